@@ -1,0 +1,42 @@
+"""Elastodynamics on tetrahedra: what answers.
+
+    M u'' + C u' + K u = P q(t),  probes = S u
+
+Operators are built once, factorised once, and then only solved with. Index letters of every
+einsum in this package: e element, q quadrature point, a b element nodes, i j components,
+n node, p probe, t time, f frequency, l derivative along an element edge.
+"""
+
+from fem.assembly import Operators, assemble, facet_points, load_operator, probe_operator
+from fem.harmonic import harmonic
+from fem.linear_solver import Factor, available, factorise
+from fem.materials import PRESETS, Material, from_young
+from fem.reduced import Poles, ReducedModel, poles, reduce, respond, transfer
+from fem.static import modes, static
+from fem.transient import Diverged, State, transient
+
+__all__ = [
+    "PRESETS",
+    "Diverged",
+    "Factor",
+    "Material",
+    "Operators",
+    "Poles",
+    "ReducedModel",
+    "State",
+    "assemble",
+    "available",
+    "facet_points",
+    "factorise",
+    "from_young",
+    "harmonic",
+    "load_operator",
+    "modes",
+    "poles",
+    "probe_operator",
+    "reduce",
+    "respond",
+    "static",
+    "transfer",
+    "transient",
+]

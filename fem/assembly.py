@@ -1,0 +1,367 @@
+"""Stiffness, damping and mass of a body, and the operators for its load and its probes.
+
+    K_ab,ij = int lam N_a,i N_b,j + mu (N_a,j N_b,i + delta_ij N_a,k N_b,k) dV
+    M_ab,ij = delta_ij int rho N_a N_b dV
+    C       = (viscosity/mu) K + Rayleigh damping for the loss factor
+              + int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
+                (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
+
+Near incompressibility the part of lam beyond nu = 0.45 acts on the element mean of the
+dilatation (Nagtegaal, Parks and Rice 1974; Hughes 1980), without which displacements some
+wavelengths away come out several per cent too small.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
+from fem.materials import Material, rayleigh_damping
+from meshes import MeshError, TetMesh, facet_set
+from meshes.tetmesh import FACES, Floats, Ints
+
+SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
+LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, below which 10-node tetrahedra need no remedy
+ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pin the normal motion
+LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Operators:
+    """M u'' + C u' + K u = f on the free degrees of freedom.
+
+    `K`, `C`, `M` are sparse (n_free, n_free); `free` (n_free,) numbers their rows among the
+    3 n displacement components of the mesh, component fastest.
+    """
+
+    K: sparse.csr_array
+    C: sparse.csr_array
+    M: sparse.csr_array
+    free: Ints
+    n_dofs: int
+
+    def expand(self, values: Floats) -> Floats:
+        """Values (n_free, ...) as (n_dofs, ...), 0 where the body is fixed."""
+        full = np.zeros((self.n_dofs, *values.shape[1:]), values.dtype)
+        full[self.free] = values
+        return full
+
+
+def assemble(
+    mesh: TetMesh,
+    material: Material | Mapping[int, Material],
+    *,
+    fixed: str | Mapping[str, str] | ArrayLike = "clamped",
+    absorbing: str | Ints | None = None,
+) -> Operators:
+    """Operators of a body.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    material : one Material, or region number -> Material
+    fixed : the name of a facet set that does not move; or facet set -> the components that do
+        not, such as {"bottom": "xyz", "left": "x"}; or an (n, 3) bool array, True where fixed.
+    absorbing : facets that let waves out, by the name of their set or as nodes, or None.
+
+    Raises
+    ------
+    ValueError
+        If a region has no material, or no degree of freedom is left.
+    MeshError
+        If a facet set is unknown or an element is inverted.
+    """
+    materials = _by_region(mesh, material)
+    rho, mu, lam, lag = (
+        np.array([value(m) for m in materials])[mesh.region]
+        for value in (
+            lambda m: m.density,
+            lambda m: m.shear_modulus,
+            lambda m: m.first_lame,
+            lambda m: m.viscosity / m.shear_modulus,
+        )
+    )
+    a, b = np.array([rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]).T
+    pattern = Pattern.of(mesh.tets, len(mesh.points))
+    free = np.flatnonzero(~_fixed_dofs(mesh, fixed))
+    if not len(free):
+        raise ValueError("every node is fixed; leave some of the body free to move")
+
+    K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[mesh.region], b[mesh.region] + lag)
+    if absorbing is not None:
+        C = C + _dashpots(mesh, facet_set(mesh, absorbing), materials)
+    K, C, M = (operator[free][:, free] for operator in (K, C, M))
+    return Operators(K=K, C=C, M=M, free=free, n_dofs=mesh.n_dofs)
+
+
+def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
+    """P (3 n, k q): nodal forces in N of pressures in Pa at the points of `facet_points`.
+
+    Pressure pushes into the body, against the outward normal.
+    """
+    nodes = facet_set(mesh, facets)
+    N, normals = _facet_geometry(mesh, nodes)  # normals carry the quadrature weight and area
+    k, q = normals.shape[:2]
+    forces = -np.einsum("qa,eqi->eaiq", N, normals)
+    rows = (3 * nodes[:, :, None, None] + np.arange(3)[:, None]).repeat(q, axis=3)
+    columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
+    shape = (mesh.n_dofs, k * q)
+    return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
+    """Quadrature points (k q, 3) in metre at which `load_operator` takes the pressure."""
+    nodes = facet_set(mesh, facets)
+    N = shape_functions(triangle_rule()[0], nodes.shape[1])
+    return np.einsum("qa,eai->eqi", N, mesh.points[nodes]).reshape(-1, 3)
+
+
+def probe_operator(
+    mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top"
+) -> sparse.csr_array:
+    """S (p, 3 n): displacement into the body, in metre, at surface points (p, 2 or 3).
+
+    A point is carried along z onto the facets; positive is the way a pressure pushes.
+
+    Raises
+    ------
+    ValueError
+        If a point lies beside the facets.
+    """
+    nodes = facet_set(mesh, facets)
+    points = np.atleast_2d(np.asarray(points, np.float64))[:, :2]
+    owner, barycentric = _locate(mesh.points[nodes[:, :3], :2], points)
+    normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    N = shape_functions(barycentric, nodes.shape[1])
+    values = -np.einsum("pa,pi->pai", N, normals)
+    columns = 3 * nodes[owner][:, :, None] + np.arange(3)
+    rows = np.broadcast_to(np.arange(len(points))[:, None, None], columns.shape)
+    shape = (len(points), mesh.n_dofs)
+    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pattern:
+    """Where each pair of element nodes is summed: CSR pattern on nodes and a slot per pair."""
+
+    indptr: Ints
+    indices: Ints
+    slot: Ints  # (e, a, b)
+
+    @staticmethod
+    def of(tets: Ints, n_nodes: int) -> "Pattern":
+        """The pattern of a mesh; one sort of pair number and origin packed into one integer."""
+        key = (tets[:, :, None] * n_nodes + tets[:, None, :]).ravel()
+        bits = int(key.size).bit_length()
+        if int(n_nodes**2).bit_length() + bits > 63:
+            raise MeshError(f"{len(tets)} tetrahedra are too many for one assembly; coarsen")
+        packed = np.sort((key << bits) | np.arange(key.size))
+        key, origin = packed >> bits, packed & ((1 << bits) - 1)
+        first = np.append(True, key[1:] != key[:-1])
+        slot = np.empty(key.size, np.int64)
+        slot[origin] = np.cumsum(first) - 1
+        rows, indices = np.divmod(key[first], n_nodes)
+        indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
+        return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
+
+    def sum(self, values: Floats) -> Floats:
+        """Element values (e, a, b) summed into the slots."""
+        summed = np.bincount(self.slot.ravel(), values.ravel(), len(self.indices))
+        return summed.astype(np.float64, copy=False)
+
+
+def _volume_operators(
+    mesh: TetMesh,
+    pattern: Pattern,
+    rho: Floats,
+    mu: Floats,
+    lam: Floats,
+    mass_rate: Floats,
+    stiffness_lag: Floats,
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
+    """K, C and M on all degrees of freedom; C = mass_rate M + stiffness_lag K by element."""
+    blocks, masses = element_matrices(mesh, rho, mu, lam)
+    K, M = _from_blocks(pattern, blocks), _from_masses(pattern, masses)
+    if np.ptp(mass_rate) == 0 and np.ptp(stiffness_lag) == 0:
+        return K, mass_rate[0] * M + stiffness_lag[0] * K, M
+    blocks *= stiffness_lag[:, None, None]
+    masses *= mass_rate[:, None, None]
+    return K, _from_blocks(pattern, blocks) + _from_masses(pattern, masses), M
+
+
+def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
+    """Element stiffness blocks (i, j, e, a, b) in N/m and masses (e, a, b) in kg."""
+    m, n_nodes = mesh.tets.shape
+    blocks, masses = np.empty((3, 3, m, n_nodes, n_nodes)), np.empty((m, n_nodes, n_nodes))
+    projected = np.maximum(lam - LOCKING_FREE * mu, 0.0) if mesh.order == 2 else np.zeros(m)
+    direct = lam - projected
+    N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
+    for slab, corners in _slabs(mesh):
+        gradients, volumes = _gradients(corners, 2, slab.start)
+        G = np.sqrt(volumes)[..., None, None] * gradients  # (e, q, a, i)
+        e, q = volumes.shape
+        flat = G.transpose(0, 2, 3, 1).reshape(e, 3 * n_nodes, q)
+        H = np.matmul(flat, flat.transpose(0, 2, 1)).reshape(e, n_nodes, 3, n_nodes, 3)
+        shear = np.einsum("eaibi->eab", H)
+        mean = np.einsum("eq,eqai->eai", volumes, gradients)
+        mean *= np.sqrt(projected[slab] / volumes.sum(axis=1))[:, None, None]
+        for i in range(3):
+            for j in range(3):
+                block = blocks[i, j, slab]
+                np.multiply(direct[slab, None, None], H[:, :, i, :, j], out=block)
+                block += mu[slab, None, None] * H[:, :, j, :, i]
+                if i == j:
+                    block += mu[slab, None, None] * shear
+                if projected[slab].any():
+                    block += mean[:, :, None, i] * mean[:, None, :, j]
+        weights = rho[slab, None] * _gradients(corners, 5, slab.start)[1]
+        masses[slab] = np.einsum("eq,qa,qb->eab", weights, N, N, optimize=True)
+    return blocks, masses
+
+
+def _slabs(mesh: TetMesh) -> Iterator[tuple[slice, Floats]]:
+    for start in range(0, len(mesh.tets), SLAB):
+        slab = slice(start, min(start + SLAB, len(mesh.tets)))
+        yield slab, mesh.points[mesh.tets[slab]]
+
+
+def _gradients(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats]:
+    """Shape gradients (e, q, a, i) and quadrature volumes (e, q) of elements (e, a, i)."""
+    barycentric, weights = tetrahedron_rule(degree)
+    derivatives = shape_derivatives(barycentric, nodes.shape[1])
+    jacobian = np.einsum("qal,eai->eqli", derivatives, nodes, optimize=True)
+    determinant = np.linalg.det(jacobian)
+    inverted = np.flatnonzero((determinant <= 0).any(axis=1))
+    if len(inverted):
+        raise MeshError(
+            f"element {first + inverted[0]} is inverted (and {len(inverted) - 1} more near it); "
+            "straighten its mid-side nodes or remesh"
+        )
+    gradients = np.einsum("eqil,qal->eqai", np.linalg.inv(jacobian), derivatives, optimize=True)
+    return gradients, determinant * weights / 6
+
+
+def _from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
+    data = np.empty((len(pattern.indices), 3, 3))
+    for i in range(3):
+        for j in range(3):
+            data[:, i, j] = pattern.sum(blocks[i, j])
+    return sparse.bsr_array((data, pattern.indices, pattern.indptr)).tocsr()
+
+
+def _from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
+    n = len(pattern.indptr) - 1
+    nodal = sparse.csr_array((pattern.sum(masses), pattern.indices, pattern.indptr), shape=(n, n))
+    return sparse.kron(nodal, sparse.eye_array(3), format="csr")
+
+
+def _by_region(mesh: TetMesh, material: Material | Mapping[int, Material]) -> list[Material]:
+    """Materials such that region number r has material[r]."""
+    if isinstance(material, Material):
+        return [material] * (int(mesh.region.max()) + 1)
+    missing = sorted(set(np.unique(mesh.region).tolist()) - set(material))
+    if missing:
+        raise ValueError(f"regions {missing} have no material; give one for each region")
+    spare = next(iter(material.values()))
+    return [material.get(r, spare) for r in range(int(mesh.region.max()) + 1)]
+
+
+def _fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
+    """(3 n,) bool, True where the displacement is held at 0."""
+    if isinstance(fixed, str):
+        fixed = {fixed: "xyz"}
+    if not isinstance(fixed, Mapping):
+        mask = np.asarray(fixed, bool)
+        if mask.shape != mesh.points.shape:
+            raise ValueError(f"fixed has shape {mask.shape}; give {mesh.points.shape}, node by xyz")
+        return mask.ravel()
+    mask = np.zeros(mesh.points.shape, bool)
+    for name, components in fixed.items():
+        if not components or set(components) - set("xyz"):
+            raise ValueError(f"fixed components '{components}' of '{name}': use letters of 'xyz'")
+        for component in components:
+            mask[np.unique(facet_set(mesh, name)), "xyz".index(component)] = True
+    return mask.ravel()
+
+
+def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
+    """The two edge tangents at one barycentric point (p, 3) per facet (p, a)."""
+    derivatives = shape_derivatives(barycentric, nodes.shape[1])
+    tangents = np.einsum("pal,pai->pli", derivatives, mesh.points[nodes])
+    return tangents[:, 0], tangents[:, 1]
+
+
+def _facet_geometry(mesh: TetMesh, nodes: Ints) -> tuple[Floats, Floats]:
+    """Shape values (q, a) and outward normals (e, q, i) times area and quadrature weight."""
+    barycentric, weights = triangle_rule()
+    derivatives = shape_derivatives(barycentric, nodes.shape[1])
+    tangents = np.einsum("qal,eai->eqli", derivatives, mesh.points[nodes], optimize=True)
+    normals = np.cross(tangents[:, :, 0], tangents[:, :, 1]) / 2
+    return shape_functions(barycentric, nodes.shape[1]), normals * weights[:, None]
+
+
+def _dashpots(mesh: TetMesh, nodes: Ints, materials: list[Material]) -> sparse.csr_array:
+    """Lysmer-Kuhlemeyer damping (3 n, 3 n) of facets (k, a)."""
+    m = [materials[r] for r in mesh.region[_owners(mesh, nodes)]]
+    shear = np.array([x.density * x.shear_speed for x in m])
+    squared_ratio = np.array(
+        [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]
+    )
+    pressure = shear * np.sqrt(squared_ratio)
+    N, normals = _facet_geometry(mesh, nodes)
+    area = np.linalg.norm(normals, axis=2)
+    unit = normals / area[..., None]
+    along = unit[..., :, None] * unit[..., None, :]
+    impedance = pressure[:, None, None, None] * along
+    impedance += shear[:, None, None, None] * (np.eye(3) - along)
+    local = np.einsum("eq,eqij,qa,qb->eaibj", area, impedance, N, N, optimize=True)
+    dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+    rows = np.broadcast_to(dofs[:, :, None], (*dofs.shape, dofs.shape[1]))
+    columns = rows.transpose(0, 2, 1)
+    shape = (mesh.n_dofs, mesh.n_dofs)
+    return sparse.csr_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def _owners(mesh: TetMesh, nodes: Ints) -> Ints:
+    """The tetrahedron behind each facet: the one that has all its corners."""
+    n = len(mesh.points)
+    corner_sets = mesh.tets[:, FACES[:, :3]].reshape(-1, 3)
+
+    def key(corners: Ints) -> Ints:
+        low, middle, high = np.sort(corners, axis=1).T
+        return (low * n + middle) * n + high
+
+    keys = key(corner_sets)
+    order = np.argsort(keys)
+    wanted = key(nodes[:, :3])
+    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(order) - 1)]
+    if not (keys[found] == wanted).all():
+        raise MeshError("a facet belongs to no tetrahedron; take facets from the same mesh")
+    return found // 4
+
+
+def _locate(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """Which triangle (p,) of (k, 3, 2) each point (p, 2) lies in, and where (p, 3)."""
+    origin, edges = triangles[:, 0], triangles[:, 1:] - triangles[:, :1]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    standing = np.abs(area) < 1e-12 * (edges**2).sum(axis=(1, 2))
+    inverse_area = np.where(standing, np.nan, 1 / np.where(standing, 1, area))
+    owners, coordinates = [], []
+    for point in points:
+        x, y = (point - origin).T
+        second = (x * edges[:, 1, 1] - y * edges[:, 1, 0]) * inverse_area
+        third = (y * edges[:, 0, 0] - x * edges[:, 0, 1]) * inverse_area
+        inside = np.minimum(np.minimum(second, third), 1 - second - third)
+        owner = int(np.nanargmax(inside))
+        if inside[owner] < -1e-9:
+            x_mm, y_mm = 1e3 * point
+            raise ValueError(
+                f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
+            )
+        owners.append(owner)
+        coordinates.append([1 - second[owner] - third[owner], second[owner], third[owner]])
+    return np.array(owners), np.array(coordinates)

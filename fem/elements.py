@@ -1,0 +1,85 @@
+"""Lagrange shape functions and quadrature on triangles and tetrahedra.
+
+Both are written in barycentric coordinates, so that one formula serves both shapes: the
+quadratic functions are l_a (2 l_a - 1) at the corners and 4 l_a l_b at the mid-sides.
+Index letters of every einsum in `fem`: e element, q quadrature point, a b element nodes,
+i j components, n node, p probe, t time, f frequency, m mode, l barycentric coordinate.
+"""
+
+from itertools import permutations
+
+import numpy as np
+
+from meshes.tetmesh import EDGES, Floats
+
+TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+def shape_functions(barycentric: Floats, n_nodes: int) -> Floats:
+    """Values (q, n_nodes) at barycentric points (q, 3) of triangles or (q, 4) of tetrahedra."""
+    corners = barycentric.shape[1]
+    if n_nodes == corners:
+        return barycentric
+    a, b = _edges(corners).T
+    quadratic = barycentric * (2 * barycentric - 1)
+    return np.hstack([quadratic, 4 * barycentric[:, a] * barycentric[:, b]])
+
+
+def shape_derivatives(barycentric: Floats, n_nodes: int) -> Floats:
+    """Derivatives (q, n_nodes, l - 1) along the edges from corner 0 to each other corner."""
+    points, corners = barycentric.shape
+    by_coordinate = np.zeros((points, n_nodes, corners))
+    if n_nodes == corners:
+        by_coordinate[:] = np.eye(corners)
+    else:
+        corner = np.arange(corners)
+        by_coordinate[:, corner, corner] = 4 * barycentric - 1
+        for edge, (a, b) in enumerate(_edges(corners)):
+            by_coordinate[:, corners + edge, a] = 4 * barycentric[:, b]
+            by_coordinate[:, corners + edge, b] = 4 * barycentric[:, a]
+    return by_coordinate[:, :, 1:] - by_coordinate[:, :, :1]
+
+
+def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
+    """Barycentric points (q, 4) and weights (q,) summing to 1, exact to `degree` (2 or 5).
+
+    Degree 5 is the 14-point rule of Walkington (2000), all of whose weights are positive.
+    """
+    if degree <= 2:
+        return _orbits((0.25, [(5 - 5**0.5) / 20] * 3))
+    return _orbits(
+        (0.11268792571801585, [0.3108859192633006] * 3),
+        (0.07349304311636195, [0.0927352503108912] * 3),
+        (0.042546020777081466, [0.04550370412564965] * 2 + [0.4544962958743504]),
+    )
+
+
+def triangle_rule() -> tuple[Floats, Floats]:
+    """Barycentric points (6, 3) and weights (6,) summing to 1, exact to degree 4 (Dunavant)."""
+    return _orbits(
+        (0.22338158967801147, [0.4459484909159649] * 2),
+        (0.10995174365532187, [0.09157621350977074] * 2),
+    )
+
+
+def _edges(corners: int) -> np.ndarray:
+    return EDGES if corners == 4 else TRIANGLE_EDGES
+
+
+def _orbits(*orbits: tuple[float, list[float]]) -> tuple[Floats, Floats]:
+    """Every distinct permutation of each point; its last coordinate makes the sum 1."""
+    points, weights = [], []
+    for weight, leading in orbits:
+        orbit = sorted(set(permutations([*leading, round(1 - sum(leading), 15)])))
+        orbit = _distinct(orbit)
+        points += orbit
+        weights += [weight] * len(orbit)
+    return np.array(points), np.array(weights) / sum(weights)
+
+
+def _distinct(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Points that differ by more than round-off."""
+    kept: dict[tuple[float, ...], tuple[float, ...]] = {}
+    for point in points:
+        kept.setdefault(tuple(round(value, 9) for value in point), point)
+    return list(kept.values())

@@ -1,0 +1,110 @@
+"""Linear viscoelastic materials and the presets that scenes name.
+
+The complex shear modulus is mu(w) = mu (1 + i loss_factor) + i w viscosity (time exp(+i w t));
+Poisson's ratio stays what it is, so that the whole stiffness scales with mu.
+"""
+
+from dataclasses import dataclass
+from math import isfinite, pi, sqrt
+
+import numpy as np
+from scipy.optimize import brentq
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """An isotropic solid; give `shear_modulus` or build it with `from_young`.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    shear_modulus : float, Pa
+    poisson : float, -1 < poisson < 0.5
+    viscosity : float, Pa s, Kelvin-Voigt: shear stress per shear rate
+    loss_factor : float, hysteretic loss, the same at every frequency
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or outside these limits.
+    """
+
+    density: float
+    shear_modulus: float
+    poisson: float
+    viscosity: float = 0.0
+    loss_factor: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("density", "shear_modulus"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value > 0):
+                raise ValueError(f"{name} = {value} must be a finite number above 0")
+        for name in ("viscosity", "loss_factor"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0):
+                raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
+        if not -1 < self.poisson < 0.5:
+            raise ValueError(
+                f"poisson = {self.poisson} is outside -1 < poisson < 0.5; "
+                "for an incompressible solid use 0.4999"
+            )
+
+    @property
+    def young(self) -> float:
+        """Young's modulus, Pa."""
+        return 2 * self.shear_modulus * (1 + self.poisson)
+
+    @property
+    def first_lame(self) -> float:
+        """Lame's first parameter, Pa."""
+        return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
+
+    @property
+    def shear_speed(self) -> float:
+        """Speed of shear waves without loss, m/s."""
+        return sqrt(self.shear_modulus / self.density)
+
+    @property
+    def pressure_speed(self) -> float:
+        """Speed of pressure waves without loss, m/s."""
+        return sqrt((self.first_lame + 2 * self.shear_modulus) / self.density)
+
+    @property
+    def rayleigh_speed(self) -> float:
+        """Speed of surface waves without loss, m/s, the root of Rayleigh's equation."""
+        ratio = self.shear_modulus / (self.first_lame + 2 * self.shear_modulus)
+
+        def rayleigh(x: float) -> float:
+            return (2 - x * x) ** 2 - 4 * sqrt(1 - x * x) * sqrt(1 - x * x * ratio)
+
+        return self.shear_speed * brentq(rayleigh, 0.5, 1 - 1e-12, xtol=1e-14)
+
+
+def from_young(*, young: float, poisson: float, **rest: float) -> Material:
+    """A material by its Young's modulus in Pa; the rest as in `Material`."""
+    return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
+
+
+def rayleigh_damping(loss_factor: float, band: tuple[float, float]) -> tuple[float, float]:
+    """Coefficients (a, b) of the damping a M + b K that stand in for a constant loss factor.
+
+    Viscous damping a M + b K has the loss factor a/w + b w; over the band (Hz) its largest and
+    smallest values lie equally far above and below the given one (least maximum deviation).
+    """
+    low, high = 2 * pi * np.array(band)
+    middle, spread = sqrt(low * high), sqrt(high / low)
+    # a/w + b w is least, 2 b middle, at the middle, and largest, b middle (r + 1/r), at both ends.
+    b = 2 * loss_factor / middle / (2 + spread + 1 / spread)
+    return b * middle**2, b
+
+
+PRESETS = {
+    # Effective homogeneous soft tissue: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
+    # palms bracket the 5-8 m/s at which a moving focus is felt most.
+    "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
+    "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
+    "palm-stiff": Material(density=1000, shear_modulus=50e3, poisson=0.4999, viscosity=10.0),
+    # 80 g/m2 office paper of 0.1 mm, geometric mean of the two in-plane directions.
+    "paper": from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03),
+}

@@ -1,0 +1,280 @@
+"""A small model that answers like the large one at the probes, for any load on the surface.
+
+By reciprocity the response of probe p to a load f is f^T y_p with (K + s C + s^2 M) y_p = s_p.
+Those y_p(s) are approximated by Galerkin projection onto the second-order Krylov space of the
+probe vectors at one real shift, which costs one real factorisation. The space is built by the
+two-level Arnoldi method (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016): with
+proportional damping the plain recurrence loses all accuracy after a few dozen moments.
+The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, signal, sparse
+
+from fem.assembly import Operators
+from fem.linear_solver import factorise
+from meshes.tetmesh import Floats
+
+Complex = NDArray[np.complex128]
+
+SHIFT = 2 * np.pi * 200.0  # rad/s: best between 200 and 400 Hz for a band of 1 to 2 kHz
+BATCH = 5  # moments between two looks at the error estimate
+MOST_MOMENTS = 200
+DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedModel:
+    """u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
+
+    `basis` (3 n, r) in kg^-1/2, `K` and `C` (r, r), `outputs` (p, r); `estimate` is the relative
+    change of the probes' adjoint fields by the last moments, `moments` how many there are.
+    """
+
+    basis: Floats
+    K: Floats
+    C: Floats
+    outputs: Floats
+    moments: int
+    estimate: float
+    solver: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Poles:
+    """The model in its own coordinates: z' = pole z + inputs f, probes = 2 Re(outputs z).
+
+    `values` (m,) in 1/s with imaginary part >= 0, `inputs` (m, r), `outputs` (p, m).
+    """
+
+    values: Complex
+    inputs: Complex
+    outputs: Complex
+
+
+def reduce(
+    operators: Operators,
+    probes: sparse.csr_array,
+    band: float = 1000.0,
+    tolerance: float = 1e-3,
+    *,
+    loads: Floats | None = None,
+    solver: str = "auto",
+    progress: Callable[[float], None] | None = None,
+) -> ReducedModel:
+    """Reduce a body to the motion of its probes.
+
+    Parameters
+    ----------
+    operators : Operators
+    probes : (p, 3 n) sparse, from `probe_operator`
+    band : float, Hz, highest frequency that must be right
+    tolerance : float, relative error of the probes' displacement at any frequency of the band
+    loads : (3 n, k), typical nodal forces by which the error is judged; without any it is judged
+        by the probes' adjoint fields in the whole body, which asks for far more moments
+    progress : called with the fraction done, as the error estimate approaches the tolerance
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is out of reach.
+    """
+    K, C, M, free = operators.K, operators.C, operators.M, operators.free
+    factor = factorise(K + SHIFT * C + SHIFT**2 * M, backend=solver)
+    seeds = probes[:, free].toarray().T
+    loads = None if loads is None else loads[free]
+    space = _Space(M, seeds.shape[1] * (MOST_MOMENTS + 1))
+    small_K, small_C = np.empty((0, 0)), np.empty((0, 0))
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift): rows of `pairs`
+    # are orthonormal, so that nothing grows however many moments are taken.
+    pairs = np.zeros((2, space.size, 0))
+    newest = np.stack([upper := space.extend(factor.solve(seeds)), np.zeros_like(upper)])
+    errors: list[float] = []
+    before = None
+    for moment in range(1, MOST_MOMENTS + 1):
+        new = space.basis[:, len(small_K) :]
+        small_K = _bordered(small_K, space.basis.T @ (K @ new))
+        small_C = _bordered(small_C, space.basis.T @ (C @ new))
+        if moment % BATCH == 0:
+            weights = None if loads is None else space.basis.T @ loads
+            now = _probe_response(small_K, small_C, space.basis.T @ seeds, weights, band)
+            errors += [] if before is None else [_change(before, now)]
+            before = now
+            if progress and errors:
+                progress(min(1.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
+            if len(errors) > 1 and _tail(errors) <= tolerance:
+                break
+        pairs, newest = _append(pairs, newest)
+        y, y_before = (space.basis @ part for part in newest)
+        step = factor.solve(C @ y + 2 * SHIFT * (M @ y) + SHIFT * (M @ y_before))
+        lower = newest[0]
+        upper = space.extend(-step)
+        newest = np.stack([upper, _padded(lower, len(upper)) / SHIFT])
+    else:
+        raise ValueError(
+            f"{MOST_MOMENTS} moments leave an error of {_tail(errors):.2g}, above the tolerance "
+            f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
+        )
+    return ReducedModel(
+        basis=operators.expand(space.basis),
+        K=small_K,
+        C=small_C,
+        outputs=seeds.T @ space.basis,
+        moments=moment,
+        estimate=_tail(errors),
+        solver=factor.backend,
+    )
+
+
+def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Complex:
+    """Probe displacement (f, p, k) in metre per unit of the reduced forces (r, k) at each Hz."""
+    w = 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))
+    Z = _impedance(model.K, model.C, w)
+    return model.outputs @ np.linalg.solve(Z, np.broadcast_to(forces, (len(w), *forces.shape)))
+
+
+def poles(model: ReducedModel) -> Poles:
+    """Diagonalise the model in first-order form, once; one of each conjugate pair is kept."""
+    r = len(model.K)
+    companion = np.block([[np.zeros((r, r)), np.eye(r)], [-model.K, -model.C]])
+    values, vectors = linalg.eig(companion)
+    kept = values.imag >= 0
+    inverse = np.linalg.inv(vectors)[kept, r:]
+    # A real pole stands alone, so that twice the real part counts it double.
+    weight = np.where(values[kept].imag > 0, 1.0, 0.5)
+    outputs = (model.outputs @ vectors[:r, kept]) * weight
+    return Poles(values=values[kept], inputs=inverse, outputs=outputs)
+
+
+def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt: float) -> Floats:
+    """Probe displacement (t, p) in metre from rest, exact for a load linear within each step.
+
+    Parameters
+    ----------
+    footprints : (k, r) reduced forces at k positions of the focus, N kg^-1/2 per Pa
+    position : (t,) float, where the focus is, in 0..k-1; between two positions linear
+    gain : (t,) float, Pa, pressure at the focus
+    dt : float, s
+    """
+    low = np.minimum(position.astype(np.int64), max(len(footprints) - 2, 0))
+    part = position - low
+    high = np.minimum(low + 1, len(footprints) - 1)
+    at_low, at_high = gain * (1 - part), gain * part
+    displacement = np.zeros((len(poles.outputs), len(gain)))
+    for value, modal, output in zip(
+        poles.values, poles.inputs @ footprints.T, poles.outputs.T, strict=True
+    ):
+        drive = at_low * modal[low] + at_high * modal[high]
+        decay, end, start = _step_weights(value * dt)
+        # The initial condition of the filter makes z(0) = 0 whatever the load begins with.
+        z, _ = signal.lfilter([dt * end, dt * start], [1, -decay], drive, zi=[-dt * end * drive[0]])
+        displacement += 2 * (output.real[:, None] * z.real - output.imag[:, None] * z.imag)
+    return displacement.T
+
+
+def _step_weights(x: complex) -> tuple[complex, complex, complex]:
+    """exp(x), and the weights of the load at the end and at the start of a step.
+
+    z(t + dt) = exp(x) z + dt int_0^1 exp(x (1 - s)) [(1 - s) g_0 + s g_1] ds
+    """
+    if abs(x) < 1e-2:  # series, where the closed forms cancel
+        end = 1 / 2 + x / 6 + x**2 / 24 + x**3 / 120 + x**4 / 720
+        whole = 1 + x / 2 + x**2 / 6 + x**3 / 24 + x**4 / 120 + x**5 / 720
+    else:
+        end = (np.exp(x) - 1 - x) / x**2
+        whole = (np.exp(x) - 1) / x
+    return np.exp(x), end, whole - end
+
+
+class _Space:
+    """A growing mass-orthonormal basis (n, size); memory is touched only as far as it is used."""
+
+    def __init__(self, M: sparse.csr_array, most: int) -> None:
+        self._M = M
+        self._columns = np.empty((M.shape[0], most), order="F")
+        self.size = 0
+
+    @property
+    def basis(self) -> Floats:
+        return self._columns[:, : self.size]
+
+    def extend(self, block: Floats) -> Floats:
+        """Add the directions of a block (n, k) that are new; its coordinates (size, k)."""
+        M, Q = self._M, self.basis
+        scale = _mass_norms(M, block)
+        block, overlap = block / scale, 0.0
+        for _ in range(2):  # twice is enough
+            coordinates = Q.T @ (M @ block)
+            block = block - Q @ coordinates
+            overlap = overlap + coordinates
+        left = _mass_norms(M, block)
+        block = block / left
+        squares, directions = np.linalg.eigh(block.T @ (M @ block))
+        new = block @ (directions[:, squares > DEPENDENT * squares.max()])
+        for _ in range(2):
+            new = new - Q @ (Q.T @ (M @ new))
+            new = np.linalg.solve(np.linalg.cholesky(new.T @ (M @ new)), new.T).T
+        self._columns[:, self.size : self.size + new.shape[1]] = new
+        self.size += new.shape[1]
+        return np.vstack([overlap, (new.T @ (M @ block)) * left]) * scale
+
+
+def _mass_norms(M: sparse.csr_array, block: Floats) -> Floats:
+    return np.sqrt(np.einsum("nk,nk->k", block, M @ block))
+
+
+def _padded(coordinates: Floats, size: int) -> Floats:
+    return np.vstack([coordinates, np.zeros((size - len(coordinates), coordinates.shape[1]))])
+
+
+def _append(pairs: Floats, newest: Floats) -> tuple[Floats, Floats]:
+    """The pairs (2, size, k) with the newest made orthonormal to them; and those alone."""
+    _, size, width = newest.shape
+    grown = np.zeros((2, size, pairs.shape[2]))
+    grown[:, : pairs.shape[1]] = pairs
+    W, X = grown.reshape(2 * size, -1), newest.reshape(2 * size, width)
+    X = X / np.linalg.norm(X, axis=0)
+    for _ in range(2):
+        X = X - W @ (W.T @ X)
+    X = np.linalg.qr(X)[0]
+    return np.hstack([W, X]).reshape(2, size, -1), X.reshape(2, size, width)
+
+
+def _bordered(small: Floats, columns: Floats) -> Floats:
+    """A symmetric matrix grown by its last columns (r, k)."""
+    r, k = columns.shape
+    grown = np.empty((r, r))
+    grown[: r - k, : r - k] = small
+    grown[:, r - k :] = columns
+    grown[r - k :] = columns.T
+    return grown
+
+
+def _impedance(K: Floats, C: Floats, w: Floats) -> Complex:
+    s = 1j * w[:, None, None]
+    return K + s * C + s**2 * np.eye(len(K))
+
+
+def _probe_response(
+    K: Floats, C: Floats, seeds: Floats, loads: Floats | None, band: float
+) -> Complex:
+    """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
+    w = 2 * np.pi * np.linspace(0, band, 41)
+    fields = np.linalg.solve(_impedance(K, C, w), np.broadcast_to(seeds, (len(w), *seeds.shape)))
+    return np.asarray(fields if loads is None else loads.T @ fields)
+
+
+def _change(before: Complex, now: Complex) -> float:
+    """Largest relative change at any frequency."""
+    change = now.copy()
+    change[:, : before.shape[1]] -= before
+    return float((np.linalg.norm(change, axis=(1, 2)) / np.linalg.norm(now, axis=(1, 2))).max())
+
+
+def _tail(changes: list[float]) -> float:
+    """Error left after the last change, if the changes go on shrinking as they did last."""
+    return changes[-1] * min(1.0, changes[-1] / changes[-2])

@@ -1,0 +1,112 @@
+"""M u'' + C u' + K u = f(t) from rest by the generalized-alpha method.
+
+Chung and Hulbert, J Appl Mech 60:371 (1993), doi 10.1115/1.2900803. Spectral radius 1 is
+average acceleration (Newmark 1/4, 1/2), which conserves energy; 0 annihilates what the time
+step cannot resolve. Second order and unconditionally stable throughout.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import cg
+
+from fem.assembly import Operators
+from fem.linear_solver import factorise
+from meshes.tetmesh import Floats
+
+
+class Diverged(ArithmeticError):
+    """A run whose numbers grew beyond all bounds."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """Time in s; displacement, velocity and acceleration (3 n,) in m, m/s and m/s2."""
+
+    time: float
+    displacement: Floats
+    velocity: Floats
+    acceleration: Floats
+
+
+def transient(
+    operators: Operators,
+    force: Callable[[float], Floats],
+    dt: float,
+    *,
+    spectral_radius: float = 1.0,
+    initial: State | None = None,
+    solver: str = "auto",
+) -> Iterator[State]:
+    """States at 0, dt, 2 dt, ... without end: take what you need.
+
+    Parameters
+    ----------
+    force : time in s -> nodal forces (3 n,) in N
+    dt : float, s
+    spectral_radius : 0 to 1, amplitude kept per step by motion far beyond the time step
+    initial : where to start; at rest at time 0 if not given
+
+    Raises
+    ------
+    ValueError
+        If dt or the spectral radius is out of range.
+    Diverged
+        If the displacement is not finite.
+    """
+    if not (np.isfinite(dt) and dt > 0):
+        raise ValueError(f"dt = {dt} s must be a finite number above 0")
+    if not 0 <= spectral_radius <= 1:
+        raise ValueError(f"spectral_radius = {spectral_radius} is outside 0..1; 1 conserves energy")
+    K, C, M, free = operators.K, operators.C, operators.M, operators.free
+    a_m = (2 * spectral_radius - 1) / (spectral_radius + 1)
+    a_f = spectral_radius / (spectral_radius + 1)
+    gamma = 0.5 - a_m + a_f
+    beta = (1 - a_m + a_f) ** 2 / 4
+    system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * K)
+    factor = factorise(system, backend=solver)
+
+    start = initial or _at_rest(operators.n_dofs)
+    u, v = start.displacement[free], start.velocity[free]
+    f = force(start.time)[free]
+    a = _acceleration(operators, f - C @ v - K @ u)
+    step = 0
+    while True:
+        time = start.time + step * dt
+        if not np.isfinite(u).all():
+            raise Diverged(
+                f"displacement is not finite at t = {time:g} s, step {step} of dt = {dt:g} s; "
+                "check the load and the material"
+            )
+        yield State(
+            time=time,
+            displacement=operators.expand(u),
+            velocity=operators.expand(v),
+            acceleration=operators.expand(a),
+        )
+        step += 1
+        f_next = force(start.time + step * dt)[free]
+        u_next = u + dt * v + dt**2 * (0.5 - beta) * a
+        v_next = v + dt * (1 - gamma) * a
+        inner = (1 - a_f) * f_next + a_f * f - a_m * (M @ a)
+        inner -= K @ ((1 - a_f) * u_next + a_f * u) + C @ ((1 - a_f) * v_next + a_f * v)
+        a = factor.solve(inner)
+        u, v, f = u_next + dt**2 * beta * a, v_next + dt * gamma * a, f_next
+
+
+def _at_rest(n_dofs: int) -> State:
+    zero = np.zeros(n_dofs)
+    return State(time=0.0, displacement=zero, velocity=zero, acceleration=zero)
+
+
+def _acceleration(operators: Operators, unbalanced: Floats) -> Floats:
+    """M^-1 r by conjugate gradients: a consistent mass matrix scaled by its diagonal is benign."""
+    if not unbalanced.any():
+        return np.zeros_like(unbalanced)
+    scale = 1 / np.sqrt(operators.M.diagonal())
+    scaled = operators.M.multiply(scale).T.multiply(scale).tocsr()
+    a, failed = cg(scaled, scale * unbalanced, rtol=1e-13, atol=0.0, maxiter=500)
+    if failed:
+        raise Diverged("the mass matrix could not be inverted; are all densities above 0?")
+    return scale * a

@@ -1,0 +1,25 @@
+"""Tetrahedral bodies: what the moving pressure drives."""
+
+from meshes.structured import Grading, block, extrude, graded_axis, sheet
+from meshes.tetmesh import (
+    MeshError,
+    TetMesh,
+    boundary_facets,
+    corner_volumes,
+    facet_set,
+    quadratic,
+)
+
+__all__ = [
+    "Grading",
+    "MeshError",
+    "TetMesh",
+    "block",
+    "boundary_facets",
+    "corner_volumes",
+    "extrude",
+    "facet_set",
+    "graded_axis",
+    "quadratic",
+    "sheet",
+]

@@ -1,0 +1,195 @@
+"""Structured bodies: triangulated rectangles extruded downwards, three tetrahedra a prism.
+
+The driven surface is the plane z = 0 with the body below it, centred on the origin.
+Sorting the node numbers of each triangle before it is extruded makes neighbouring prisms
+cut their common side along the same diagonal, so that the mesh conforms without a search.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from meshes.tetmesh import (
+    Floats,
+    Ints,
+    MeshError,
+    TetMesh,
+    boundary_facets,
+    corner_volumes,
+    quadratic,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grading:
+    """Fine where the focus travels, coarser away from it.
+
+    Parameters
+    ----------
+    radius : float, metre, half width of the square that keeps the fine size.
+    growth : float, ratio of one cell to its neighbour outside the square and downwards.
+    coarsest : float, metre, largest cell.
+    """
+
+    radius: float
+    growth: float = 1.3
+    coarsest: float = np.inf
+
+
+def sheet(
+    width: float, height: float, thickness: float, h: float, *, layers: int = 1, order: int = 2
+) -> TetMesh:
+    """A flat sheet with its edges in the facet set `clamped`.
+
+    Parameters
+    ----------
+    width, height, thickness : float, metre, along x, y and z.
+    h : float, metre, largest side of a cell in the plane.
+    layers : int, elements through the thickness.
+    order : 1 or 2, four- or ten-node tetrahedra.
+    """
+    lines = (_even(width, h), _even(height, h), np.linspace(-thickness, 0.0, layers + 1))
+    return _with_roles(extrude(*lines, order=order), clamped="sides")
+
+
+def block(
+    lengths: tuple[float, float, float],
+    h: float,
+    *,
+    grading: Grading | None = None,
+    order: int = 2,
+) -> TetMesh:
+    """A rectangular block: its base in the facet set `clamped`, its sides in `absorbing`.
+
+    Parameters
+    ----------
+    lengths : three floats, metre, along x, y and z.
+    h : float, metre, largest side of a cell, under the focus if graded.
+    grading : how cells grow away from the focus; None for equal cells.
+    order : 1 or 2, four- or ten-node tetrahedra.
+    """
+    x_length, y_length, depth = lengths
+    if grading is None:
+        lines = _even(x_length, h), _even(y_length, h), _even(depth, h, least=1) - depth / 2
+    else:
+        lines = (
+            _mirrored(graded_axis(x_length / 2, h, grading)),
+            _mirrored(graded_axis(y_length / 2, h, grading)),
+            -graded_axis(depth, h, Grading(radius=0, **_beyond(grading)))[::-1],
+        )
+    return _with_roles(extrude(*lines, order=order), clamped="bottom", absorbing="sides")
+
+
+def graded_axis(length: float, h: float, grading: Grading) -> Floats:
+    """Grid lines from 0 to `length`: cells of `h` up to the radius, then growing."""
+    fine = min(grading.radius, length)
+    cells = [fine / n] * n if (n := int(np.ceil(fine / h - 1e-9))) else []
+    rest, size = length - fine, h
+    tail: list[float] = []
+    while rest > 1e-9 * length and sum(tail) < rest:
+        size = min(size * grading.growth if tail or cells else size, grading.coarsest)
+        tail.append(size)
+    if tail:
+        # Land on the end exactly, by leaving out the last cell or stretching fewer of them.
+        tail = tail[:-1] if len(tail) > 1 and sum(tail) - rest > tail[-1] / 2 else tail
+        cells += list(np.array(tail) * (rest / sum(tail)))
+    return np.concatenate([[0.0], np.cumsum(cells)])
+
+
+def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
+    """Tetrahedra on the grid lines x, y, z (increasing, metre).
+
+    The facet sets are `top`, `bottom`, `sides` and the four sides `left` (least x), `right`,
+    `front` (least y) and `back`. Diagonals alternate between cells, so that a grid with an even
+    number of cells and mirrored lines has the mirror symmetries of the rectangle.
+
+    Raises
+    ------
+    MeshError
+        If grid lines do not increase or the order is not 1 or 2.
+    """
+    lines = [np.asarray(line, np.float64) for line in (x, y, z)]
+    for name, line in zip("xyz", lines, strict=True):
+        if line.ndim != 1 or len(line) < 2 or not (np.diff(line) > 0).all():
+            raise MeshError(f"grid lines along {name} must be two or more increasing numbers")
+    if order not in (1, 2):
+        raise MeshError(f"order = {order} is not available; use 1 or 2")
+    triangles, per_layer = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
+    tets = np.vstack(
+        [
+            _prism_tets(triangles + low * per_layer, per_layer)
+            for low, _ in pairwise(range(len(lines[2])))
+        ]
+    )
+    zz, yy, xx = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
+    points = np.column_stack([xx.ravel(), yy.ravel(), zz.ravel()])
+    wrong = corner_volumes(points, tets) < 0
+    tets[wrong, 2:] = tets[wrong, :1:-1]
+    mesh = TetMesh(points=points, tets=tets, facets=_sides(points, boundary_facets(tets)))
+    return quadratic(mesh) if order == 2 else mesh
+
+
+def _rectangle_triangles(nx: int, ny: int) -> tuple[Ints, int]:
+    """Two triangles a cell with alternating diagonals, node numbers sorted; nodes a layer."""
+    j, i = np.divmod(np.arange(nx * ny), nx)
+    a, b = j * (nx + 1) + i, j * (nx + 1) + i + 1
+    d, c = a + nx + 1, b + nx + 1
+    even = ((i + j) % 2 == 0)[:, None]
+    first = np.where(even, np.column_stack([a, b, c]), np.column_stack([a, b, d]))
+    second = np.where(even, np.column_stack([a, c, d]), np.column_stack([b, c, d]))
+    return np.sort(np.vstack([first, second]), axis=1), (nx + 1) * (ny + 1)
+
+
+def _prism_tets(triangles: Ints, per_layer: int) -> Ints:
+    a0, a1, a2 = triangles.T
+    b0, b1, b2 = triangles.T + per_layer
+    return np.vstack(
+        [
+            np.column_stack([a0, a1, a2, b2]),
+            np.column_stack([a0, a1, b2, b1]),
+            np.column_stack([a0, b1, b2, b0]),
+        ]
+    )
+
+
+def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
+    """Facet sets of a box by the plane in which each facet lies."""
+    corners = points[facets]
+    low, high = points.min(axis=0), points.max(axis=0)
+    planes = [("left", 0, low), ("right", 0, high), ("front", 1, low), ("back", 1, high)]
+    planes += [("bottom", 2, low), ("top", 2, high)]
+    sets = {
+        name: facets[(corners[..., axis] == end[axis]).all(axis=1)] for name, axis, end in planes
+    }
+    sets["sides"] = np.vstack([sets[name] for name in ("left", "right", "front", "back")])
+    return sets
+
+
+def _with_roles(mesh: TetMesh, **roles: str) -> TetMesh:
+    """The mesh with some of its facet sets known by what is done to them, too."""
+    named = {role: mesh.facets[name] for role, name in roles.items()}
+    return TetMesh(
+        points=mesh.points, tets=mesh.tets, region=mesh.region, facets={**mesh.facets, **named}
+    )
+
+
+def _even(length: float, h: float, *, least: int = 2) -> Floats:
+    """Equal cells no larger than h about the origin, an even number where symmetry is wanted."""
+    if not (length > 0 and h > 0):
+        raise MeshError(f"length {length} m and h {h} m must be above 0")
+    return np.linspace(-length / 2, length / 2, least * max(1, round_up(length / (least * h))) + 1)
+
+
+def round_up(ratio: float) -> int:
+    """Ceiling that forgives round-off just above a whole number."""
+    return int(np.ceil(ratio - 1e-9))
+
+
+def _mirrored(half: Floats) -> Floats:
+    return np.concatenate([-half[:0:-1], half])
+
+
+def _beyond(grading: Grading) -> dict[str, float]:
+    return {"growth": grading.growth, "coarsest": grading.coarsest}

@@ -1,0 +1,27 @@
+"""What is commanded, and every answer that needs no mesh."""
+
+from simple_model.focus import array_field, focal_spot, relative_intensity
+from simple_model.point_kernel import point_kernel
+from simple_model.pressure import MovingPressure
+from simple_model.response import Effort, Response, lines, spectrum, tacton_lines
+from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
+from simple_model.trajectory import SHAPES, Trajectory
+
+__all__ = [
+    "SHAPES",
+    "SUPERPOSITIONS",
+    "Effort",
+    "MovingPressure",
+    "Response",
+    "Tacton",
+    "Trajectory",
+    "array_field",
+    "commanded",
+    "focal_spot",
+    "lines",
+    "modulation",
+    "point_kernel",
+    "relative_intensity",
+    "spectrum",
+    "tacton_lines",
+]

@@ -1,0 +1,107 @@
+"""The focal spot, and the phased array that it comes from.
+
+A 16 x 16 array of circular pistons (pitch 10.3 mm, 40 kHz, as Ultraleap's STRATOS Explore):
+
+    p(x) = sum_i P1/r_i 2 J1(k a sin th_i)/(k a sin th_i) exp(j(k r_i - k |x_f - x_i|) - al r_i)
+
+Its intensity |p|^2 near the focus is close to sinc^2(D/D0) with D0 growing with height.
+"""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
+from scipy.special import j1
+
+from simple_model.trajectory import Floats
+
+SPEED_OF_SOUND = 343.0  # m/s
+WAVENUMBER = 2 * np.pi * 40e3 / SPEED_OF_SOUND
+PITCH, PISTON_RADIUS, PER_SIDE = 10.3e-3, 4.5e-3, 16  # m, m
+PRESSURE_AT_1M = 3.4  # Pa, amplitude per element on its axis
+ABSORPTION = 1.32 / (20 * np.log10(np.e))  # 1/m: 1.32 dB/m at 20 C and 50 % humidity, ISO 9613-1
+GAUSSIAN_WIDTH = 4.35e-3  # m at 200 mm: the half width of sinc^2, and the force out to 20 mm
+NOMINAL_HEIGHT = 0.200  # m
+FOCI = ("gaussian", "main_lobe", "array")
+
+# Force on a disc of radius 10 mm about the focus by height, relative to 200 mm: `array_field`.
+# This is what a scale under the array reads, and it alone has its maximum at 200 mm.
+_HEIGHTS = np.array([20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600])
+_FORCES = np.array(
+    [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
+    + [1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414]
+)
+
+
+def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:
+    """Complex sound pressure amplitude (n,) in Pa at points (n, 3) for a focus (3,), metre.
+
+    The array lies in the plane z = 0 with its centre at the origin and radiates upwards.
+    """
+    line = (np.arange(PER_SIDE) - (PER_SIDE - 1) / 2) * PITCH
+    elements = np.stack(np.meshgrid(line, line, [0.0]), axis=-1).reshape(-1, 3)
+    rays = np.atleast_2d(np.asarray(points, np.float64))[:, None] - elements
+    distance = np.linalg.norm(rays, axis=2)
+    argument = WAVENUMBER * PISTON_RADIUS * np.hypot(rays[..., 0], rays[..., 1]) / distance
+    directivity = np.ones_like(argument)
+    np.divide(2 * j1(argument), argument, out=directivity, where=argument > 1e-9)
+    delay = np.linalg.norm(np.asarray(focus, np.float64) - elements, axis=1)
+    wave = np.exp(1j * WAVENUMBER * (distance - delay) - ABSORPTION * distance)
+    return (PRESSURE_AT_1M / distance * directivity * wave).sum(axis=1)
+
+
+def relative_intensity(height: float) -> float:
+    """Intensity at a height in metre relative to 200 mm, where it is greatest.
+
+    Raises
+    ------
+    ValueError
+        If the height is outside 20..600 mm.
+    """
+    low, high = _HEIGHTS[[0, -1]]
+    if not low <= 1e3 * height <= high:
+        raise ValueError(
+            f"height = {1e3 * height:g} mm is outside {low}..{high} mm, where the array focuses"
+        )
+    return float(PchipInterpolator(_HEIGHTS, _FORCES)(1e3 * height))
+
+
+def lobe_width(height: float) -> float:
+    """D0 in metre, distance from the focus to the first zero, at a height in metre."""
+    above = height - NOMINAL_HEIGHT
+    return 11.6e-3 + 46.5e-3 * above + 25e-3 * above**2
+
+
+def focal_spot(
+    offsets: ArrayLike, height: float = NOMINAL_HEIGHT, focus: str = "main_lobe"
+) -> Floats:
+    """S: intensity relative to the focus (...) at offsets (..., 2) in metre from it.
+
+    Parameters
+    ----------
+    focus : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; or "array",
+        the field of the array with its side lobes, as far as 60 mm along each axis.
+    """
+    offsets = np.asarray(offsets, np.float64)
+    if focus == "array":
+        return _array_spot(height)(np.abs(offsets).clip(max=60e-3))
+    distance = np.hypot(offsets[..., 0], offsets[..., 1])
+    if focus == "main_lobe":
+        return np.sinc(distance / lobe_width(height)) ** 2
+    return np.exp(-((distance / spot_width(height)) ** 2) / 2)
+
+
+def spot_width(height: float) -> float:
+    """Standard deviation in metre of the Gaussian spot at a height in metre."""
+    return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
+
+
+@cache
+def _array_spot(height: float) -> RegularGridInterpolator:
+    """|p|^2 relative to the focus in one quadrant; the array is symmetric about both axes."""
+    line = np.linspace(0, 60e-3, 121)
+    x, y = np.meshgrid(line, line, indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)])
+    intensity = np.abs(array_field(points, (0.0, 0.0, height))).reshape(x.shape) ** 2
+    return RegularGridInterpolator((line, line), intensity / intensity[0, 0], method="cubic")

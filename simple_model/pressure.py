@@ -1,0 +1,72 @@
+"""The one load that every model receives:
+
+q(x, t) = p0 I(h) drive(A, M(t)) S(x - x(t))
+"""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.choices import choose
+from simple_model.drive import DRIVES
+from simple_model.focus import FOCI, NOMINAL_HEIGHT, focal_spot, relative_intensity
+from simple_model.tacton import Tacton, modulation
+from simple_model.trajectory import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingPressure:
+    """Pressure of a Tacton on a flat surface.
+
+    Parameters
+    ----------
+    tacton : Tacton
+    focus : "gaussian", "main_lobe" or "array", the shape of the focal spot
+    drive : "linear", "pressure_squared" or "force_corrected"
+    depth_of_modulation : float, 0..1, of the last two
+    peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a
+        factor of 2, is the radiation pressure of a 160 dB focus on a wall that reflects fully.
+    height : float, metre, of the focus above the array
+
+    Raises
+    ------
+    ValueError
+        If a value is unknown, not finite or out of range.
+    """
+
+    tacton: Tacton
+    focus: str = "gaussian"
+    drive: str = "pressure_squared"
+    depth_of_modulation: float = 1.0
+    peak_pressure: float = 50.0
+    height: float = NOMINAL_HEIGHT
+
+    def __post_init__(self) -> None:
+        choose("focus", self.focus, FOCI)
+        choose("drive", self.drive, DRIVES)
+        if not 0 <= self.depth_of_modulation <= 1:
+            raise ValueError(f"depth_of_modulation = {self.depth_of_modulation} is outside 0..1")
+        if not (isfinite(self.peak_pressure) and self.peak_pressure >= 0):
+            raise ValueError(
+                f"peak_pressure = {self.peak_pressure} Pa must be a finite number, 0 or above"
+            )
+        relative_intensity(self.height)
+
+    def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
+        """Pressure (..., n) in Pa at points (n, 2) in metre and times (...) in s."""
+        t = np.asarray(t, np.float64)
+        return self.gain(t)[..., None] * self.spot(points, self.tacton.trajectory.position(t))
+
+    def gain(self, t: ArrayLike) -> Floats:
+        """Pressure (...) in Pa at the focus at times (...) in s."""
+        law, tacton = DRIVES[self.drive], self.tacton
+        driven = law(tacton.amplitude, modulation(tacton, t), self.depth_of_modulation)
+        return self.peak_pressure * relative_intensity(self.height) * driven
+
+    def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
+        """Relative pressure (..., n) at points (n, 2) with the focus at centres (..., 2)."""
+        points = np.asarray(points, np.float64)[:, :2]
+        offsets = points - np.asarray(centre, np.float64)[..., None, :]
+        return focal_spot(offsets, self.height, self.focus)

@@ -1,0 +1,147 @@
+"""What every model returns, and its spectral lines."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import get_window
+
+from simple_model.tacton import Tacton
+from simple_model.trajectory import Floats
+
+# Side lobes of the Kaiser window below -140 dB: lines as weak as that stay apart from strong ones.
+LINE_WINDOW = ("kaiser", 19.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """What an answer cost, and how it was found.
+
+    `seconds` by phase; `dofs` and `steps` solved for; `peak_memory` of the process in bytes;
+    `solver` used; `residual` and `estimate` relative; `versions` of what computed it.
+    """
+
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    dofs: int = 0
+    steps: int = 0
+    reduced_dofs: int = 0
+    peak_memory: int = 0
+    solver: str = "none"
+    estimate: float = 0.0
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Response:
+    """Motion of the probes.
+
+    Parameters
+    ----------
+    model : str, which model answered
+    times : (t,) float, s, equally spaced
+    probes : (p, 2) float, metre
+    displacement : (t, p) float, metre, normal to the surface, positive the way a pressure
+        pushes. The point kernel has no body to displace: in its response this holds the
+        stimulation it predicts instead, in Pa, and `unit` says so.
+    unit : "m" or "Pa"
+    effort : Effort
+    """
+
+    model: str
+    times: Floats
+    probes: Floats
+    displacement: Floats
+    unit: str = "m"
+    effort: Effort = field(default_factory=Effort)
+
+    def __post_init__(self) -> None:
+        for array in (self.times, self.probes, self.displacement):
+            array.setflags(write=False)
+
+
+def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
+    """Frequencies (f,) in Hz and amplitudes (f, p) in the unit of the response.
+
+    A sinusoid of amplitude a on a bin shows as a, whatever the window (any name that
+    `scipy.signal.get_window` knows).
+    """
+    n = len(response.times)
+    weights = get_window(window, n)
+    amplitude = np.abs(np.fft.rfft(response.displacement * weights[:, None], axis=0))
+    amplitude *= 2 / weights.sum()
+    amplitude[0] /= 2
+    return np.asarray(np.fft.rfftfreq(n, step(response.times))), amplitude
+
+
+def lines(response: Response, frequencies: ArrayLike, *, settle: float = 0.25) -> Floats:
+    """Amplitudes (f, p) at exactly these frequencies (f,) in Hz, by weighted least squares.
+
+    All lines and the mean are fitted together after the first part `settle` of the response,
+    under a Kaiser window, so that neither the position of a line between two bins nor a line
+    left out nor a dying transient leaks into another. Lines closer than one over the fitted
+    time cannot be told apart and share one amplitude. 0 Hz gives the mean.
+
+    Raises
+    ------
+    ValueError
+        If a frequency is not below half the sampling rate.
+    """
+    frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
+    nyquist = 0.5 / step(response.times)
+    if not ((frequencies >= 0) & (frequencies < nyquist)).all():
+        raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
+    kept = response.times >= response.times[0] + settle * np.ptp(response.times)
+    t, x = response.times[kept], response.displacement[kept]
+    distinct, which = _distinct(frequencies, 1 / np.ptp(t))
+    angle = 2 * np.pi * t[:, None] * distinct[1:]
+    basis = np.hstack([np.ones((len(t), 1)), np.cos(angle), np.sin(angle)])
+    weighted = basis * get_window(LINE_WINDOW, len(t), fftbins=False)[:, None]
+    fitted = np.linalg.lstsq(weighted.T @ basis, weighted.T @ x, rcond=1e-13)[0]
+    cosine, sine = np.split(fitted[1:], 2)
+    return np.vstack([np.abs(fitted[:1]), np.hypot(cosine, sine)])[which]
+
+
+def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
+    """Names and frequencies in Hz of the lines that a Tacton can make.
+
+    f_AM, n f_AM, f_d, n f_d, n f_d-f_AM and n f_d+f_AM (as a positive frequency); also with the
+    second AM frequency f_AM2 and the envelope f_e where they are used.
+    """
+    f_d = tacton.trajectory.drawing_frequency
+    w1, w2 = tacton.superposition
+    tones = {
+        "f_AM": tacton.am_frequency * (w1 > 0),
+        "f_AM2": tacton.second_am_frequency * (w2 > 0),
+        "f_e": tacton.envelope_frequency,
+    }
+    tones = {name: f for name, f in tones.items() if f > 0}
+    drawn = {f"{_times(n)}f_d": n * f_d for n in range(1, harmonics + 1) if f_d > 0}
+    found = {
+        f"{_times(n)}{name}": n * f for name, f in tones.items() for n in range(1, harmonics + 1)
+    }
+    found |= drawn
+    for name, f in tones.items():
+        for drawn_name, drawn_f in drawn.items():
+            found[f"{drawn_name}-{name}"] = abs(drawn_f - f)
+            found[f"{drawn_name}+{name}"] = drawn_f + f
+    return found
+
+
+def step(times: Floats) -> float:
+    """Sampling interval in s of equally spaced times (t,)."""
+    return float((times[-1] - times[0]) / (len(times) - 1))
+
+
+def _times(n: int) -> str:
+    return "" if n == 1 else str(n)
+
+
+def _distinct(frequencies: Floats, resolution: float) -> tuple[Floats, np.ndarray]:
+    """0 Hz and the frequencies further apart than the resolution; which of them each one is."""
+    distinct, which = [0.0], np.zeros(len(frequencies), int)
+    for k in np.argsort(frequencies, kind="stable"):
+        if frequencies[k] > 0 and frequencies[k] - distinct[-1] >= resolution:
+            distinct.append(float(frequencies[k]))
+        which[k] = len(distinct) - 1
+    return np.array(distinct), which

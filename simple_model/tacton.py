@@ -1,0 +1,89 @@
+"""The commanded signal, equation 1 of Lim, Seifi and Park, CHI EA '24:
+
+    p(t) = A U(t) {w1 M1(t) + w2 M2(t)} E(t)
+
+with the carrier U at 40 kHz, AM sinusoids M = sin(2 pi f_AM t) and the envelope
+E = sin(2 pi f_e t). A frequency of 0 means a factor of exactly 1.
+"""
+
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.trajectory import Floats, Trajectory
+
+CARRIER = 40e3  # Hz
+LONGEST = 10.0  # s
+SUPERPOSITIONS = ((1.0, 0.0), (0.75, 0.25), (0.5, 0.5), (0.25, 0.75), (0.0, 1.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tacton:
+    """A mid-air tactile pattern of one focus.
+
+    Parameters
+    ----------
+    amplitude : float, 0..1, of the device's full drive
+    am_frequency, second_am_frequency : float, Hz, 0 = off
+    superposition : (w1, w2), weights >= 0 of the two AM sinusoids, sum 1
+    envelope_frequency : float, Hz, 0 = constant
+    duration : float, s, above 0 and at most 10
+    trajectory : Trajectory
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or out of range.
+    """
+
+    amplitude: float = 1.0
+    am_frequency: float = 0.0
+    second_am_frequency: float = 0.0
+    superposition: tuple[float, float] = (1.0, 0.0)
+    envelope_frequency: float = 0.0
+    duration: float = 1.0
+    trajectory: Trajectory = field(default_factory=Trajectory)
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.amplitude) and 0 <= self.amplitude <= 1):
+            raise ValueError(
+                f"amplitude = {100 * self.amplitude:g} % is outside 0..100 %; 100 % is full drive"
+            )
+        for name in ("am_frequency", "second_am_frequency", "envelope_frequency"):
+            value = getattr(self, name)
+            if not (isfinite(value) and 0 <= value <= CARRIER / 2):
+                raise ValueError(
+                    f"{name} = {value} Hz is outside 0..{CARRIER / 2:g} Hz, half the carrier; "
+                    "0 switches it off"
+                )
+        if not (isfinite(self.duration) and 0 < self.duration <= LONGEST):
+            raise ValueError(
+                f"duration = {self.duration} s is outside 0 < duration <= {LONGEST:g} s, "
+                "the longest Tacton; shorten it"
+            )
+        w1, w2 = self.superposition
+        if not (w1 >= 0 and w2 >= 0 and abs(w1 + w2 - 1) <= 1e-9):
+            raise ValueError(
+                f"superposition = [{w1}, {w2}] must be two weights of 0 or above with sum 1, "
+                "such as [0.75, 0.25]"
+            )
+
+
+def modulation(tacton: Tacton, t: ArrayLike) -> Floats:
+    """{w1 M1 + w2 M2} E at times (...) in s: what the carrier is multiplied by, -1..1."""
+    t = np.asarray(t, np.float64)
+    w1, w2 = tacton.superposition
+    mixed = w1 * _sinusoid(tacton.am_frequency, t) + w2 * _sinusoid(tacton.second_am_frequency, t)
+    return mixed * _sinusoid(tacton.envelope_frequency, t)
+
+
+def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
+    """p(t) of equation 1 at times (...) in s, carrier included, as a fraction of full drive."""
+    carrier = np.sin(2 * np.pi * CARRIER * np.asarray(t, np.float64))
+    return tacton.amplitude * carrier * modulation(tacton, t)
+
+
+def _sinusoid(frequency: float, t: Floats) -> Floats:
+    return np.sin(2 * np.pi * frequency * t) if frequency > 0 else np.ones_like(t)

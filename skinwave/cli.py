@@ -1,0 +1,179 @@
+"""The command line: `skinwave run`, `skinwave compare`.
+
+Only argparse is imported before a command is known, so that help answers at once.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from skinwave.simulation import Progress
+
+TITLE = "The paper's 15 Tactons: point kernel, paper and skin"
+MODELS = ("point-kernel", "fem", "fem-transient")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; 0 if it succeeded, 1 if it was interrupted, 2 if its input was wrong."""
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.command(options))
+    except KeyboardInterrupt:
+        print("skinwave: interrupted; nothing was finished", file=sys.stderr)
+        return 1
+    except (ValueError, ArithmeticError, MemoryError, OSError) as error:
+        if options.debug:
+            raise
+        print(f"skinwave: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="skinwave", description="Waves in skin and paper under mid-air ultrasound haptics."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
+    common.add_argument("--overwrite", action="store_true", help="replace an existing folder")
+    common.add_argument("--h", type=float, metavar="MM", help="element size, mm (default: planned)")
+    common.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
+    common.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    common.add_argument("--json", action="store_true", help="summary as JSON")
+    common.add_argument("--debug", action="store_true", help="traceback of an error")
+
+    run = commands.add_parser("run", parents=[common], help="one scene, one model")
+    run.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+    run.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    run.add_argument("--dt", type=float, metavar="S", help="time step of fem-transient, s")
+    run.set_defaults(command=_run)
+
+    compare = commands.add_parser(
+        "compare", parents=[common], help="point kernel beside finite elements (the main job)"
+    )
+    compare.add_argument(
+        "scene", nargs="?", default="paper-15", metavar="SCENE",
+        help="scene file, or paper-15, the 15 Tactons of Lim, Seifi and Park (default)",
+    )  # fmt: skip
+    compare.set_defaults(command=_compare)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    from skinwave.claims import Run
+    from skinwave.files import output_folder
+    from skinwave.scene import BODIES, read
+    from skinwave.simulation import simulate
+    from skinwave.study import write_single
+
+    scene = read(options.scene)
+    known = (label for label, body in BODIES.items() if body == scene.body)
+    out = options.out or Path(f"{options.scene.stem}-out")
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        with _progress(options) as progress:
+            response = simulate(
+                scene, options.model, progress=progress,
+                h=_metre(options.h), dt=options.dt, solver=options.solver,
+            )  # fmt: skip
+        run = Run(
+            tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
+        )
+        write_single(folder, run)
+    summary = {
+        "out": str(out),
+        "model": response.model,
+        "dofs": response.effort.dofs,
+        "solver": response.effort.solver,
+        "seconds": round(sum(response.effort.seconds.values()), 2),
+    }
+    _summarise(options, summary, f"{response.model}: wrote {out}/index.html")
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from skinwave.files import output_folder
+    from skinwave.scene import read
+    from skinwave.study import own_scenes, paper_scenes, run_study
+
+    paper = options.scene == "paper-15"
+    scene = None if paper else read(options.scene)
+    scenes = paper_scenes() if scene is None else own_scenes(scene, scene.name)
+    out = options.out or Path("paper-15" if paper else f"{Path(options.scene).stem}-compared")
+    with output_folder(out, overwrite=options.overwrite) as folder, _progress(options) as progress:
+        outcome = run_study(
+            scenes, folder, progress,
+            title=TITLE if scene is None else scene.name,
+            command=f"skinwave compare {options.scene}",
+            h=_metre(options.h), solver=options.solver,
+        )  # fmt: skip
+    held = sum(verdict.holds for verdict in outcome.verdicts)
+    summary = {
+        "out": str(out),
+        "runs": outcome.runs,
+        "planned": outcome.planned,
+        "statements_held": held,
+        "statements_judged": len(outcome.verdicts),
+        "seconds": round(outcome.seconds, 1),
+        "peak_memory_gib": round(outcome.peak_memory / 2**30, 2),
+    }
+    _summarise(
+        options,
+        summary,
+        f"{outcome.runs} of {outcome.planned} runs in {outcome.seconds:.0f} s, "
+        f"{outcome.peak_memory / 2**30:.2f} GiB; {held} of {len(outcome.verdicts)} statements "
+        f"hold; open {out}/index.html",
+    )
+    return 0 if outcome.runs == outcome.planned else 1
+
+
+def _summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:
+    if options.json:
+        print(json.dumps(summary))
+    elif not options.quiet:
+        print(sentence)
+
+
+def _metre(millimetre: float | None) -> float | None:
+    return None if millimetre is None else millimetre / 1e3
+
+
+@contextmanager
+def _progress(options: argparse.Namespace) -> "Iterator[Progress]":
+    """A bar with the phase named; on a pipe a line per phase; nothing if not wanted."""
+    if options.quiet or options.json:
+        yield lambda phase, fraction: None
+        return
+    if not sys.stderr.isatty():
+        phases: list[str] = []
+
+        def log(phase: str, fraction: float) -> None:
+            if phase not in phases[-1:]:
+                phases.append(phase)
+                print(phase, file=sys.stderr, flush=True)
+
+        yield log
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (TextColumn("{task.description:<36}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def show(phase: str, fraction: float) -> None:
+            if bar.tasks[task].description != phase:
+                bar.reset(task, description=phase, total=1.0)
+            bar.update(task, completed=min(max(fraction, 0.0), 1.0))
+
+        yield show

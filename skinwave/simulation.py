@@ -1,0 +1,283 @@
+"""From a scene to a response, for every model by one name."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from itertools import islice
+
+import numpy as np
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model import Effort, MovingPressure, Response, point_kernel
+from simple_model.choices import choose
+from simple_model.focus import spot_width
+from skinwave import plan
+from skinwave.scene import Body, Scene
+
+MODELS = ("auto", "point-kernel", "fem", "fem-transient")
+Progress = Callable[[str, float], None]  # phase and fraction of it done
+
+
+def simulate(
+    scene: Scene,
+    model: str = "auto",
+    tolerance: float = 0.05,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+) -> Response:
+    """Motion of a scene's probes.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : "point-kernel", "fem" (the reduced model), "fem-transient", or "auto": the point
+        kernel where there is no body, else fem
+    tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
+    progress : called with the name of the phase and the fraction done
+    h : float, metre, element size; planned from the body if not given
+    dt : float, s, time step of "fem-transient"
+    solver : a backend of `fem.linear_solver`
+
+    Raises
+    ------
+    ValueError
+        If the model is unknown or does not fit the scene, or a number is out of range.
+    """
+    choose("model", model, MODELS)
+    check_knobs(solver, h=h, dt=dt)
+    if not 0 < tolerance < 1:
+        raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    if model == "auto":
+        model = "point-kernel" if scene.body.kind == "none" else "fem"
+    if model == "point-kernel":
+        return point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
+    report = progress or _silent
+    if model == "fem-transient":
+        return _march(scene, report, h, dt, solver)
+    reduction = min(plan.REDUCTION_TOLERANCE, tolerance / 50)
+    prepared = prepare(
+        scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction
+    )
+    return answer(prepared, scene, report)
+
+
+def check_knobs(solver: str, **lengths: float | None) -> None:
+    """Refuse a solver that is not installed and sizes that are no sizes, before any work.
+
+    Raises
+    ------
+    ValueError
+        If there is one.
+    """
+    choose("solver", solver, ("auto", *fem.available()))
+    for name, value in lengths.items():
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} = {value} must be a finite number above 0")
+
+
+def sample_times(scene: Scene, rate: float = plan.SAMPLE_RATE) -> Floats:
+    """Times (t,) in s of a response: from 0 up to the duration, at least two."""
+    return np.arange(max(2, round(scene.tacton.duration * rate))) / rate
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prepared:
+    """A body ready to answer any Tacton at its probes.
+
+    `poles` of the reduced model; `load` (k, r): reduced forces of unit pressure at the surface
+    points (k, 2).
+    """
+
+    probes: Floats
+    poles: fem.Poles
+    load: Floats
+    points: Floats
+    effort: Effort
+
+
+def prepare(
+    body: Body,
+    probes: Floats,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+    tolerance: float = plan.REDUCTION_TOLERANCE,
+) -> Prepared:
+    """Mesh, assemble, factorise and reduce a body, once for all Tactons."""
+    report, clock = progress or _silent, Clock()
+    build, operators = _assemble(body, h, clock, report)
+    mesh = build.mesh
+    with clock("factorise and reduce"):
+        report("factorise", 0.0)
+        P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+        model = fem.reduce(
+            operators,
+            fem.probe_operator(mesh, probes),
+            plan.BAND,
+            tolerance,
+            loads=P @ typical_spots(body, points),
+            solver=solver,
+            progress=lambda fraction: report("reduce", fraction),
+        )
+    with clock("diagonalise"):
+        poles, load = fem.poles(model), P.T @ model.basis
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        reduced_dofs=len(model.K),
+        peak_memory=peak_memory(),
+        solver=model.solver,
+        estimate=model.estimate,
+        versions=versions(),
+    )
+    return Prepared(probes=probes, poles=poles, load=load, points=points, effort=effort)
+
+
+def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -> Response:
+    """Motion of the prepared probes under a scene's Tacton."""
+    clock = Clock()
+    if progress:
+        progress("march", 0.0)
+    with clock("march"):
+        oversampling = round(plan.LOAD_RATE / plan.SAMPLE_RATE)
+        times = sample_times(scene)
+        fine = np.arange(oversampling * (len(times) - 1) + 1) / plan.LOAD_RATE
+        spots, position = footprints(scene.pressure, prepared.points, fine)
+        forces = np.vstack([spot @ prepared.load for spot in spots])
+        gain = scene.pressure.gain(fine)
+        displacement = fem.respond(prepared.poles, forces, position, gain, 1 / plan.LOAD_RATE)
+    effort = replace(
+        prepared.effort,
+        seconds={**prepared.effort.seconds, **clock.seconds},
+        steps=len(fine),
+        peak_memory=peak_memory(),
+    )
+    return Response(
+        model="fem",
+        times=times,
+        probes=prepared.probes,
+        displacement=np.ascontiguousarray(displacement[::oversampling]),
+        effort=effort,
+    )
+
+
+def footprints(
+    pressure: MovingPressure, points: Floats, times: Floats
+) -> tuple[Iterator[Floats], Floats]:
+    """The spot at knots along the path, in chunks (k, n), and where among them the focus is.
+
+    A moving spot is its gain times one of few shapes. Knots a fortieth of the spot's standard
+    deviation apart, with linear interpolation, are right to 1e-4 of the peak.
+    """
+    path = pressure.tacton.trajectory
+    if path.is_static:
+        return iter([pressure.spot(points, path.position(np.zeros(1)))]), np.zeros(len(times))
+    intervals = 12 * int(np.ceil(path.length / (spot_width(pressure.height) / 40) / 12))
+    centres = path.at_phase(np.linspace(0, 1, intervals + 1))  # 12: knots in every corner
+    chunks = (pressure.spot(points, part) for part in np.array_split(centres, intervals // 64 + 1))
+    return chunks, path.phase(times) * intervals
+
+
+def typical_spots(body: Body, points: Floats) -> Floats:
+    """Unit Gaussian spots (n, 12) where palm-sized paths run, to judge a reduction by."""
+    reach = min(20e-3, body.width / 3, body.height / 3)
+    centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
+    squared = ((points[:, None] - centres) ** 2).sum(axis=2)
+    return np.exp(-squared / (2 * spot_width(0.2) ** 2))
+
+
+def _assemble(
+    body: Body, h: float | None, clock: "Clock", report: Progress
+) -> tuple[plan.Build, fem.Operators]:
+    with clock("mesh"):
+        report("mesh", 0.0)
+        build = plan.build(body, h)
+    with clock("assemble"):
+        report("assemble", 0.0)
+        operators = fem.assemble(
+            build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing
+        )
+    return build, operators
+
+
+def _march(
+    scene: Scene, report: Progress, h: float | None, dt: float | None, solver: str
+) -> Response:
+    """The full time stepping, sampled at the time steps nearest to the response's times."""
+    clock = Clock()
+    build, operators = _assemble(scene.body, h, clock, report)
+    times = sample_times(scene)
+    per_sample = max(1, round(1 / plan.SAMPLE_RATE / (dt or 1 / plan.TRANSIENT_RATE)))
+    steps = per_sample * (len(times) - 1)
+    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    S = fem.probe_operator(build.mesh, scene.probe_points)
+    displacement = np.empty((len(times), len(scene.probes)))
+    report("factorise", 0.0)
+    with clock("march"):
+        states = fem.transient(
+            operators,
+            lambda t: P @ scene.pressure(points, t),
+            1 / (plan.SAMPLE_RATE * per_sample),
+            solver=solver,
+        )
+        for k, state in enumerate(islice(states, steps + 1)):
+            if k % per_sample == 0:
+                displacement[k // per_sample] = S @ state.displacement
+            report("march", k / steps)
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        steps=steps,
+        peak_memory=peak_memory(),
+        solver=fem.available()[0] if solver == "auto" else solver,
+        versions=versions(),
+    )
+    return Response(
+        model="fem-transient",
+        times=times,
+        probes=scene.probe_points,
+        displacement=displacement,
+        effort=effort,
+    )
+
+
+class Clock:
+    """Wall seconds by phase: `with clock("mesh"): ...`."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, phase: str) -> Iterator[None]:
+        """Time a phase."""
+        started = time.perf_counter()
+        yield
+        self.seconds[phase] = self.seconds.get(phase, 0.0) + time.perf_counter() - started
+
+
+def peak_memory() -> int:
+    """Largest resident size of this process so far, bytes; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(peak if sys.platform == "darwin" else 1024 * peak)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, skinwave and what it computes with."""
+    names = ("skinwave", "numpy", "scipy")
+    return {"python": sys.version.split()[0], **{name: version(name) for name in names}}
+
+
+def _silent(phase: str, fraction: float) -> None:
+    pass

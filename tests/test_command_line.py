@@ -1,0 +1,158 @@
+"""The command line as its users meet it: results, refusals, interruption."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from skinwave.cli import main
+
+SMALL = """
+name = "short"
+[tacton]
+am_frequency_hz = 200
+duration_s = 0.05
+shape = "circle"
+size_mm = 10
+speed_m_per_s = 6
+[body]
+width_mm = 60
+height_mm = 60
+[probes]
+points_mm = [[0, 0], [10, 0]]
+"""
+
+
+def table(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "short.toml"
+    path.write_text(SMALL)
+    return path
+
+
+def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
+    assert main(["run", str(scene), "--out", "first", "--h", "6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["model"] == "fem"
+    assert main(["run", "first/scene.toml", "--out", "second", "--h", "6", "--quiet"]) == 0
+    first, second = (np.load(f"{folder}/response.npz") for folder in ("first", "second"))
+    assert first["displacement"].shape == (500, 2)
+    np.testing.assert_array_equal(first["fem"], first["displacement"])
+    np.testing.assert_allclose(first["displacement"], second["displacement"], rtol=1e-9)
+    page = (scene.parent / "first/index.html").read_text()
+    assert "data:image/png;base64," in page
+    assert "http" not in page.replace("https://", "http").split("<body>")[0]
+    assert json.loads((scene.parent / "first/effort.json").read_text())["dofs"] > 1000
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "fem-transient"])
+def test_run_with_each_model(scene, model):
+    arguments = ["run", str(scene), "--model", model, "--h", "15", "--dt", "1e-4", "--quiet"]
+    assert main(arguments) == 0
+    rows = table(scene.parent / "short-out/lines.csv")
+    assert {row["model"] for row in rows} == {model}
+    empty, filled = ("displacement_um", "pressure_pa")[:: 1 if model == "point-kernel" else -1]
+    assert all(row[empty] == "" and float(row[filled]) >= 0 for row in rows)
+
+
+def test_compare_a_scene_of_ones_own(scene, capsys):
+    assert main(["compare", str(scene), "--h", "6", "--out", "both"]) == 0
+    assert "2 of 2 runs" in capsys.readouterr().out
+    folder = scene.parent / "both"
+    rows = table(folder / "lines.csv")
+    assert ",".join(rows[0]) == (
+        "tacton,body,model,probe_x_mm,probe_y_mm,line,frequency_hz,"
+        "displacement_um,velocity_mm_s,pressure_pa"
+    )
+    assert {(row["body"], row["model"]) for row in rows} == {
+        ("none", "point-kernel"), ("slab", "fem"),
+    }  # fmt: skip
+    row = next(r for r in rows if r["body"] == "slab" and r["line"] == "f_AM")
+    velocity = 2 * np.pi * 200 * float(row["displacement_um"]) / 1e3
+    assert float(row["velocity_mm_s"]) == pytest.approx(velocity, rel=1e-4)
+    claims = table(folder / "claims.csv")
+    assert list(claims[0]) == ["claim", "body", "model", "holds", "value", "bar", "sentence"]
+    assert (folder / "short/slab/scene.toml").exists()
+    assert (folder / "short/none/response.npz").exists()
+    assert (folder / "figures/short.png").stat().st_size > 10_000
+
+
+def refused(capsys, *arguments):
+    """The one sentence with which a call is refused."""
+    assert main([str(argument) for argument in arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert "Traceback" not in captured.err
+    return captured.err
+
+
+def test_what_exists_is_kept(scene, capsys):
+    (scene.parent / "kept").mkdir()
+    (scene.parent / "kept/note.txt").write_text("mine")
+    assert "pass --overwrite" in refused(capsys, "run", scene, "--out", "kept")
+    assert "pass --overwrite" in refused(capsys, "compare", scene, "--out", "kept")
+    assert (scene.parent / "kept/note.txt").read_text() == "mine"
+
+
+def test_overwriting_replaces_only_when_all_is_written(scene, capsys):
+    (scene.parent / "kept").mkdir()
+    (scene.parent / "kept/note.txt").write_text("mine")
+    arguments = ["run", scene, "--out", "kept", "--overwrite"]
+    assert "solver 'nonsense' is unknown" in refused(capsys, *arguments, "--solver", "nonsense")
+    assert (scene.parent / "kept/note.txt").read_text() == "mine"
+    assert main([*map(str, arguments), "--model", "point-kernel", "--quiet"]) == 0
+    assert not (scene.parent / "kept/note.txt").exists()
+    assert (scene.parent / "kept/index.html").exists()
+    assert sorted(p.name for p in scene.parent.iterdir()) == ["kept", "short.toml"]
+
+
+def test_bad_input_is_one_sentence(scene, capsys):
+    assert "cannot be read" in refused(capsys, "run", "missing.toml")
+    scene.write_text("[tacton\n")
+    assert "not valid TOML" in refused(capsys, "run", scene)
+    scene.write_bytes(b"\xff\xfe\x00")
+    assert "short.toml" in refused(capsys, "run", scene)
+    scene.write_text(SMALL)
+    assert "h = -0.001 must" in refused(capsys, "run", scene, "--h", "-1")
+    assert "dt = -1" in refused(
+        capsys, "run", scene, "--h", "15", "--model", "fem-transient", "--dt", "-1"
+    )
+    assert not (scene.parent / "short-out").exists()
+
+
+def test_unwritable_folders_are_refused(scene, capsys):
+    (scene.parent / "file").write_text("")
+    assert "is a file" in refused(capsys, "run", scene, "--out", "file", "--overwrite")
+    assert "cannot be written" in refused(capsys, "run", scene, "--out", "file/below")
+
+
+def test_wrong_options_exit_with_two(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["run", "x.toml", "--model", "magic"])
+    assert stop.value.code == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
+def test_ctrl_c_leaves_what_is_finished(tmp_path):
+    command = [sys.executable, "-m", "skinwave", "compare", "--out", str(tmp_path / "cut")]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+        assert process.stderr is not None
+        for line in process.stderr:  # phases are named, a line each
+            if line.startswith("paper-sheet: assemble"):
+                process.send_signal(signal.SIGINT)
+                break
+        process.stderr.read()
+    assert process.returncode == 1
+    page = (tmp_path / "cut/index.html").read_text()
+    assert "Interrupted: 15 of 45 runs" in page
+    assert len(list((tmp_path / "cut").glob("*/none/response.npz"))) == 15
+    assert not os.path.exists(tmp_path / "cut.partial")

@@ -1,0 +1,149 @@
+"""What a finite element must do exactly."""
+
+from itertools import product
+from math import factorial
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+from fem.assembly import element_matrices
+from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
+from meshes import MeshError, TetMesh
+
+
+@pytest.mark.parametrize(
+    ("rule", "degree", "corners"),
+    [(tetrahedron_rule(2), 2, 4), (tetrahedron_rule(5), 5, 4), (triangle_rule(), 4, 3)],
+)
+def test_quadrature_is_exact_to_its_degree(rule, degree, corners):
+    points, weights = rule
+    volume = factorial(corners - 1)
+    for powers in product(range(degree + 1), repeat=corners):
+        if sum(powers) <= degree:
+            exact = volume * np.prod([factorial(p) for p in powers])
+            exact /= factorial(sum(powers) + corners - 1)
+            assert weights @ np.prod(points**powers, axis=1) == pytest.approx(exact, abs=1e-15)
+
+
+@pytest.mark.parametrize(("corners", "nodes"), [(3, 3), (3, 6), (4, 4), (4, 10)])
+def test_shape_functions_sum_to_one_and_derivatives_are_theirs(corners, nodes):
+    point = np.random.default_rng(1).dirichlet(np.ones(corners), 5)
+    np.testing.assert_allclose(shape_functions(point, nodes).sum(axis=1), 1, atol=1e-14)
+    derivatives, eps = shape_derivatives(point, nodes), 1e-6
+    for k in range(1, corners):
+        nudge = eps * (np.eye(corners)[k] - np.eye(corners)[0])
+        ahead, behind = (shape_functions(point + s * nudge, nodes) for s in (1, -1))
+        np.testing.assert_allclose(derivatives[..., k - 1], (ahead - behind) / 2 / eps, atol=1e-8)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49, 0.4999])
+def test_patch_linear_fields_are_exact_on_distorted_tetrahedra(distorted_cube, poisson):
+    mesh = distorted_cube
+    material = fem.Material(density=1, shear_modulus=1, poisson=poisson)
+    outside = np.unique(meshes.boundary_facets(mesh.tets))
+    gradient = np.random.default_rng(0).standard_normal((3, 3))
+    exact = (mesh.points @ gradient.T).ravel()
+    everything = fem.assemble(mesh, material, fixed=np.zeros_like(mesh.points, bool))
+    fixed = np.zeros_like(mesh.points, bool)
+    fixed[outside] = True
+    inner = np.flatnonzero(~fixed.ravel())
+    # Move the outside as the field says; the inside must follow.
+    outer = np.where(fixed.ravel(), exact, 0.0)
+    factor = fem.factorise(everything.K[inner][:, inner])
+    follows = factor.solve(-(everything.K @ outer)[inner])
+    assert np.abs(follows - exact[inner]).max() < 1e-10 * np.abs(exact).max()
+
+
+def test_rigid_motion_has_no_energy(distorted_cube):
+    material = fem.Material(density=1, shear_modulus=1, poisson=0.4999)
+    K = fem.assemble(distorted_cube, material, fixed=np.zeros_like(distorted_cube.points, bool)).K
+    x = distorted_cube.points
+    for motion in (np.eye(3)[0] + 0 * x, np.cross([0.3, -0.2, 0.9], x)):
+        u = motion.ravel()
+        assert abs(u @ K @ u) < 1e-12 * abs(K).sum() / len(u)
+
+
+def test_mass_and_weight_are_those_of_the_body(distorted_cube):
+    material = fem.Material(density=700, shear_modulus=1, poisson=0.3)
+    M = fem.assemble(distorted_cube, material, fixed=np.zeros_like(distorted_cube.points, bool)).M
+    up = np.tile([0, 0, 1.0], len(distorted_cube.points))
+    assert up @ M @ up == pytest.approx(700, rel=1e-12)
+    linear = np.zeros_like(distorted_cube.points)
+    linear[:, 2] = distorted_cube.points[:, 0]
+    assert linear.ravel() @ M @ linear.ravel() == pytest.approx(700 / 3, rel=1e-12)
+
+
+def test_operators_are_symmetric_and_positive(distorted_cube):
+    material = fem.Material(density=1, shear_modulus=1, poisson=0.499, viscosity=0.1)
+    ops = fem.assemble(distorted_cube, material, fixed="bottom", absorbing="sides")
+    for operator in (ops.K, ops.C, ops.M):
+        assert abs(operator - operator.T).max() < 1e-12 * abs(operator).max()
+        assert np.linalg.eigvalsh(operator.toarray()).min() > 0
+
+
+def test_regions_have_their_own_material():
+    mesh = meshes.block((0.02, 0.02, 0.02), 0.005)
+    half = TetMesh(
+        points=mesh.points,
+        tets=mesh.tets,
+        region=(mesh.points[mesh.tets].mean(axis=1)[:, 2] < -0.01).astype(int),
+        facets=mesh.facets,
+    )
+    soft = fem.Material(density=1000, shear_modulus=1e4, poisson=0.45, viscosity=2)
+    stiff = fem.Material(density=1200, shear_modulus=1e6, poisson=0.45, viscosity=3)
+    one, two = fem.assemble(mesh, soft), fem.assemble(half, {0: soft, 1: soft})
+    for name in "KCM":
+        difference = abs(getattr(one, name) - getattr(two, name)).max()
+        assert difference < 1e-13 * abs(getattr(one, name)).max()
+    mixed = fem.assemble(half, {0: soft, 1: stiff})
+    assert mixed.M.sum() / 3 == pytest.approx(
+        (one.M.sum() * 1.2 + fem.assemble(half, {0: soft, 1: soft}).M.sum() * 0) / 3, rel=0.5
+    )
+    assert abs(mixed.C).max() > abs(two.C).max()
+    with pytest.raises(ValueError, match=r"regions \[1\] have no material"):
+        fem.assemble(half, {0: soft})
+
+
+def test_an_inverted_element_is_refused_with_its_index():
+    mesh = meshes.block((1.0, 1.0, 1.0), 1.0)
+    points = mesh.points.copy()
+    points[mesh.tets[3, 4]] += 2.0
+    bent = TetMesh(points=points, tets=mesh.tets, facets=mesh.facets)
+    with pytest.raises(MeshError, match=r"element \d+ is inverted"):
+        element_matrices(bent, *np.ones((3, len(mesh.tets))))
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"density": 0}, "density = 0"),
+        ({"shear_modulus": float("nan")}, "shear_modulus = nan"),
+        ({"poisson": 0.5}, "use 0.4999"),
+        ({"viscosity": -1}, "viscosity = -1"),
+    ],
+)
+def test_impossible_materials_are_refused(fields, said):
+    with pytest.raises(ValueError, match=said):
+        fem.Material(**{"density": 1.0, "shear_modulus": 1.0, "poisson": 0.3} | fields)
+
+
+@pytest.mark.parametrize(
+    ("poisson", "ratio"), [(0.0, 0.874032), (0.25, 0.919402), (0.4, 0.942195), (0.4999, 0.955300)]
+)
+def test_rayleigh_speed(poisson, ratio):
+    material = fem.Material(density=1000, shear_modulus=25e3, poisson=poisson)
+    assert material.rayleigh_speed / material.shear_speed == pytest.approx(ratio, abs=1e-6)
+
+
+def test_probes_off_the_body_are_refused():
+    with pytest.raises(ValueError, match=r"\(60, 0\) mm is not on the surface"):
+        fem.probe_operator(meshes.sheet(0.1, 0.1, 0.001, 0.02), [[0.06, 0.0]])
+
+
+def test_probes_read_the_displacement_along_the_push(distorted_cube):
+    u = np.zeros_like(distorted_cube.points)
+    u[:, 2] = -(1 + distorted_cube.points[:, 0] ** 2)
+    S = fem.probe_operator(distorted_cube, [[0.3, 0.4], [0.71, 0.2]])
+    np.testing.assert_allclose(S @ u.ravel(), [1.09, 1.5041], rtol=1e-12)

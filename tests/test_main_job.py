@@ -1,0 +1,87 @@
+"""The main job, end to end: the paper's 15 Tactons on a paper sheet and on skin."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from skinwave.claims import TEXTS
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("main") / "paper-15"
+    command = [sys.executable, "-m", "skinwave", "compare", "--out", str(folder), "--json"]
+    return folder, json.loads(subprocess.check_output(command, text=True))
+
+
+@pytest.fixture(scope="module")
+def claims(job):
+    rows = csv.DictReader((job[0] / "claims.csv").read_text().splitlines())
+    return {(row["body"], row["claim"]): row for row in rows}
+
+
+def test_all_runs_are_there(job):
+    folder, summary = job
+    assert summary["runs"] == summary["planned"] == 45
+    assert len(list(folder.glob("*/*/scene.toml"))) == 45
+    assert len(list((folder / "figures").glob("*.png"))) == 16
+    responses = np.load(folder / "responses.npz")
+    assert responses["am140/skin-slab/fem"].shape == (10_000, 5)
+
+
+def test_the_meshes_are_fine_enough_and_the_memory_is_bounded(job):
+    folder, summary = job
+    for body in ("paper-sheet", "skin-slab"):
+        effort = json.loads((folder / "am140" / body / "effort.json").read_text())
+        assert effort["dofs"] >= 60_000
+        assert effort["estimate"] <= 1e-3
+    assert summary["peak_memory_gib"] <= 6
+
+
+def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
+    assert set(TEXTS) == {claim for body, claim in claims if body == "none"}
+    for claim in ("S1", "S2", "S3", "S4", "S5"):
+        assert claims["none", claim]["holds"] == "True", claims["none", claim]
+    assert float(claims["none", "S3"]["value"]) < -120
+    # What the measurement had and the model lacks.
+    assert claims["none", "M1"]["holds"] == claims["none", "M3"]["holds"] == "False"
+
+
+def test_bodies_have_the_measured_lines_that_the_point_kernel_lacks(claims):
+    for body in ("paper-sheet", "skin-slab"):
+        for claim in ("M1", "M2", "M3", "S2", "S5"):
+            assert claims[body, claim]["holds"] == "True", claims[body, claim]
+
+
+def test_second_harmonic_is_the_loads_times_the_bodys(job):
+    """AM 140 on skin: 2 f / f is a quarter in the load, and no body adds 3 f."""
+    rows = csv.DictReader((job[0] / "am140/skin-slab/lines.csv").read_text().splitlines())
+    centre = {r["line"]: float(r["displacement_um"]) for r in rows if r["probe_x_mm"] == "0"}
+    assert 0.05 < centre["2f_AM"] / centre["f_AM"] < 0.25
+    assert centre["3f_AM"] < 1e-6 * centre["f_AM"]
+
+
+def test_waves_spread_further_than_the_point_kernel(job):
+    responses = np.load(job[0] / "responses.npz")
+
+    def level(body, model):
+        motion = responses[f"am140/{body}/{model}"][2500:].std(axis=0)
+        return 20 * np.log10(motion[2:] / motion[0])  # 10 mm and beyond
+
+    kernel = level("none", "point-kernel")
+    assert (level("skin-slab", "fem") > kernel + 10).all()
+
+
+def test_the_page_stands_alone(job):
+    page = (job[0] / "index.html").read_text()
+    assert page.count("data:image/png;base64,") == 16
+    for outside in ('src="http', 'href="http', "url(http", "<script"):
+        assert outside not in page
+    assert "peak memory" in page
+    assert "contradict M4" in page

@@ -1,0 +1,91 @@
+"""Structured bodies: volume, conformity, symmetry, grading; and meshes that are refused."""
+
+import numpy as np
+import pytest
+
+import meshes
+from meshes import MeshError, TetMesh
+
+
+def test_a_sheet_is_exact_and_conforming():
+    mesh = meshes.sheet(0.1, 0.08, 0.001, 0.005)
+    assert meshes.corner_volumes(mesh.points, mesh.tets).sum() == pytest.approx(8e-6, rel=1e-12)
+    outside = meshes.boundary_facets(mesh.tets)
+    named = sum(len(mesh.facets[name]) for name in ("top", "bottom", "sides"))
+    assert len(outside) == named == 2 * (2 * 20 * 16) + 2 * (2 * 20 + 2 * 16)
+    assert mesh.facets["clamped"] is not None
+    np.testing.assert_array_equal(mesh.facets["clamped"], mesh.facets["sides"])
+
+
+def test_facets_look_outwards():
+    mesh = meshes.block((0.02, 0.03, 0.01), 0.005)
+    for name, normal in {"top": (0, 0, 1), "left": (-1, 0, 0), "back": (0, 1, 0)}.items():
+        a, b, c = (mesh.points[mesh.facets[name][:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        np.testing.assert_allclose(
+            cross / np.linalg.norm(cross, axis=1)[:, None], [normal] * len(cross), atol=1e-12
+        )
+
+
+def test_mid_side_nodes_lie_on_their_edges():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    edges = [(0, 1, 4), (1, 2, 5), (0, 2, 6), (0, 3, 7), (1, 3, 8), (2, 3, 9)]  # VTK
+    for a, b, middle in edges:
+        halfway = (mesh.points[mesh.tets[:, a]] + mesh.points[mesh.tets[:, b]]) / 2
+        np.testing.assert_allclose(mesh.points[mesh.tets[:, middle]], halfway, atol=1e-15)
+    top = mesh.facets["top"]
+    halfway = (mesh.points[top[:, 1]] + mesh.points[top[:, 2]]) / 2
+    np.testing.assert_allclose(mesh.points[top[:, 4]], halfway, atol=1e-15)
+
+
+def test_no_node_is_double_or_unused():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    assert len(np.unique(np.round(mesh.points, 12), axis=0)) == len(mesh.points)
+    assert len(np.unique(mesh.tets)) == len(mesh.points)
+
+
+def test_grading_is_fine_inside_and_ends_on_the_side():
+    grading = meshes.Grading(radius=0.02, growth=1.3, coarsest=0.01)
+    axis = meshes.graded_axis(0.05, 0.0025, grading)
+    cells = np.diff(axis)
+    assert axis[-1] == pytest.approx(0.05)
+    np.testing.assert_allclose(cells[:8], 0.0025)
+    assert (cells[1:] / cells[:-1] <= 1.3 * 1.3).all()
+    assert cells.max() < 0.0125
+
+
+def test_inside_out_tetrahedra_are_turned_round():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
+    swapped = mesh.tets[:, [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]]
+    again = TetMesh(points=mesh.points, tets=swapped)
+    np.testing.assert_array_equal(again.tets, mesh.tets)
+
+
+def test_records_cannot_be_written_to():
+    mesh = meshes.sheet(0.1, 0.1, 0.001, 0.05)
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.points[0] = 1.0
+
+
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"points": [*CORNERS[:3], [1, 1, 0.0]]}, "1 tetrahedra are flat, the worst is 0"),
+        ({"points": [*CORNERS[:3], [0, 0, np.nan]]}, "1 points are not finite, first 3"),
+        ({"tets": [[0, 1, 2, 4]]}, "node numbers run from 0 to 4"),
+        ({"tets": [[0, 1, 2]]}, r"tets have shape \(1, 3\)"),
+        ({"tets": np.zeros((0, 4), int)}, "m > 0"),
+        ({"region": [0, 1]}, "give one per element"),
+    ],
+)
+def test_broken_meshes_are_refused_with_what_and_where(fields, said):
+    with pytest.raises(MeshError, match=said):
+        TetMesh(**{"points": CORNERS, "tets": [[0, 1, 2, 3]]} | fields)
+
+
+def test_unknown_facet_sets_are_named_with_the_known_ones():
+    with pytest.raises(MeshError, match=r"no facet set 'lid'.*top"):
+        meshes.facet_set(meshes.sheet(0.1, 0.1, 0.001, 0.05), "lid")

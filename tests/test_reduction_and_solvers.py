@@ -1,0 +1,238 @@
+"""Every solver gives the same answer, and the reduced model gives the large one's."""
+
+import sys
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import fem
+import meshes
+from fem import linear_solver
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.paper15 import scenes
+from skinwave.simulation import prepare, simulate
+
+PROBES = np.column_stack([[0, 5, 10, 15, 20], np.zeros(5)]) * 1e-3
+CIRCLING = Tacton(
+    am_frequency=140,
+    duration=0.2,
+    trajectory=Trajectory(shape="circle", size=0.02, speed=12),
+)
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    """A small dynamic stiffness and a right-hand side."""
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.004)
+    ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
+    A = ops.K + 1e3 * ops.C + 1e6 * ops.M
+    return ops, A, np.random.default_rng(0).standard_normal((A.shape[0], 3))
+
+
+@pytest.mark.parametrize("backend", linear_solver.BACKENDS)
+def test_every_solver_solves(stiff, backend):
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    _, A, b = stiff
+    factor = fem.factorise(A, backend=backend)
+    assert factor.backend == backend
+    x = factor.solve(b)
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    np.testing.assert_allclose(factor.solve(b[:, 0]), x[:, 0], rtol=1e-9)
+    complex_b = b[:, 0] * (1 + 2j)
+    np.testing.assert_allclose(factor.solve(complex_b), (1 + 2j) * x[:, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+def test_complex_symmetric_matrices_are_solved(stiff, backend):
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    ops, _, b = stiff
+    A = ops.K + 1j * 900 * ops.C - 900**2 * ops.M
+    x = fem.factorise(A, backend=backend).solve(b.astype(complex))
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+
+
+def test_without_mkl_and_metis_superlu_carries_it(stiff, monkeypatch):
+    _, A, b = stiff
+    monkeypatch.setitem(sys.modules, "pymetis", None)
+    monkeypatch.setitem(sys.modules, "sksparse.cholmod", None)
+    monkeypatch.setattr(linear_solver, "_mkl", lambda: None)
+    factor = fem.factorise(A)
+    assert factor.backend == "superlu"
+    assert np.abs(A @ factor.solve(b) - b).max() < 1e-9 * np.abs(b).max()
+
+
+@pytest.mark.parametrize("metis", [True, False])
+def test_the_ordering_is_a_permutation_that_saves_fill(stiff, monkeypatch, metis):
+    _, A, _ = stiff
+    if not metis:
+        monkeypatch.setitem(sys.modules, "pymetis", None)
+    order = linear_solver.dissect(A)
+    np.testing.assert_array_equal(np.sort(order), np.arange(A.shape[0]))
+    options = {
+        "permc_spec": "NATURAL",
+        "diag_pivot_thresh": 0.0,
+        "options": {"SymmetricMode": True},
+    }
+
+    def fill(permutation):
+        permuted = sparse.csc_array(A[permutation][:, permutation])
+        return sparse.linalg.splu(permuted, **options).L.nnz
+
+    assert fill(order) < 0.6 * fill(np.arange(A.shape[0]))
+
+
+def test_unknown_or_missing_solvers_are_named():
+    with pytest.raises(ValueError, match=r"'umfpack' is not installed; choose one of .*superlu"):
+        fem.factorise(sparse.eye_array(3).tocsr(), backend="umfpack")
+
+
+@pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+def test_a_floating_body_is_refused_with_the_cure(backend):
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    singular = sparse.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
+    with pytest.raises(ValueError, match="is the body held anywhere"):
+        fem.factorise(singular, backend=backend)
+
+
+def body(kind):
+    if kind == "skin":
+        mesh = meshes.block(
+            (0.06, 0.06, 0.015), 0.004, grading=meshes.Grading(radius=0.02, growth=1.2)
+        )
+        return mesh, fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
+    mesh = meshes.sheet(0.1, 0.1, 1e-3, 0.1 / 24)
+    return mesh, fem.assemble(
+        mesh, fem.from_young(density=80, young=4e6, poisson=0.3, loss_factor=0.03)
+    )
+
+
+def reduced_for_circling(kind):
+    """A body of about 20 k unknowns, what pushes and reads it, and its reduced model."""
+    mesh, ops = body(kind)
+    assert 15e3 < len(ops.free) < 30e3
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    S = fem.probe_operator(mesh, PROBES)
+    load = MovingPressure(tacton=CIRCLING)
+    typical = P @ load.spot(points, CIRCLING.trajectory.at_phase(np.linspace(0, 1, 12))).T
+    return ops, P, points, S, load, fem.reduce(ops, S, 1000.0, 2e-4, loads=typical)
+
+
+def marched(ops, read, force, dt):
+    """(t, p) for 0.2 s from rest."""
+    states = islice(fem.transient(ops, force, dt), round(0.2 / dt))
+    return np.array([read @ state.displacement for state in states])
+
+
+def misfit(candidate, reference):
+    return (np.linalg.norm(candidate - reference, axis=0) / np.linalg.norm(reference, axis=0)).max()
+
+
+@pytest.mark.slow
+def test_the_reduced_model_follows_the_transient_from_rest():
+    ops, P, points, S, load, model = reduced_for_circling("skin")
+    dt, knots = 2.5e-5, 600
+    full = marched(ops, S, lambda t: P @ load(points, t), dt)
+    times = np.arange(len(full)) * dt
+    spots = load.spot(points, CIRCLING.trajectory.at_phase(np.linspace(0, 1, knots + 1)))
+    position = CIRCLING.trajectory.phase(times) * knots
+    forces = (model.basis.T @ (P @ spots.T)).T
+    reduced = fem.respond(fem.poles(model), forces, position, load.gain(times), dt)
+    assert misfit(reduced, full) <= 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["skin", "sheet"])
+def test_reduction_alone_costs_less_than_a_thousandth(kind):
+    """Both marched by the same scheme at the same step, so that only the reduction differs."""
+    ops, P, points, S, load, model = reduced_for_circling(kind)
+    r = len(model.K)
+    small = fem.Operators(
+        K=sparse.csr_array(model.K), C=sparse.csr_array(model.C), M=sparse.eye_array(r).tocsr(),
+        free=np.arange(r), n_dofs=r,
+    )  # fmt: skip
+    project = model.basis.T @ P
+    full = marched(ops, S, lambda t: P @ load(points, t), 1e-4)
+    reduced = marched(small, model.outputs, lambda t: project @ load(points, t), 1e-4)
+    assert misfit(reduced, full) <= 1e-3
+
+
+@pytest.mark.parametrize("kind", ["skin", "sheet"])
+def test_the_estimate_is_near_the_true_error(kind):
+    mesh, ops = body(kind)
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    S = fem.probe_operator(mesh, PROBES)
+    centres = np.random.default_rng(2).uniform(-0.02, 0.02, (12, 2))
+    F = P @ MovingPressure(tacton=Tacton()).spot(points, centres).T
+    model = fem.reduce(ops, S, 1000.0, 5e-3, loads=F)
+    frequencies = [0.0, 250.0, 700.0, 1000.0]
+    found = fem.transfer(model, model.basis.T @ F, frequencies)
+    exact = np.array([S @ fem.harmonic(ops, F, f)[0] for f in frequencies])
+    error = np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+    assert model.estimate <= 5e-3
+    assert model.estimate / 10 < error.max() < model.estimate * 3
+
+
+def test_poles_answer_like_the_model(stiff):
+    ops, _, _ = stiff
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.004)
+    S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
+    model = fem.reduce(ops, S, 500.0, 1e-2)
+    assert (np.linalg.eigvalsh(model.K) > 0).all()
+    poles = fem.poles(model)
+    assert (poles.values.real < 0).all()
+    force = np.random.default_rng(0).standard_normal(len(model.K))
+    s = 2j * np.pi * 140.0
+    half = poles.outputs @ (poles.inputs @ force / (s - poles.values))
+    mirrored = poles.outputs.conj() @ (poles.inputs.conj() @ force / (s - poles.values.conj()))
+    np.testing.assert_allclose(
+        half + mirrored, fem.transfer(model, force[:, None], 140.0)[0, :, 0], rtol=1e-8
+    )
+
+
+def test_a_response_starts_from_rest_whatever_the_load_begins_with():
+    poles = fem.Poles(
+        values=np.array([-3.0 + 40j]), inputs=np.array([[1.0 + 0j]]), outputs=np.array([[-0.5j]])
+    )
+    t = np.arange(2001) * 1e-3
+    found = fem.respond(poles, np.ones((1, 1)), np.zeros(2001), np.ones(2001), 1e-3)[:, 0]
+    # 2 Re(c (exp(s t) - 1)/s), the step response.
+    expected = 2 * np.real(-0.5j * (np.exp((-3 + 40j) * t) - 1) / (-3 + 40j))
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_an_unreachable_tolerance_is_said(monkeypatch):
+    monkeypatch.setattr("fem.reduced.MOST_MOMENTS", 20)
+    mesh, ops = body("sheet")
+    S = fem.probe_operator(mesh, PROBES[:1])
+    with pytest.raises(ValueError, match="raise the tolerance"):
+        fem.reduce(ops, S, 1000.0, 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper-sheet", "skin-slab"])
+def test_fem_and_fem_transient_agree_on_a_scene(name):
+    scene = scenes("short", Tacton(am_frequency=210, duration=0.02))[name]
+    h = 0.006 if name == "skin-slab" else 0.005
+    reduced = simulate(scene, "fem", h=h)
+    full = simulate(scene, "fem-transient", h=h, dt=2.5e-5)
+    misfit = np.linalg.norm(reduced.displacement - full.displacement, axis=0)
+    assert (misfit / np.linalg.norm(full.displacement, axis=0)).max() < 3e-3
+    assert full.effort.steps == 4 * (len(full.times) - 1)
+
+
+def test_preparing_says_what_it_cost():
+    scene = scenes("short", Tacton(am_frequency=210, duration=0.02))["skin-slab"]
+    phases = []
+    prepared = prepare(
+        scene.body, scene.probe_points, lambda phase, fraction: phases.append(phase), h=0.006
+    )
+    assert list(dict.fromkeys(phases)) == ["mesh", "assemble", "factorise", "reduce"]
+    assert prepared.effort.solver == fem.available()[0]
+    assert prepared.effort.dofs > 1000
+    assert prepared.effort.peak_memory > 1e7
+    assert 0 < prepared.effort.estimate <= 1e-3

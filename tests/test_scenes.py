@@ -1,0 +1,100 @@
+"""Scene files: what they default to, what they refuse, and that they come back as written."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fem import Material
+from skinwave import BODIES, dumps, loads, read
+from skinwave.paper15 import scenes, tactons
+
+EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
+
+
+def test_the_paper_has_fifteen_tactons():
+    patterns = dict(tactons())
+    assert len(patterns) == 15
+    moving = [t for t in patterns.values() if t.trajectory.drawing_frequency]
+    assert len(moving) == 12
+    assert sum(t.am_frequency > 0 for t in moving) == 9
+
+
+@pytest.mark.parametrize("name", [name for name, _ in tactons()])
+def test_every_preset_comes_back_from_its_file(name):
+    for scene in scenes(name, dict(tactons())[name]).values():
+        assert loads(dumps(scene)) == scene
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_every_example_is_a_scene_that_comes_back(path):
+    assert loads(dumps(read(path))) == read(path)
+
+
+def test_a_material_of_ones_own_comes_back():
+    scene = loads(
+        "[body]\nkind = 'slab'\n[body.material]\ndensity_kg_m3 = 1070\n"
+        "shear_modulus_pa = 25e3\npoisson = 0.49\nviscosity_pa_s = 3\n"
+    )
+    assert scene.body.material == Material(
+        density=1070, shear_modulus=25e3, poisson=0.49, viscosity=3
+    )
+    assert loads(dumps(scene)) == scene
+
+
+def test_missing_keys_take_the_presets_value():
+    assert loads("").body == BODIES["skin-slab"]
+    assert loads("[body]\nkind = 'sheet'").body == BODIES["paper-sheet"]
+    published = loads("[body]\nkind = 'none'").pressure
+    assert (published.drive, published.focus) == ("linear", "main_lobe")
+    assert loads("").pressure.drive == "pressure_squared"
+
+
+def test_units_of_the_file_are_those_of_its_keys():
+    scene = loads(
+        "[tacton]\namplitude_percent = 50\nshape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12\n"
+        "[focus]\nheight_mm = 150\n[probes]\npoints_mm = [[5, -10]]"
+    )
+    assert scene.tacton.amplitude == 0.5
+    assert scene.tacton.trajectory.size == 0.020
+    assert scene.pressure.height == 0.150
+    np.testing.assert_array_equal(scene.probe_points, [[0.005, -0.010]])
+
+
+WRONG = {
+    "[tacton]\nshape = 'circel'": "did you mean 'circle'",
+    "[tacton]\nsize = 20": "unknown key 'size'; did you mean 'size_mm'",
+    "[tactons]\nsize_mm = 20": "unknown key 'tactons'; did you mean 'tacton'",
+    "[tacton]\nshape = 'circle'\nsize_mm = 61": "size = 61 mm is outside 0..60 mm",
+    "[tacton]\nam_frequency_hz = -80": "am_frequency = -80",
+    "[tacton]\nspeed_m_per_s = nan": "speed = nan m/s must be a finite number",
+    "[focus]\npeak_pressure_pa = inf": "peak_pressure = inf Pa must be a finite number",
+    "[tacton]\nsuperposition = [0.5, 0.6]": "with sum 1",
+    "[tacton]\nsuperposition = [1]": "must be a pair of numbers",
+    "[tacton]\nduration_s = 0": "outside 0 < duration <= 10 s",
+    "[tacton]\nduration_s = 12": "longest Tacton; shorten it",
+    "[tacton]\nsize_mm = 'big'": "size_mm = 'big' must be a number",
+    "[tacton]\nsize_mm = true": "size_mm = True must be a number",
+    "tacton = 3": "must be a table",
+    "[focus]\nheight_mm = 700": "height = 700 mm is outside 20..600 mm",
+    "[focus]\ndrive = 'squared'": "did you mean 'pressure_squared'",
+    "[focus]\nprofile = 'gauss'": "did you mean 'gaussian'",
+    "[probes]\npoints_mm = [[51, 0]]": "probe (51, 0) mm is off the body",
+    "[probes]\npoints_mm = []": "give at least one probe",
+    "[probes]\npoints_mm = [[0, nan]]": "coordinates must be finite",
+    "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nwidth_mm = 50": "path reaches 30 mm",
+    "[body]\nkind = 'slap'": "did you mean 'slab'",
+    "[body]\nmaterial = 'palms'": "did you mean 'palm'",
+    "[body]\nbase = 'free'\nsides = 'free'": "flies away",
+    "[body]\ndepth_mm = -1": "must be finite and above 0",
+    "[body.material]\ndensity_kg_m3 = 1000": "lacks shear_modulus_pa and poisson",
+    "[tacton\n": "not valid TOML",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_wrong_scenes_are_refused_in_one_sentence(text):
+    with pytest.raises(ValueError) as error:  # noqa: PT011 - the text is checked below
+        loads(text)
+    assert WRONG[text] in str(error.value)
+    assert "\n" not in str(error.value)
