@@ -61,7 +61,16 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     if not np.isfinite(A.data).all():
         raise ValueError("the matrix has entries that are not finite; check the material")
     solve = {"pardiso": _pardiso, "cholmod": _cholmod_solve, "superlu": _superlu}[backend](A)
-    return Factor(solve=solve, backend=backend)
+    return Factor(solve=solve if np.iscomplexobj(A.data) else _by_parts(solve), backend=backend)
+
+
+def _by_parts(solve: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """A real factor's solution that takes complex right-hand sides, too."""
+
+    def either(b: Array) -> Array:
+        return solve(b.real) + 1j * solve(b.imag) if np.iscomplexobj(b) else solve(b)
+
+    return either
 
 
 def _singular(detail: object) -> ValueError:
@@ -82,7 +91,7 @@ def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
         raise _singular(error) from None
 
     def solve(b: Array) -> Array:
-        x = np.empty(b.shape, np.result_type(b, A.dtype))
+        x = np.empty(b.shape, A.dtype)
         x[order] = lu.solve(np.ascontiguousarray(b[order], x.dtype))
         return x
 
@@ -206,8 +215,6 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     call(12)
 
     def solve(b: Array) -> Array:
-        if np.iscomplexobj(b) and kind == 2:
-            return call(33, b.real) + 1j * call(33, b.imag)
         return np.ascontiguousarray(call(33, b))
 
     weakref.finalize(solve, call, -1)
