@@ -78,6 +78,12 @@ def test_waves_spread_further_than_the_point_kernel(job):
     assert (level("skin-slab", "fem") > kernel + 10).all()
 
 
+def test_the_centre_of_a_circle_does_not_feel_the_drawing_frequency(job):
+    rows = csv.DictReader((job[0] / "stm20/skin-slab/lines.csv").read_text().splitlines())
+    drawn = {r["probe_x_mm"]: float(r["displacement_um"]) for r in rows if r["line"] == "f_d"}
+    assert drawn["0"] < 1e-3 * drawn["10"]
+
+
 def test_the_page_stands_alone(job):
     page = (job[0] / "index.html").read_text()
     assert page.count("data:image/png;base64,") == 16

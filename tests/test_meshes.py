@@ -38,6 +38,15 @@ def test_mid_side_nodes_lie_on_their_edges():
     np.testing.assert_allclose(mesh.points[top[:, 4]], halfway, atol=1e-15)
 
 
+def test_a_centred_mesh_is_its_own_mirror_image():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    for axis in (0, 1):
+        mirrored = mesh.points * np.where(np.arange(3) == axis, -1, 1)
+        _, twin = np.nonzero((np.abs(mirrored[:, None] - mesh.points) < 1e-12).all(axis=2))
+        there = {tuple(sorted(tet)) for tet in mesh.tets[:, :4]}
+        assert {tuple(sorted(tet)) for tet in twin[mesh.tets[:, :4]]} == there
+
+
 def test_no_node_is_double_or_unused():
     mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
     assert len(np.unique(np.round(mesh.points, 12), axis=0)) == len(mesh.points)
