@@ -5,12 +5,10 @@ from collections.abc import Iterable
 from html import escape
 from string import Template
 
-from matplotlib.figure import Figure
-
 from simple_model import Effort
 from skinwave.claims import TEXTS, Run, Verdict
 from skinwave.comparison import compare
-from skinwave.figures import label, png
+from skinwave.figures import label
 
 _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>$title</title>
@@ -51,11 +49,11 @@ def paragraph(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
-def picture(figure: Figure, caption: str, name: str = "") -> str:
-    """A figure inside the page."""
+def picture(drawn: bytes, caption: str, name: str = "") -> str:
+    """A PNG inside the page."""
     return (
         f'<figure id="{escape(name)}"><img alt="{escape(caption)}" '
-        f'src="data:image/png;base64,{b64encode(png(figure)).decode()}">'
+        f'src="data:image/png;base64,{b64encode(drawn).decode()}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
 

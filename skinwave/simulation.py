@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from itertools import islice
 
@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response, point_kernel
 from simple_model.choices import choose
 from simple_model.focus import spot_width
-from skinwave import plan
+from skinwave import cache, plan
 from skinwave.scene import Body, Scene
 
 MODELS = ("auto", "point-kernel", "fem", "fem-transient")
@@ -111,8 +111,31 @@ def prepare(
     solver: str = "auto",
     tolerance: float = plan.REDUCTION_TOLERANCE,
 ) -> Prepared:
-    """Mesh, assemble, factorise and reduce a body, once for all Tactons."""
-    report, clock = progress or _silent, Clock()
+    """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine."""
+    clock = Clock()
+    name = cache.key(body, body.solid, h, probes, plan.BAND, tolerance, versions())
+    with clock("read from cache"):
+        if entry := cache.load(name):
+            poles = fem.Poles(**{field: entry[field] for field in ("values", "inputs", "outputs")})
+            effort = Effort(**entry["meta"])
+    if not entry:
+        return _prepared_anew(body, probes, progress or _silent, h, solver, tolerance, name)
+    effort = replace(effort, seconds=clock.seconds, peak_memory=peak_memory())
+    return Prepared(
+        probes=probes, poles=poles, load=entry["load"], points=entry["points"], effort=effort
+    )
+
+
+def _prepared_anew(
+    body: Body,
+    probes: Floats,
+    report: Progress,
+    h: float | None,
+    solver: str,
+    tolerance: float,
+    name: str,
+) -> Prepared:
+    clock = Clock()
     build, operators = _assemble(body, h, clock, report)
     mesh = build.mesh
     with clock("factorise and reduce"):
@@ -138,6 +161,8 @@ def prepare(
         estimate=model.estimate,
         versions=versions(),
     )
+    arrays = {"values": poles.values, "inputs": poles.inputs, "outputs": poles.outputs}
+    cache.store(name, asdict(effort), **arrays, load=load, points=points)
     return Prepared(probes=probes, poles=poles, load=load, points=points, effort=effort)
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from skinwave import paper15, report
 from skinwave.claims import Run, Verdict, evaluate
 from skinwave.figures import label, overview_figure, png, tacton_figure
@@ -101,7 +103,7 @@ def write_single(folder: Path, run: Run) -> None:
     write_run(folder, run)
     figure = tacton_figure(run.tacton, [run])
     parts = [
-        report.picture(figure, _caption(run.tacton, [run]), "tacton"),
+        report.picture(png(figure), _caption(run.tacton, [run]), "tacton"),
         report.section("Effort", report.effort_table({run.body: run.response.effort}, 1)),
         report.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
     ]
@@ -148,15 +150,14 @@ def _write_page(
     for k, (name, group) in enumerate(groups.items()):
         progress("draw", k / len(groups))
         figure = tacton_figure(name, group)
-        (folder / "figures" / f"{name}.png").write_bytes(png(figure))
-        pictures.append(report.picture(figure, _caption(name, group), name))
+        pictures.append(_picture(folder, name, figure, _caption(name, group)))
     shown = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
     overview = overview_figure(shown, min(2, len(runs[0].scene.probes) - 1))
-    (folder / "figures" / "overview.png").write_bytes(png(overview))
+    shown_first = _picture(folder, "overview", overview, OVERVIEW_CAPTION)
     efforts = {body: p.effort for body, p in prepared.items()}
     parts = [
         *_introduction(outcome, groups),
-        report.picture(overview, OVERVIEW_CAPTION, "overview"),
+        shown_first,
         report.section(
             "Which of the paper's statements hold where",
             report.claims_table(outcome.verdicts),
@@ -171,6 +172,13 @@ def _write_page(
             f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder.")),
     ]  # fmt: skip
     (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+
+
+def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
+    """A figure drawn once: as a file, and inside the page."""
+    drawn = png(figure)
+    (folder / "figures" / f"{name}.png").write_bytes(drawn)
+    return report.picture(drawn, caption, name)
 
 
 def _introduction(outcome: Outcome, groups: dict[str, list[Run]]) -> list[str]:

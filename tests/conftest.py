@@ -1,5 +1,7 @@
 """Shared, small: a block of skin and ways to measure orders."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,12 @@ import meshes
 def order(sizes: list[float], errors: list[float]) -> float:
     """Slope of log error against log size."""
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def fresh_cache(tmp_path_factory):
+    """Tests prepare bodies themselves, whatever this machine prepared before."""
+    os.environ["SKINWAVE_CACHE"] = str(tmp_path_factory.mktemp("cache"))
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,295 @@
+"""Exact waves without a mesh: a half-space, a slab on a rigid base, or a thin sheet, endless.
+
+A pressure q pushes the surface by u = G q at each wavenumber k and complex frequency w (time
+exp(+i w t)). A spot S of unit pressure at the focus moves a point at distance r by
+
+    g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
+
+and a focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
+
+    u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(|x_p - X(a)|, w) exp(-2 pi i n a) da
+
+where Q is the transform of the pressure at the focus. The path of integration over k runs above
+the real axis, away from the poles of the waves, which lie below it for any loss.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.special import jv
+
+from simple_model.focus import spot_width
+from simple_model.pressure import MovingPressure
+from simple_model.response import Effort, Response, step
+from simple_model.trajectory import Floats
+
+Complex = NDArray[np.complex128]
+# (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f, 1) in rad/s.
+Compliance = Callable[[Complex, Complex], Complex]
+
+AIR_DENSITY = 1.2  # kg/m3
+PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
+WRAPPED = 1e-5
+KNOTS = 128  # positions along a closed path: all harmonics below 64 f_d
+INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
+BATCH = 256  # frequencies at a time
+NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
+
+
+def half_space(
+    *, density: float, shear_modulus: float, poisson: float, viscosity: float = 0.0,
+    loss_factor: float = 0.0,
+) -> Compliance:  # fmt: skip
+    """G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s; 0 <= poisson <= 0.5."""
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        mu = _modulus(shear_modulus, viscosity, loss_factor, w)
+        ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
+        bp, bs = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
+        still = np.abs(ks2) < 1e-9 * np.abs(k) ** 2  # the closed form cancels towards rest
+        rayleigh = (2 * k**2 - ks2) ** 2 - 4 * k**2 * bp * bs
+        dynamic = -bp * ks2 / (mu * np.where(still, 1.0, rayleigh))
+        return np.where(still, (1 - poisson) / (mu * k), dynamic)
+
+    return compliance
+
+
+def slab(
+    *, density: float, shear_modulus: float, poisson: float, depth: float,
+    viscosity: float = 0.0, loss_factor: float = 0.0,
+) -> Compliance:  # fmt: skip
+    """A layer of `depth` metre bonded to a rigid base; poisson < 0.5.
+
+    Potentials phi = A e^{bp z} + B e^{-bp (z + H)} and psi likewise meet zero displacement at
+    the base and unit pressure without shear at the top: four equations for each k and w, whose
+    exponentials all decay, so that no thickness overflows.
+    """
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        w = np.where(np.abs(w) < LEAST_FREQUENCY, LEAST_FREQUENCY, w)
+        mu = _modulus(shear_modulus, viscosity, loss_factor, w)
+        ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
+        k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
+        p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
+        ep, es, one, t = np.exp(-p * depth), np.exp(-s * depth), np.ones_like(p), 2 * k**2 - ks2
+        # Rows: normal stress and shear stress at the top, both displacements at the base.
+        rows = [
+            [t, t * ep, -2 * k * s, 2 * k * s * es],
+            [2 * k * p, -2 * k * p * ep, -t, -t * es],
+            [k * ep, k, -s * es, s],
+            [p * ep, -p, -k * es, -k],
+        ]
+        matrix = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        load = np.stack([one, 0 * one, 0 * one, 0 * one], axis=-1)[..., None]
+        a, b, c, d = np.moveaxis(np.linalg.solve(matrix, load)[..., 0], -1, 0)
+        return (p * (a - b * ep) - k * (c + d * es)) / mu
+
+    return compliance
+
+
+def thin_sheet(
+    *, bending_stiffness: float, mass_per_area: float, loss_factor: float = 0.0,
+    viscous_lag: float = 0.0, air_density: float = AIR_DENSITY,
+) -> Compliance:  # fmt: skip
+    """G = 1 / [D (1 + i eta + i w lag) k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
+
+    Under a steady push an endless sheet gives way without bound: its motion is told about a mean
+    that is left out, G = 0 at rest.
+    """
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        bending = bending_stiffness * (1 + 1j * loss_factor + 1j * w * viscous_lag)
+        inertia = (mass_per_area + 2 * air_density / k) * w**2
+        return np.where(w == 0, 0, 1 / (bending * k**4 - inertia))
+
+    return compliance
+
+
+def point_response(
+    compliance: Compliance,
+    distances: ArrayLike,
+    frequencies: ArrayLike,
+    width: float,
+    *,
+    negligible: float = 0.0,
+) -> Complex:
+    """g(r, w) (f, r) in m/Pa: a Gaussian spot of 1 Pa and standard deviation `width` metre.
+
+    Parameters
+    ----------
+    distances : (r,) float, metre
+    frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
+    negligible : a batch of frequencies that stays below this fraction of the largest response so
+        far is the last one answered; for frequencies that rise
+
+    Raises
+    ------
+    ArithmeticError
+        If the wavenumber grid cannot be made fine enough.
+    """
+    r = np.atleast_1d(np.asarray(distances, np.float64))
+    w = np.atleast_1d(np.asarray(frequencies, np.complex128))
+    found = np.zeros((len(w), len(r)), np.complex128)
+    n = 256
+    for start in range(0, len(w), BATCH):
+        part = slice(start, start + BATCH)
+        coarse = _integrated(compliance, r, w[part], width, n)
+        while True:
+            fine = _integrated(compliance, r, w[part], width, 2 * n)
+            if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
+                break
+            coarse, n = fine, 2 * n
+            if n > 2**16:
+                raise ArithmeticError("the wavenumber integral does not converge; add some loss")
+        found[part] = fine
+        if np.abs(fine).max() < negligible * np.abs(found[: part.stop]).max():
+            break
+    return found
+
+
+def steady_lines(
+    compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
+) -> tuple[Floats, Complex]:
+    """Frequencies (f,) in Hz >= 0 and complex amplitudes (f, p) in metre of the steady state.
+
+    Only lines whose load exceeds `threshold` of the strongest are answered. Amplitude a stands
+    for Re a exp(i w t). The gain must repeat within a second.
+    """
+    probes = np.atleast_2d(np.asarray(probes, np.float64))
+    rate = 8192
+    gain = np.fft.fft(pressure.gain(np.arange(rate) / rate)) / rate
+    tones = np.flatnonzero(np.abs(gain) > threshold * np.abs(gain).max())
+    tones_hz = np.where(tones > rate // 2, tones - rate, tones)
+    f_d = pressure.tacton.trajectory.drawing_frequency
+    harmonics = np.arange(-KNOTS // 2 + 1, KNOTS // 2) if f_d else np.zeros(1, int)
+    spot = np.exp(-(_distances(pressure, probes) ** 2) / 2 / spot_width(pressure.height) ** 2)
+    of_load = np.abs(_harmonics(spot[None])[0]).max(axis=0)
+    n, tone = (x.ravel() for x in np.meshgrid(harmonics, np.arange(len(tones)), indexing="ij"))
+    strength = np.abs(gain[tones[tone]]) * of_load[n]
+    strong = strength > threshold * strength.max()
+    n, tone = n[strong], tone[strong]
+    f = n * f_d + tones_hz[tone]
+    g = _on_path(compliance, pressure, probes, 2 * np.pi * np.abs(f))
+    line = _harmonics(g)[np.arange(len(f)), :, np.where(f < 0, -n, n)]
+    amplitude = np.where(f[:, None] < 0, line.conj(), line) * gain[tones[tone]][:, None]
+    amplitude = np.where(f[:, None] < 0, amplitude.conj(), amplitude)
+    frequencies, which = np.unique(np.round(np.abs(f), 9), return_inverse=True)
+    total = np.zeros((len(frequencies), len(probes)), np.complex128)
+    np.add.at(total, which, amplitude)
+    return frequencies, total
+
+
+def flat_body(
+    compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Response:
+    """Motion of probes (p, 2) in metre from rest, at equally spaced times (t,) in s.
+
+    By FFT over twice the duration with exponential damping, which takes what wraps round to
+    1e-5. The rest position is that before the load: a pressure that never stops pushes an
+    endless sheet ever further.
+
+    Raises
+    ------
+    ValueError
+        If the focus is not Gaussian.
+    """
+    if pressure.focus != "gaussian":
+        raise ValueError(f"focus '{pressure.focus}' has no flat-body answer; use 'gaussian'")
+    started = time.perf_counter()
+    probes = np.atleast_2d(np.array(probes, np.float64))
+    dt, n = step(times), len(times)
+    padded = int(PADDING * n)
+    damping = -np.log(WRAPPED) / (padded * dt)
+    t = np.arange(padded) * dt
+    gain = np.where(np.arange(padded) < n, pressure.gain(t), 0.0) * np.exp(-damping * t)
+    gain[0] /= 2  # the trapezoidal rule's end point: the load begins in the middle of a sample
+    w = 2 * np.pi * np.fft.rfftfreq(padded, dt)
+    f_d = pressure.tacton.trajectory.drawing_frequency
+    u = np.zeros((len(w), len(probes)), np.complex128)
+    h = _harmonics(_on_path(compliance, pressure, probes, w - 1j * damping, NEGLIGIBLE))
+    harmonics = range(-KNOTS // 2 + 1, KNOTS // 2) if f_d else [0]
+    largest = np.abs(h).max()
+    for m in harmonics:
+        if np.abs(h[:, :, m]).max() > 1e-7 * largest:
+            driven = np.fft.fft(gain * np.exp(2j * np.pi * m * f_d * t))[: len(w)]
+            u += h[:, :, m] * driven[:, None]
+    displacement = np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None])
+    effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=n, dofs=len(w))
+    return Response(
+        model="flat-body",
+        times=np.array(times),
+        probes=probes,
+        displacement=displacement,
+        effort=effort,
+    )
+
+
+LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
+
+
+def _modulus(mu: float, viscosity: float, loss_factor: float, w: Complex) -> Complex:
+    # The sign of a hysteretic loss follows that of the frequency.
+    return np.asarray(mu * (1 + 1j * loss_factor) + 1j * w * viscosity)
+
+
+def _squared_wavenumbers(
+    density: float, mu: Complex, poisson: float, w: Complex
+) -> tuple[Complex, Complex]:
+    """k_s^2 and k_p^2."""
+    ks2 = density * w**2 / mu
+    return ks2, ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)
+
+
+def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> Complex:
+    """The wavenumber integral by Gauss-Legendre nodes on panels along the raised path."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
+    edges = 6.5 / width * np.linspace(0, 1, n // 16 + 1) ** 2
+    half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
+    x = (middle[:, None] + half[:, None] * nodes).ravel()
+    dx = (half[:, None] * weights).ravel()
+    lift = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
+    ramp = np.tanh(x / lift)
+    k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
+    spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
+    weight = spot * k * dk * dx / (2 * np.pi)
+    bessel = jv(0, k[:, None] * r)
+    return (compliance(k, w[:, None]) * weight) @ bessel
+
+
+def _distances(pressure: MovingPressure, probes: Floats) -> Floats:
+    """Distances (p, KNOTS) in metre from the probes to knots of the path."""
+    knots = np.arange(KNOTS) / KNOTS if not pressure.tacton.trajectory.is_static else np.zeros(1)
+    path = pressure.tacton.trajectory.at_phase(knots)
+    return np.linalg.norm(probes[:, None] - path, axis=2)
+
+
+def _on_path(
+    compliance: Compliance,
+    pressure: MovingPressure,
+    probes: Floats,
+    w: ArrayLike,
+    negligible: float = 0.0,
+) -> Complex:
+    """g (f, p, KNOTS) from knots of the path to the probes."""
+    distance = _distances(pressure, probes)
+    width = spot_width(pressure.height)
+    if distance.size <= 2 * len(probes):
+        unique, which = np.unique(distance, return_inverse=True)
+        return point_response(compliance, unique, w, width, negligible=negligible)[
+            :, which.reshape(distance.shape)
+        ]
+    # g is as smooth as the spot: a table six to its standard deviation serves every distance.
+    table = np.linspace(0, distance.max(), max(8, int(np.ceil(distance.max() / width * 6))))
+    g = point_response(compliance, table, w, width, negligible=negligible)
+    flat = (1, np.zeros(len(g), np.complex128))
+    spline = CubicSpline(table, g, axis=1, bc_type=(flat, "not-a-knot"))
+    return np.asarray(spline(distance))
+
+
+def _harmonics(values: Complex) -> Complex:
+    """Fourier coefficients (..., n) along the path; index -n is harmonic -n."""
+    return np.asarray(np.fft.fft(values, axis=-1) / values.shape[-1])
