@@ -1,5 +1,6 @@
 """What is commanded, and every answer that needs no mesh."""
 
+from simple_model.flat_body import flat_body
 from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.point_kernel import point_kernel
 from simple_model.pressure import MovingPressure
@@ -17,6 +18,7 @@ __all__ = [
     "Trajectory",
     "array_field",
     "commanded",
+    "flat_body",
     "focal_spot",
     "lines",
     "modulation",

@@ -24,6 +24,7 @@ from scipy.special import jv
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, step
+from simple_model.steady import KNOTS, along_path, load_lines, path_knots, summed
 from simple_model.trajectory import Floats
 
 Complex = NDArray[np.complex128]
@@ -33,8 +34,10 @@ Compliance = Callable[[Complex, Complex], Complex]
 AIR_DENSITY = 1.2  # kg/m3
 PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
 WRAPPED = 1e-5
-KNOTS = 128  # positions along a closed path: all harmonics below 64 f_d
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
+LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
+FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
+CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
 
@@ -133,19 +136,13 @@ def point_response(
     r = np.atleast_1d(np.asarray(distances, np.float64))
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))
     found = np.zeros((len(w), len(r)), np.complex128)
-    n = 256
+    n = FEWEST_NODES
     for start in range(0, len(w), BATCH):
         part = slice(start, start + BATCH)
-        coarse = _integrated(compliance, r, w[part], width, n)
-        while True:
-            fine = _integrated(compliance, r, w[part], width, 2 * n)
-            if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
-                break
-            coarse, n = fine, 2 * n
-            if n > 2**16:
-                raise ArithmeticError("the wavenumber integral does not converge; add some loss")
-        found[part] = fine
-        if np.abs(fine).max() < negligible * np.abs(found[: part.stop]).max():
+        if start % (CHECKED_EACH * BATCH) == 0:
+            n = _enough_nodes(compliance, r, w[part], width, n)
+        found[part] = _integrated(compliance, r, w[part], width, n)
+        if np.abs(found[part]).max() < negligible * np.abs(found[: part.stop]).max():
             break
     return found
 
@@ -155,31 +152,21 @@ def steady_lines(
 ) -> tuple[Floats, Complex]:
     """Frequencies (f,) in Hz >= 0 and complex amplitudes (f, p) in metre of the steady state.
 
-    Only lines whose load exceeds `threshold` of the strongest are answered. Amplitude a stands
-    for Re a exp(i w t). The gain must repeat within a second.
+    Only the lines that the load contains above `threshold` of its strongest are answered.
+    Amplitude a stands for Re a exp(2 pi i f t).
+
+    Raises
+    ------
+    ValueError
+        If the focus is not Gaussian.
     """
+    _check(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
-    rate = 8192
-    gain = np.fft.fft(pressure.gain(np.arange(rate) / rate)) / rate
-    tones = np.flatnonzero(np.abs(gain) > threshold * np.abs(gain).max())
-    tones_hz = np.where(tones > rate // 2, tones - rate, tones)
-    f_d = pressure.tacton.trajectory.drawing_frequency
-    harmonics = np.arange(-KNOTS // 2 + 1, KNOTS // 2) if f_d else np.zeros(1, int)
-    spot = np.exp(-(_distances(pressure, probes) ** 2) / 2 / spot_width(pressure.height) ** 2)
-    of_load = np.abs(_harmonics(spot[None])[0]).max(axis=0)
-    n, tone = (x.ravel() for x in np.meshgrid(harmonics, np.arange(len(tones)), indexing="ij"))
-    strength = np.abs(gain[tones[tone]]) * of_load[n]
-    strong = strength > threshold * strength.max()
-    n, tone = n[strong], tone[strong]
-    f = n * f_d + tones_hz[tone]
-    g = _on_path(compliance, pressure, probes, 2 * np.pi * np.abs(f))
-    line = _harmonics(g)[np.arange(len(f)), :, np.where(f < 0, -n, n)]
-    amplitude = np.where(f[:, None] < 0, line.conj(), line) * gain[tones[tone]][:, None]
-    amplitude = np.where(f[:, None] < 0, amplitude.conj(), amplitude)
-    frequencies, which = np.unique(np.round(np.abs(f), 9), return_inverse=True)
-    total = np.zeros((len(frequencies), len(probes)), np.complex128)
-    np.add.at(total, which, amplitude)
-    return frequencies, total
+    lines = load_lines(pressure, threshold)
+    f, which = np.unique(lines.frequencies, return_inverse=True)
+    h = along_path(_on_path(compliance, pressure, probes, 2 * np.pi * f))
+    amplitudes = h[which, :, lines.harmonics] * lines.coefficients[:, None]
+    return summed(lines.frequencies, amplitudes)
 
 
 def flat_body(
@@ -196,8 +183,7 @@ def flat_body(
     ValueError
         If the focus is not Gaussian.
     """
-    if pressure.focus != "gaussian":
-        raise ValueError(f"focus '{pressure.focus}' has no flat-body answer; use 'gaussian'")
+    _check(pressure)
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
     dt, n = step(times), len(times)
@@ -209,7 +195,7 @@ def flat_body(
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt)
     f_d = pressure.tacton.trajectory.drawing_frequency
     u = np.zeros((len(w), len(probes)), np.complex128)
-    h = _harmonics(_on_path(compliance, pressure, probes, w - 1j * damping, NEGLIGIBLE))
+    h = along_path(_on_path(compliance, pressure, probes, w - 1j * damping, NEGLIGIBLE))
     harmonics = range(-KNOTS // 2 + 1, KNOTS // 2) if f_d else [0]
     largest = np.abs(h).max()
     for m in harmonics:
@@ -227,7 +213,9 @@ def flat_body(
     )
 
 
-LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
+def _check(pressure: MovingPressure) -> None:
+    if pressure.focus != "gaussian":
+        raise ValueError(f"focus '{pressure.focus}' has no flat-body answer; use 'gaussian'")
 
 
 def _modulus(mu: float, viscosity: float, loss_factor: float, w: Complex) -> Complex:
@@ -241,6 +229,17 @@ def _squared_wavenumbers(
     """k_s^2 and k_p^2."""
     ks2 = density * w**2 / mu
     return ks2, ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)
+
+
+def _enough_nodes(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> int:
+    """The fewest wavenumbers that twice as many do not improve on."""
+    coarse = _integrated(compliance, r, w, width, n)
+    while n < MOST_NODES:
+        fine = _integrated(compliance, r, w, width, 2 * n)
+        if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
+            return n
+        coarse, n = fine, 2 * n
+    raise ArithmeticError("the wavenumber integral does not converge; add some loss")
 
 
 def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> Complex:
@@ -262,9 +261,7 @@ def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: 
 
 def _distances(pressure: MovingPressure, probes: Floats) -> Floats:
     """Distances (p, KNOTS) in metre from the probes to knots of the path."""
-    knots = np.arange(KNOTS) / KNOTS if not pressure.tacton.trajectory.is_static else np.zeros(1)
-    path = pressure.tacton.trajectory.at_phase(knots)
-    return np.linalg.norm(probes[:, None] - path, axis=2)
+    return np.linalg.norm(probes[:, None] - path_knots(pressure), axis=2)
 
 
 def _on_path(
@@ -288,8 +285,3 @@ def _on_path(
     flat = (1, np.zeros(len(g), np.complex128))
     spline = CubicSpline(table, g, axis=1, bc_type=(flat, "not-a-knot"))
     return np.asarray(spline(distance))
-
-
-def _harmonics(values: Complex) -> Complex:
-    """Fourier coefficients (..., n) along the path; index -n is harmonic -n."""
-    return np.asarray(np.fft.fft(values, axis=-1) / values.shape[-1])

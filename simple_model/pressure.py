@@ -61,8 +61,11 @@ class MovingPressure:
 
     def gain(self, t: ArrayLike) -> Floats:
         """Pressure (...) in Pa at the focus at times (...) in s."""
-        law, tacton = DRIVES[self.drive], self.tacton
-        driven = law(tacton.amplitude, modulation(tacton, t), self.depth_of_modulation)
+        return self.driven(modulation(self.tacton, t))
+
+    def driven(self, modulation: Floats) -> Floats:
+        """Pressure (...) in Pa at the focus where the modulation (...) has these values."""
+        driven = DRIVES[self.drive](self.tacton.amplitude, modulation, self.depth_of_modulation)
         return self.peak_pressure * relative_intensity(self.height) * driven
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:

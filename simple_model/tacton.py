@@ -74,16 +74,25 @@ class Tacton:
 def modulation(tacton: Tacton, t: ArrayLike) -> Floats:
     """{w1 M1 + w2 M2} E at times (...) in s: what the carrier is multiplied by, -1..1."""
     t = np.asarray(t, np.float64)
+    return modulation_at_phases(tacton, *(2 * np.pi * f * t for f in tones(tacton)))
+
+
+def modulation_at_phases(tacton: Tacton, first: Floats, second: Floats, envelope: Floats) -> Floats:
+    """The modulation (...) where its three sinusoids have these phases (...) in rad."""
     w1, w2 = tacton.superposition
-    mixed = w1 * _sinusoid(tacton.am_frequency, t) + w2 * _sinusoid(tacton.second_am_frequency, t)
-    return mixed * _sinusoid(tacton.envelope_frequency, t)
+    m1, m2, e = (
+        np.sin(phase) if f > 0 else np.ones_like(phase)
+        for f, phase in zip(tones(tacton), (first, second, envelope), strict=True)
+    )
+    return (w1 * m1 + w2 * m2) * e
+
+
+def tones(tacton: Tacton) -> tuple[float, float, float]:
+    """Frequencies in Hz of the two AM sinusoids and the envelope; 0 where one is off."""
+    return tacton.am_frequency, tacton.second_am_frequency, tacton.envelope_frequency
 
 
 def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
     """p(t) of equation 1 at times (...) in s, carrier included, as a fraction of full drive."""
     carrier = np.sin(2 * np.pi * CARRIER * np.asarray(t, np.float64))
     return tacton.amplitude * carrier * modulation(tacton, t)
-
-
-def _sinusoid(frequency: float, t: Floats) -> Floats:
-    return np.sin(2 * np.pi * frequency * t) if frequency > 0 else np.ones_like(t)
