@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from skinwave.simulation import Progress
+    from skinwave.effort import Progress
 
 TITLE = "The paper's 15 Tactons: point kernel, paper and skin"
-MODELS = ("point-kernel", "fem", "fem-transient")
+MODELS = ("point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

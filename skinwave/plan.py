@@ -45,6 +45,8 @@ def build(body: Body, h: float | None = None) -> Build:
     """
     if body.kind == "none":
         raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    if not np.isfinite(body.depth):
+        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
     if body.kind == "sheet":
         shorter = min(body.width, body.height)
         thickness = max(body.depth, SHEET_THICKNESS * shorter)

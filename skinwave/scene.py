@@ -4,7 +4,7 @@ import difflib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,8 @@ class Body:
     ----------
     kind : "none" (the point kernel needs no body), "sheet" (thin, bends) or "slab" (thick)
     material : the name of a preset, or a Material
-    width, height, depth : float, metre, along x, y and downwards
+    width, height, depth : float, metre, along x, y and downwards; a slab's depth may be inf,
+        a half-space, which only flat-body answers
     base, sides : "clamped", "absorbing" or "free"
 
     Raises
@@ -52,7 +53,8 @@ class Body:
         for name in ("base", "sides"):
             choose(name, getattr(self, name), BASES)
         for name in ("width", "height", "depth"):
-            if not (isfinite(length := getattr(self, name)) and length > 0):
+            length, endless = getattr(self, name), name == "depth" and self.kind == "slab"
+            if not (length > 0 and (isfinite(length) or (endless and length == inf))):
                 raise ValueError(f"body {name} = {1e3 * length} mm must be finite and above 0")
         if self.kind != "none" and self.base == self.sides == "free":
             raise ValueError("a body with free base and free sides flies away; clamp one of them")

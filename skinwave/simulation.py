@@ -1,25 +1,21 @@
 """From a scene to a response, for every model by one name."""
 
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
-from itertools import islice
 
 import numpy as np
 
 import fem
 from meshes.tetmesh import Floats
-from simple_model import Effort, MovingPressure, Response, point_kernel
+from simple_model import Effort, MovingPressure, Response, flat_body, point_kernel
 from simple_model.choices import choose
 from simple_model.focus import spot_width
 from skinwave import cache, plan
+from skinwave.effort import Clock, Progress, peak_memory, silent, versions
+from skinwave.full import assembled, compliance, harmonic_answer, transient_answer
 from skinwave.scene import Body, Scene
 
-MODELS = ("auto", "point-kernel", "fem", "fem-transient")
-Progress = Callable[[str, float], None]  # phase and fraction of it done
+MODELS = ("auto", "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
 
 
 def simulate(
@@ -37,8 +33,9 @@ def simulate(
     Parameters
     ----------
     scene : Scene
-    model : "point-kernel", "fem" (the reduced model), "fem-transient", or "auto": the point
-        kernel where there is no body, else fem
+    model : "point-kernel"; "flat-body", exact waves in an endless body; "fem", the reduced model;
+        "fem-harmonic", the steady state line by line; "fem-transient", every time step; or
+        "auto": the point kernel where there is no body, else fem
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : called with the name of the phase and the fraction done
     h : float, metre, element size; planned from the body if not given
@@ -56,11 +53,16 @@ def simulate(
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     if model == "auto":
         model = "point-kernel" if scene.body.kind == "none" else "fem"
+    times = sample_times(scene)
     if model == "point-kernel":
-        return point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
-    report = progress or _silent
+        return point_kernel(scene.pressure, scene.probe_points, times)
+    if model == "flat-body":
+        return flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
+    report = progress or silent
     if model == "fem-transient":
-        return _march(scene, report, h, dt, solver)
+        return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
+    if model == "fem-harmonic":
+        return harmonic_answer(scene, times, report, h=h, solver=solver, threshold=tolerance / 50)
     reduction = min(plan.REDUCTION_TOLERANCE, tolerance / 50)
     prepared = prepare(
         scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction
@@ -119,7 +121,7 @@ def prepare(
             poles = fem.Poles(**{field: entry[field] for field in ("values", "inputs", "outputs")})
             effort = Effort(**entry["meta"])
     if not entry:
-        return _prepared_anew(body, probes, progress or _silent, h, solver, tolerance, name)
+        return _prepared_anew(body, probes, progress or silent, h, solver, tolerance, name)
     effort = replace(effort, seconds=clock.seconds, peak_memory=peak_memory())
     return Prepared(
         probes=probes, poles=poles, load=entry["load"], points=entry["points"], effort=effort
@@ -136,7 +138,7 @@ def _prepared_anew(
     name: str,
 ) -> Prepared:
     clock = Clock()
-    build, operators = _assemble(body, h, clock, report)
+    build, operators = assembled(body, h, clock, report)
     mesh = build.mesh
     with clock("factorise and reduce"):
         report("factorise", 0.0)
@@ -217,92 +219,3 @@ def typical_spots(body: Body, points: Floats) -> Floats:
     centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
     squared = ((points[:, None] - centres) ** 2).sum(axis=2)
     return np.exp(-squared / (2 * spot_width(0.2) ** 2))
-
-
-def _assemble(
-    body: Body, h: float | None, clock: "Clock", report: Progress
-) -> tuple[plan.Build, fem.Operators]:
-    with clock("mesh"):
-        report("mesh", 0.0)
-        build = plan.build(body, h)
-    with clock("assemble"):
-        report("assemble", 0.0)
-        operators = fem.assemble(
-            build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing
-        )
-    return build, operators
-
-
-def _march(
-    scene: Scene, report: Progress, h: float | None, dt: float | None, solver: str
-) -> Response:
-    """The full time stepping, sampled at the time steps nearest to the response's times."""
-    clock = Clock()
-    build, operators = _assemble(scene.body, h, clock, report)
-    times = sample_times(scene)
-    per_sample = max(1, round(1 / plan.SAMPLE_RATE / (dt or 1 / plan.TRANSIENT_RATE)))
-    steps = per_sample * (len(times) - 1)
-    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
-    S = fem.probe_operator(build.mesh, scene.probe_points)
-    displacement = np.empty((len(times), len(scene.probes)))
-    report("factorise", 0.0)
-    with clock("march"):
-        states = fem.transient(
-            operators,
-            lambda t: P @ scene.pressure(points, t),
-            1 / (plan.SAMPLE_RATE * per_sample),
-            solver=solver,
-        )
-        for k, state in enumerate(islice(states, steps + 1)):
-            if k % per_sample == 0:
-                displacement[k // per_sample] = S @ state.displacement
-            report("march", k / steps)
-    effort = Effort(
-        seconds=clock.seconds,
-        dofs=len(operators.free),
-        steps=steps,
-        peak_memory=peak_memory(),
-        solver=fem.available()[0] if solver == "auto" else solver,
-        versions=versions(),
-    )
-    return Response(
-        model="fem-transient",
-        times=times,
-        probes=scene.probe_points,
-        displacement=displacement,
-        effort=effort,
-    )
-
-
-class Clock:
-    """Wall seconds by phase: `with clock("mesh"): ...`."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, phase: str) -> Iterator[None]:
-        """Time a phase."""
-        started = time.perf_counter()
-        yield
-        self.seconds[phase] = self.seconds.get(phase, 0.0) + time.perf_counter() - started
-
-
-def peak_memory() -> int:
-    """Largest resident size of this process so far, bytes; 0 where the system does not tell."""
-    try:
-        import resource
-    except ImportError:
-        return 0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else 1024 * peak)
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python, skinwave and what it computes with."""
-    names = ("skinwave", "numpy", "scipy")
-    return {"python": sys.version.split()[0], **{name: version(name) for name in names}}
-
-
-def _silent(phase: str, fraction: float) -> None:
-    pass

@@ -10,18 +10,11 @@ from matplotlib.figure import Figure
 
 from skinwave import paper15, report
 from skinwave.claims import Run, Verdict, evaluate
+from skinwave.effort import Progress, peak_memory
 from skinwave.figures import label, overview_figure, png, tacton_figure
 from skinwave.files import write_claims, write_lines, write_responses, write_run
 from skinwave.scene import BODIES, Scene, dumps, with_body
-from skinwave.simulation import (
-    Prepared,
-    Progress,
-    answer,
-    check_knobs,
-    peak_memory,
-    prepare,
-    simulate,
-)
+from skinwave.simulation import Prepared, answer, check_knobs, prepare, simulate
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 

@@ -33,7 +33,9 @@ def circling(size, speed, am=0.0, **load):
 def test_a_focus_at_rest_is_the_closed_form():
     for poisson in (0.0, 0.3, 0.49, 0.5):
         found = static(half_space(**FOREARM, poisson=poisson), [0.0])[0]
-        assert found == pytest.approx(1e6 * (1 - poisson) * WIDTH * np.sqrt(np.pi / 2) / 7.86e3, rel=1e-5)
+        assert found == pytest.approx(
+            1e6 * (1 - poisson) * WIDTH * np.sqrt(np.pi / 2) / 7.86e3, rel=1e-5
+        )
 
 
 @pytest.mark.parametrize(
@@ -53,7 +55,10 @@ def test_a_focus_on_the_forearm_is_the_published_table(hz, expected):
 
 def test_phase_lags_as_published():
     g = point_response(
-        half_space(**FOREARM, poisson=0.5), [0.0], 2 * np.pi * np.array([20, 80, 140, 191, 210]), WIDTH
+        half_space(**FOREARM, poisson=0.5),
+        [0.0],
+        2 * np.pi * np.array([20, 80, 140, 191, 210]),
+        WIDTH,
     )
     np.testing.assert_allclose(
         np.degrees(np.angle(g[:, 0])), [-16.2, -60.0, -91.5, -109.1, -114.1], atol=0.1
@@ -74,7 +79,21 @@ def test_a_focus_on_paper_with_air_is_the_published_row(hz, expected):
 
 def test_deflection_is_greatest_when_the_focus_keeps_up_with_the_surface_wave():
     speeds = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 18]
-    table = [0.362, 0.402, 0.409, 0.366, 0.309, 0.260, 0.222, 0.194, 0.175, 0.162, 0.146, 0.130, 0.120]
+    table = [
+        0.362,
+        0.402,
+        0.409,
+        0.366,
+        0.309,
+        0.260,
+        0.222,
+        0.194,
+        0.175,
+        0.162,
+        0.146,
+        0.130,
+        0.120,
+    ]
     body, radius = half_space(**FOREARM, poisson=0.5), 0.1 / 2 / np.pi
     peaks = []
     for speed in speeds:
@@ -86,7 +105,11 @@ def test_deflection_is_greatest_when_the_focus_keeps_up_with_the_surface_wave():
 
 @pytest.mark.parametrize(
     ("size", "speed", "expected"),
-    [(0.01, 6, [0.422, 0.07, 0.01]), (0.02, 12, [0.970, 0.19, 0.05]), (0.03, 18, [1.136, 0.30, 0.11])],
+    [
+        (0.01, 6, [0.422, 0.07, 0.01]),
+        (0.02, 12, [0.970, 0.19, 0.05]),
+        (0.03, 18, [1.136, 0.30, 0.11]),
+    ],
 )
 def test_a_circling_focus_on_paper_has_the_published_harmonics(size, speed, expected):
     f, a = steady_lines(PAPER, circling(size, speed), [[size / 2, 0.0]])

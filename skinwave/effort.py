@@ -1,0 +1,43 @@
+"""What an answer cost: seconds by phase, memory, versions."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+
+Progress = Callable[[str, float], None]  # phase and fraction of it done
+
+
+class Clock:
+    """Wall seconds by phase: `with clock("mesh"): ...`."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, phase: str) -> Iterator[None]:
+        """Time a phase."""
+        started = time.perf_counter()
+        yield
+        self.seconds[phase] = self.seconds.get(phase, 0.0) + time.perf_counter() - started
+
+
+def peak_memory() -> int:
+    """Largest resident size of this process so far, bytes; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(peak if sys.platform == "darwin" else 1024 * peak)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, skinwave and what it computes with."""
+    names = ("skinwave", "numpy", "scipy")
+    return {"python": sys.version.split()[0], **{name: version(name) for name in names}}
+
+
+def silent(phase: str, fraction: float) -> None:
+    """Progress that nobody watches."""

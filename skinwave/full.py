@@ -1,0 +1,150 @@
+"""Answers without reduction: every time step, every line, and exact waves of endless bodies."""
+
+from itertools import islice
+from math import isfinite
+
+import numpy as np
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model import Effort, Response
+from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
+from simple_model.response import step
+from simple_model.steady import along_path, load_lines, path_knots, summed
+from skinwave import plan
+from skinwave.effort import Clock, Progress, peak_memory, versions
+from skinwave.scene import Body, Scene
+
+
+def assembled(
+    body: Body, h: float | None, clock: Clock, report: Progress
+) -> tuple[plan.Build, fem.Operators]:
+    """A body's mesh and operators."""
+    with clock("mesh"):
+        report("mesh", 0.0)
+        build = plan.build(body, h)
+    with clock("assemble"):
+        report("assemble", 0.0)
+        operators = fem.assemble(
+            build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing
+        )
+    return build, operators
+
+
+def transient_answer(
+    scene: Scene,
+    times: Floats,
+    report: Progress,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+) -> Response:
+    """The full time stepping, in whole steps of about dt between the response's times."""
+    clock = Clock()
+    build, operators = assembled(scene.body, h, clock, report)
+    per_sample = max(1, round(step(times) / (dt or 1 / plan.TRANSIENT_RATE)))
+    steps = per_sample * (len(times) - 1)
+    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    S = fem.probe_operator(build.mesh, scene.probe_points)
+    displacement = np.empty((len(times), len(scene.probes)))
+    report("factorise", 0.0)
+    with clock("march"):
+        states = fem.transient(
+            operators,
+            lambda t: P @ scene.pressure(points, t),
+            step(times) / per_sample,
+            solver=solver,
+        )
+        for k, state in enumerate(islice(states, steps + 1)):
+            if k % per_sample == 0:
+                displacement[k // per_sample] = S @ state.displacement
+            report("march", k / steps)
+    return _response("fem-transient", scene, times, displacement, clock, operators, steps, solver)
+
+
+def harmonic_answer(
+    scene: Scene,
+    times: Floats,
+    report: Progress,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+    threshold: float = 1e-3,
+) -> Response:
+    """The steady state: one factorisation for each line of the load above the threshold."""
+    clock = Clock()
+    build, operators = assembled(scene.body, h, clock, report)
+    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    S = fem.probe_operator(build.mesh, scene.probe_points)
+    with clock("lines"):
+        lines = load_lines(scene.pressure, threshold)
+        spots = along_path(scene.pressure.spot(points, path_knots(scene.pressure)).T)
+        patterns = lines.coefficients[:, None] * spots.T[lines.harmonics]
+        frequencies, pressures = summed(lines.frequencies, patterns)
+        amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
+        for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):
+            report("lines", k / len(frequencies))
+            amplitudes[k] = S @ fem.harmonic(operators, P @ pressure, f, solver=solver)[0]
+    waves = np.exp(2j * np.pi * times[:, None] * frequencies)
+    displacement = (waves @ amplitudes).real
+    count = len(frequencies)
+    return _response("fem-harmonic", scene, times, displacement, clock, operators, count, solver)
+
+
+def compliance(body: Body) -> Compliance:
+    """How an endless body of the same section gives way; a sheet vibrates in vacuum.
+
+    Raises
+    ------
+    ValueError
+        If there is no body, or none that has exact waves.
+    """
+    solid = body.solid
+    if body.kind == "sheet":
+        return thin_sheet(
+            bending_stiffness=solid.young * body.depth**3 / 12 / (1 - solid.poisson**2),
+            mass_per_area=solid.density * body.depth,
+            loss_factor=solid.loss_factor,
+            viscous_lag=solid.viscosity / solid.shear_modulus,
+            air_density=0.0,
+        )
+    if body.kind == "none" or (body.base != "clamped" and isfinite(body.depth)):
+        raise ValueError(
+            "flat-body answers a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
+        )
+    values = {
+        "density": solid.density,
+        "shear_modulus": solid.shear_modulus,
+        "poisson": solid.poisson,
+        "viscosity": solid.viscosity,
+        "loss_factor": solid.loss_factor,
+    }
+    return slab(**values, depth=body.depth) if isfinite(body.depth) else half_space(**values)
+
+
+def _response(
+    model: str,
+    scene: Scene,
+    times: Floats,
+    displacement: Floats,
+    clock: Clock,
+    operators: fem.Operators,
+    steps: int,
+    solver: str,
+) -> Response:
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        steps=steps,
+        peak_memory=peak_memory(),
+        solver=fem.available()[0] if solver == "auto" else solver,
+        versions=versions(),
+    )
+    return Response(
+        model=model,
+        times=times,
+        probes=scene.probe_points,
+        displacement=displacement,
+        effort=effort,
+    )
