@@ -11,7 +11,7 @@ dilatation (Nagtegaal, Parks and Rice 1974; Hughes 1980), without which displace
 wavelengths away come out several per cent too small.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,7 @@ from scipy import sparse
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
 from fem.materials import Material, rayleigh_damping
 from meshes import MeshError, TetMesh, facet_set
-from meshes.tetmesh import FACES, Floats, Ints
+from meshes.tetmesh import EDGES, FACES, Floats, Ints
 
 SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
 LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, below which 10-node tetrahedra need no remedy
@@ -93,7 +93,8 @@ def assemble(
     K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[mesh.region], b[mesh.region] + lag)
     if absorbing is not None:
         C = C + _dashpots(mesh, facet_set(mesh, absorbing), materials)
-    K, C, M = (operator[free][:, free] for operator in (K, C, M))
+    if len(free) < mesh.n_dofs:
+        K, C, M = (operator[free][:, free] for operator in (K, C, M))
     return Operators(K=K, C=C, M=M, free=free, n_dofs=mesh.n_dofs)
 
 
@@ -187,7 +188,8 @@ def _volume_operators(
     blocks, masses = element_matrices(mesh, rho, mu, lam)
     K, M = _from_blocks(pattern, blocks), _from_masses(pattern, masses)
     if np.ptp(mass_rate) == 0 and np.ptp(stiffness_lag) == 0:
-        return K, mass_rate[0] * M + stiffness_lag[0] * K, M
+        C = stiffness_lag[0] * K
+        return K, C + mass_rate[0] * M if mass_rate[0] else C, M
     blocks *= stiffness_lag[:, None, None]
     masses *= mass_rate[:, None, None]
     return K, _from_blocks(pattern, blocks) + _from_masses(pattern, masses), M
@@ -200,49 +202,75 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
     projected = np.maximum(lam - LOCKING_FREE * mu, 0.0) if mesh.order == 2 else np.zeros(m)
     direct = lam - projected
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
-    for slab, corners in _slabs(mesh):
-        gradients, volumes = _gradients(corners, 2, slab.start)
-        G = np.sqrt(volumes)[..., None, None] * gradients  # (e, q, a, i)
+    NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
+    shape_of = mesh.tets[:, :4] if _is_straight(mesh) else mesh.tets
+    for start in range(0, m, SLAB):
+        slab = slice(start, start + SLAB)
+        corners = mesh.points[shape_of[slab]]
+        gradients, volumes = _gradients(corners, n_nodes, 2, start)
         e, q = volumes.shape
-        flat = G.transpose(0, 2, 3, 1).reshape(e, 3 * n_nodes, q)
-        H = np.matmul(flat, flat.transpose(0, 2, 1)).reshape(e, n_nodes, 3, n_nodes, 3)
-        shear = np.einsum("eaibi->eab", H)
-        mean = np.einsum("eq,eqai->eai", volumes, gradients)
+        G = (np.sqrt(volumes)[:, :, None, None] * gradients).reshape(e, q, 3 * n_nodes)
+        H = np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
+        l2, m2 = direct[slab, None, None], mu[slab, None, None]
+        shear = m2 * np.einsum("eiaib->eab", H)
+        mean = np.einsum("eq,eqia->eia", volumes, gradients)
         mean *= np.sqrt(projected[slab] / volumes.sum(axis=1))[:, None, None]
         for i in range(3):
             for j in range(3):
                 block = blocks[i, j, slab]
-                np.multiply(direct[slab, None, None], H[:, :, i, :, j], out=block)
-                block += mu[slab, None, None] * H[:, :, j, :, i]
+                np.multiply(l2, H[:, i, :, j], out=block)
+                block += m2 * H[:, j, :, i]
                 if i == j:
-                    block += mu[slab, None, None] * shear
+                    block += shear
                 if projected[slab].any():
-                    block += mean[:, :, None, i] * mean[:, None, :, j]
-        weights = rho[slab, None] * _gradients(corners, 5, slab.start)[1]
-        masses[slab] = np.einsum("eq,qa,qb->eab", weights, N, N, optimize=True)
+                    block += mean[:, i, :, None] * mean[:, j, None, :]
+        weights = rho[slab, None] * _jacobians(corners, 5, start)[2]
+        masses[slab] = (weights @ NN).reshape(e, n_nodes, n_nodes)
     return blocks, masses
 
 
-def _slabs(mesh: TetMesh) -> Iterator[tuple[slice, Floats]]:
-    for start in range(0, len(mesh.tets), SLAB):
-        slab = slice(start, min(start + SLAB, len(mesh.tets)))
-        yield slab, mesh.points[mesh.tets[slab]]
+def _is_straight(mesh: TetMesh) -> bool:
+    """Whether every mid-side node lies in the middle of its edge."""
+    if mesh.order == 1:
+        return True
+    ends = mesh.points[mesh.tets[:, EDGES]]
+    middles = mesh.points[mesh.tets[:, 4:]]
+    bow = np.abs(2 * middles - ends[:, :, 0] - ends[:, :, 1]).max()
+    return bool(bow < 1e-10 * np.abs(ends[:, :, 0] - ends[:, :, 1]).max())
 
 
-def _gradients(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats]:
-    """Shape gradients (e, q, a, i) and quadrature volumes (e, q) of elements (e, a, i)."""
+def _gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
+    """Shape gradients (e, q, i, a) and quadrature volumes (e, q) of elements shaped by (e, a, i)."""
+    derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
+    cofactors, determinants, volumes = _jacobians(nodes, degree, first)
+    inverse = cofactors / determinants[..., None, None]
+    return np.matmul(inverse.swapaxes(2, 3), derivatives.transpose(0, 2, 1)), volumes
+
+
+def _jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
+    """Cofactors (e, q, l, i) and determinants (e, q) of the map from the reference element, and
+    quadrature volumes (e, q). Four nodes span a straight element, where q is 1 for the first two.
+    """
     barycentric, weights = tetrahedron_rule(degree)
-    derivatives = shape_derivatives(barycentric, nodes.shape[1])
-    jacobian = np.einsum("qal,eai->eqli", derivatives, nodes, optimize=True)
-    determinant = np.linalg.det(jacobian)
-    inverted = np.flatnonzero((determinant <= 0).any(axis=1))
+    at = barycentric[:1] if nodes.shape[1] == 4 else barycentric
+    jacobian = np.einsum(
+        "qal,eai->eqli", shape_derivatives(at, nodes.shape[1]), nodes, optimize=True
+    )
+    x, y, z = (jacobian[..., i] for i in range(3))
+    cofactors = np.empty_like(jacobian)
+    for l in range(3):  # noqa: E741 - the letter of the derivatives
+        m, n = (l + 1) % 3, (l + 2) % 3
+        cofactors[..., l, 0] = y[..., m] * z[..., n] - z[..., m] * y[..., n]
+        cofactors[..., l, 1] = z[..., m] * x[..., n] - x[..., m] * z[..., n]
+        cofactors[..., l, 2] = x[..., m] * y[..., n] - y[..., m] * x[..., n]
+    determinants = (jacobian[..., 0, :] * cofactors[..., 0, :]).sum(axis=-1)
+    inverted = np.flatnonzero((determinants <= 0).any(axis=1))
     if len(inverted):
         raise MeshError(
             f"element {first + inverted[0]} is inverted (and {len(inverted) - 1} more near it); "
             "straighten its mid-side nodes or remesh"
         )
-    gradients = np.einsum("eqil,qal->eqai", np.linalg.inv(jacobian), derivatives, optimize=True)
-    return gradients, determinant * weights / 6
+    return cofactors, determinants, determinants * weights / 6
 
 
 def _from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
