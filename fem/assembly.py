@@ -240,7 +240,7 @@ def _is_straight(mesh: TetMesh) -> bool:
 
 
 def _gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
-    """Shape gradients (e, q, i, a) and quadrature volumes (e, q) of elements shaped by (e, a, i)."""
+    """Shape gradients (e, q, i, a) and quadrature volumes (e, q); `nodes` (e, a, i) give shape."""
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
     cofactors, determinants, volumes = _jacobians(nodes, degree, first)
     inverse = cofactors / determinants[..., None, None]

@@ -50,6 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", parents=[common], help="one scene, one model")
     run.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
     run.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    run.add_argument("--tolerance", type=float, default=0.05, help="relative error of waveforms")
     run.add_argument("--dt", type=float, metavar="S", help="time step of fem-transient, s")
     run.set_defaults(command=_run)
 
@@ -61,7 +62,30 @@ def _parser() -> argparse.ArgumentParser:
         help="scene file, or paper-15, the 15 Tactons of Lim, Seifi and Park (default)",
     )  # fmt: skip
     compare.set_defaults(command=_compare)
+
+    plan = commands.add_parser("plan", help="what a scene requires, and why")
+    plan.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+    plan.add_argument("--tolerance", type=float, default=0.05, help="relative error of waveforms")
+    plan.add_argument("--json", action="store_true", help="the plan as JSON")
+    plan.add_argument("--debug", action="store_true", help="traceback of an error")
+    plan.set_defaults(command=_plan)
     return parser
+
+
+def _plan(options: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    from skinwave.plan import plan
+    from skinwave.scene import read
+
+    required = plan(read(options.scene), options.tolerance)
+    if options.json:
+        print(json.dumps(asdict(required)))
+        return 0
+    width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
+    for row in required.rows:
+        print(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
+    return 0
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -77,7 +101,7 @@ def _run(options: argparse.Namespace) -> int:
     with output_folder(out, overwrite=options.overwrite) as folder:
         with _progress(options) as progress:
             response = simulate(
-                scene, options.model, progress=progress,
+                scene, options.model, options.tolerance, progress,
                 h=_metre(options.h), dt=options.dt, solver=options.solver,
             )  # fmt: skip
         run = Run(

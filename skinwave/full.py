@@ -1,28 +1,28 @@
 """Answers without reduction: every time step, every line, and exact waves of endless bodies."""
 
 from itertools import islice
-from math import isfinite
 
 import numpy as np
 
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
 from simple_model.response import step
 from simple_model.steady import along_path, load_lines, path_knots, summed
-from skinwave import plan
+from skinwave.bodies import Build
+from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
+from skinwave.plan import TRANSIENT_RATE
 from skinwave.scene import Body, Scene
 
 
 def assembled(
     body: Body, h: float | None, clock: Clock, report: Progress
-) -> tuple[plan.Build, fem.Operators]:
+) -> tuple[Build, fem.Operators]:
     """A body's mesh and operators."""
     with clock("mesh"):
         report("mesh", 0.0)
-        build = plan.build(body, h)
+        build = build_body(body, h)
     with clock("assemble"):
         report("assemble", 0.0)
         operators = fem.assemble(
@@ -43,7 +43,7 @@ def transient_answer(
     """The full time stepping, in whole steps of about dt between the response's times."""
     clock = Clock()
     build, operators = assembled(scene.body, h, clock, report)
-    per_sample = max(1, round(step(times) / (dt or 1 / plan.TRANSIENT_RATE)))
+    per_sample = max(1, round(step(times) / (dt or 1 / TRANSIENT_RATE)))
     steps = per_sample * (len(times) - 1)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     S = fem.probe_operator(build.mesh, scene.probe_points)
@@ -90,37 +90,6 @@ def harmonic_answer(
     displacement = (waves @ amplitudes).real
     count = len(frequencies)
     return _response("fem-harmonic", scene, times, displacement, clock, operators, count, solver)
-
-
-def compliance(body: Body) -> Compliance:
-    """How an endless body of the same section gives way; a sheet vibrates in vacuum.
-
-    Raises
-    ------
-    ValueError
-        If there is no body, or none that has exact waves.
-    """
-    solid = body.solid
-    if body.kind == "sheet":
-        return thin_sheet(
-            bending_stiffness=solid.young * body.depth**3 / 12 / (1 - solid.poisson**2),
-            mass_per_area=solid.density * body.depth,
-            loss_factor=solid.loss_factor,
-            viscous_lag=solid.viscosity / solid.shear_modulus,
-            air_density=0.0,
-        )
-    if body.kind == "none" or (body.base != "clamped" and isfinite(body.depth)):
-        raise ValueError(
-            "flat-body answers a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
-        )
-    values = {
-        "density": solid.density,
-        "shear_modulus": solid.shear_modulus,
-        "poisson": solid.poisson,
-        "viscosity": solid.viscosity,
-        "loss_factor": solid.loss_factor,
-    }
-    return slab(**values, depth=body.depth) if isfinite(body.depth) else half_space(**values)
 
 
 def _response(

@@ -10,9 +10,17 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response, flat_body, point_kernel
 from simple_model.choices import choose
 from simple_model.focus import spot_width
-from skinwave import cache, plan
+from skinwave import cache
+from skinwave.bodies import compliance
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.full import assembled, compliance, harmonic_answer, transient_answer
+from skinwave.full import assembled, harmonic_answer, transient_answer
+from skinwave.plan import (
+    BAND,
+    LOAD_RATE,
+    REDUCTION_TOLERANCE,
+    SAMPLE_RATE,
+    plan,
+)
 from skinwave.scene import Body, Scene
 
 MODELS = ("auto", "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
@@ -35,7 +43,7 @@ def simulate(
     scene : Scene
     model : "point-kernel"; "flat-body", exact waves in an endless body; "fem", the reduced model;
         "fem-harmonic", the steady state line by line; "fem-transient", every time step; or
-        "auto": the point kernel where there is no body, else fem
+        "auto": what `plan` chooses
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : called with the name of the phase and the fraction done
     h : float, metre, element size; planned from the body if not given
@@ -52,7 +60,8 @@ def simulate(
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     if model == "auto":
-        model = "point-kernel" if scene.body.kind == "none" else "fem"
+        required = plan(scene, tolerance)
+        model, h = required.model, h or required.h
     times = sample_times(scene)
     if model == "point-kernel":
         return point_kernel(scene.pressure, scene.probe_points, times)
@@ -63,7 +72,7 @@ def simulate(
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-harmonic":
         return harmonic_answer(scene, times, report, h=h, solver=solver, threshold=tolerance / 50)
-    reduction = min(plan.REDUCTION_TOLERANCE, tolerance / 50)
+    reduction = min(REDUCTION_TOLERANCE, tolerance / 50)
     prepared = prepare(
         scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction
     )
@@ -84,7 +93,7 @@ def check_knobs(solver: str, **lengths: float | None) -> None:
             raise ValueError(f"{name} = {value} must be a finite number above 0")
 
 
-def sample_times(scene: Scene, rate: float = plan.SAMPLE_RATE) -> Floats:
+def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
     """Times (t,) in s of a response: from 0 up to the duration, at least two."""
     return np.arange(max(2, round(scene.tacton.duration * rate))) / rate
 
@@ -111,11 +120,11 @@ def prepare(
     *,
     h: float | None = None,
     solver: str = "auto",
-    tolerance: float = plan.REDUCTION_TOLERANCE,
+    tolerance: float = REDUCTION_TOLERANCE,
 ) -> Prepared:
     """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine."""
     clock = Clock()
-    name = cache.key(body, body.solid, h, probes, plan.BAND, tolerance, versions())
+    name = cache.key(body, body.solid, h, probes, BAND, tolerance, versions())
     with clock("read from cache"):
         if entry := cache.load(name):
             poles = fem.Poles(**{field: entry[field] for field in ("values", "inputs", "outputs")})
@@ -146,7 +155,7 @@ def _prepared_anew(
         model = fem.reduce(
             operators,
             fem.probe_operator(mesh, probes),
-            plan.BAND,
+            BAND,
             tolerance,
             loads=P @ typical_spots(body, points),
             solver=solver,
@@ -174,13 +183,13 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
     if progress:
         progress("march", 0.0)
     with clock("march"):
-        oversampling = round(plan.LOAD_RATE / plan.SAMPLE_RATE)
+        oversampling = round(LOAD_RATE / SAMPLE_RATE)
         times = sample_times(scene)
-        fine = np.arange(oversampling * (len(times) - 1) + 1) / plan.LOAD_RATE
+        fine = np.arange(oversampling * (len(times) - 1) + 1) / LOAD_RATE
         spots, position = footprints(scene.pressure, prepared.points, fine)
         forces = np.vstack([spot @ prepared.load for spot in spots])
         gain = scene.pressure.gain(fine)
-        displacement = fem.respond(prepared.poles, forces, position, gain, 1 / plan.LOAD_RATE)
+        displacement = fem.respond(prepared.poles, forces, position, gain, 1 / LOAD_RATE)
     effort = replace(
         prepared.effort,
         seconds={**prepared.effort.seconds, **clock.seconds},

@@ -41,9 +41,10 @@ def scene(tmp_path, monkeypatch):
 
 
 def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
-    assert main(["run", str(scene), "--out", "first", "--h", "6", "--json"]) == 0
+    fem = ["--model", "fem", "--h", "6"]
+    assert main(["run", str(scene), "--out", "first", *fem, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["model"] == "fem"
-    assert main(["run", "first/scene.toml", "--out", "second", "--h", "6", "--quiet"]) == 0
+    assert main(["run", "first/scene.toml", "--out", "second", *fem, "--quiet"]) == 0
     first, second = (np.load(f"{folder}/response.npz") for folder in ("first", "second"))
     assert first["displacement"].shape == (500, 2)
     np.testing.assert_array_equal(first["fem"], first["displacement"])
@@ -54,7 +55,7 @@ def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
     assert json.loads((scene.parent / "first/effort.json").read_text())["dofs"] > 1000
 
 
-@pytest.mark.parametrize("model", ["point-kernel", "fem-transient"])
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem-harmonic", "fem-transient"])
 def test_run_with_each_model(scene, model):
     arguments = ["run", str(scene), "--model", model, "--h", "15", "--dt", "1e-4", "--quiet"]
     assert main(arguments) == 0
@@ -84,6 +85,19 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
     assert (folder / "short/slab/scene.toml").exists()
     assert (folder / "short/none/response.npz").exists()
     assert (folder / "figures/short.png").stat().st_size > 10_000
+
+
+def test_plan_gives_a_reason_for_every_row(scene, capsys):
+    assert main(["plan", str(scene), "--tolerance", "0.02"]) == 0
+    printed = capsys.readouterr().out
+    assert "flat-body" in printed
+    assert "highest line" in printed
+    scene.write_text(SMALL.replace("[body]", "[body]\nsides = 'clamped'"))
+    assert main(["plan", str(scene), "--json"]) == 0
+    required = json.loads(capsys.readouterr().out)
+    assert required["model"] == "fem"
+    assert 0.001 < required["h"] < 0.006
+    assert all(row["reason"] for row in required["rows"])
 
 
 def refused(capsys, *arguments):
