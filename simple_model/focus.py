@@ -86,15 +86,21 @@ def focal_spot(
     offsets = np.asarray(offsets, np.float64)
     if focus == "array":
         return _array_spot(height)(np.abs(offsets).clip(max=60e-3))
-    distance = np.hypot(offsets[..., 0], offsets[..., 1])
+    squared = offsets[..., 0] ** 2 + offsets[..., 1] ** 2
     if focus == "main_lobe":
-        return np.sinc(distance / lobe_width(height)) ** 2
-    return np.exp(-((distance / spot_width(height)) ** 2) / 2)
+        return np.sinc(np.sqrt(squared) / lobe_width(height)) ** 2
+    squared *= -0.5 / spot_width(height) ** 2
+    return np.exp(squared, out=np.asarray(squared))
 
 
 def spot_width(height: float) -> float:
     """Standard deviation in metre of the Gaussian spot at a height in metre."""
     return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
+
+
+def spot_reach(height: float, focus: str) -> float:
+    """Distance in metre beyond which a spot is below 1e-7; only a Gaussian ends."""
+    return 5.7 * spot_width(height) if focus == "gaussian" else np.inf
 
 
 @cache

@@ -1,6 +1,5 @@
 """From a scene to a response, for every model by one name."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -9,7 +8,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response, flat_body, point_kernel
 from simple_model.choices import choose
-from simple_model.focus import spot_width
+from simple_model.focus import spot_reach, spot_width
 from skinwave import cache
 from skinwave.bodies import compliance
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
@@ -186,8 +185,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         oversampling = round(LOAD_RATE / SAMPLE_RATE)
         times = sample_times(scene)
         fine = np.arange(oversampling * (len(times) - 1) + 1) / LOAD_RATE
-        spots, position = footprints(scene.pressure, prepared.points, fine)
-        forces = np.vstack([spot @ prepared.load for spot in spots])
+        forces, position = footprints(scene.pressure, prepared.points, prepared.load, fine)
         gain = scene.pressure.gain(fine)
         displacement = fem.respond(prepared.poles, forces, position, gain, 1 / LOAD_RATE)
     effort = replace(
@@ -206,20 +204,25 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
 
 
 def footprints(
-    pressure: MovingPressure, points: Floats, times: Floats
-) -> tuple[Iterator[Floats], Floats]:
-    """The spot at knots along the path, in chunks (k, n), and where among them the focus is.
+    pressure: MovingPressure, points: Floats, load: Floats, times: Floats
+) -> tuple[Floats, Floats]:
+    """Reduced forces (k, r) at knots along the path, and where (t,) among them the focus is.
 
     A moving spot is its gain times one of few shapes. Knots a fortieth of the spot's standard
     deviation apart, with linear interpolation, are right to 1e-4 of the peak.
     """
     path = pressure.tacton.trajectory
     if path.is_static:
-        return iter([pressure.spot(points, path.position(np.zeros(1)))]), np.zeros(len(times))
+        return pressure.spot(points, path.position(np.zeros(1))) @ load, np.zeros(len(times))
     intervals = 12 * int(np.ceil(path.length / (spot_width(pressure.height) / 40) / 12))
     centres = path.at_phase(np.linspace(0, 1, intervals + 1))  # 12: knots in every corner
-    chunks = (pressure.spot(points, part) for part in np.array_split(centres, intervals // 64 + 1))
-    return chunks, path.phase(times) * intervals
+    reach = spot_reach(pressure.height, pressure.focus)
+    forces = []
+    for part in np.array_split(centres, intervals // 64 + 1):
+        low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
+        near = ((points > low) & (points < high)).all(axis=1)
+        forces.append(pressure.spot(points[near], part) @ load[near])
+    return np.vstack(forces), path.phase(times) * intervals
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:
