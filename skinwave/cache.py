@@ -41,7 +41,7 @@ def load(name: str) -> dict[str, Any] | None:
     if home is None:
         return None
     try:
-        with np.load(home / f"{name}.npz") as entry:
+        with open(home / f"{name}.npz", "rb") as file, np.load(file) as entry:
             arrays = {field: entry[field] for field in entry.files}
         return arrays | {"meta": json.loads(str(arrays["meta"]))}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):

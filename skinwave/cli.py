@@ -63,6 +63,12 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     compare.set_defaults(command=_compare)
 
+    trade = commands.add_parser(
+        "tradeoff", parents=[common], help="what accuracy costs on a scene, measured"
+    )
+    trade.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+    trade.set_defaults(command=_tradeoff)
+
     plan = commands.add_parser("plan", help="what a scene requires, and why")
     plan.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
     plan.add_argument("--tolerance", type=float, default=0.05, help="relative error of waveforms")
@@ -153,6 +159,22 @@ def _compare(options: argparse.Namespace) -> int:
         f"hold; open {out}/index.html",
     )
     return 0 if outcome.runs == outcome.planned else 1
+
+
+def _tradeoff(options: argparse.Namespace) -> int:
+    from skinwave.files import output_folder
+    from skinwave.scene import read
+    from skinwave.tradeoff import sentences, study, write
+
+    scene = read(options.scene)
+    out = options.out or Path(f"{options.scene.stem}-tradeoff")
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        with _progress(options) as progress:
+            found = study(scene, progress)
+        write(folder, scene, found)
+    summary = {"out": str(out), "accepted": found.accepted, "sentences": sentences(found)}
+    _summarise(options, summary, "\n".join([*sentences(found), f"open {out}/index.html"]))
+    return 0
 
 
 def _summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:

@@ -223,6 +223,9 @@ def test_fem_and_fem_transient_agree_on_a_scene(name):
     misfit = np.linalg.norm(reduced.displacement - full.displacement, axis=0)
     assert (misfit / np.linalg.norm(full.displacement, axis=0)).max() < 3e-3
     assert full.effort.steps == 4 * (len(full.times) - 1)
+    coarse = simulate(scene, "fem-transient", h=h, dt=3e-4)
+    assert coarse.effort.steps < full.effort.steps / 10
+    assert coarse.displacement.shape == full.displacement.shape
 
 
 def test_preparing_says_what_it_cost():
