@@ -23,6 +23,7 @@ from fem.materials import Material, rayleigh_damping
 from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import EDGES, FACES, Floats, Ints
 
+UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
 LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, below which 10-node tetrahedra need no remedy
 ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pin the normal motion
@@ -169,6 +170,14 @@ class Pattern:
         indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
         return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
 
+    def mirrored(self) -> Ints:
+        """The slot (slots,) of each pair taken the other way round."""
+        n = len(self.indptr) - 1
+        slots = sparse.csr_array(
+            (np.arange(len(self.indices)), self.indices, self.indptr), shape=(n, n)
+        )
+        return slots.tocsc().data
+
     def sum(self, values: Floats) -> Floats:
         """Element values (e, a, b) summed into the slots."""
         summed = np.bincount(self.slot.ravel(), values.ravel(), len(self.indices))
@@ -188,7 +197,7 @@ def _volume_operators(
     blocks, masses = element_matrices(mesh, rho, mu, lam)
     K, M = _from_blocks(pattern, blocks), _from_masses(pattern, masses)
     if np.ptp(mass_rate) == 0 and np.ptp(stiffness_lag) == 0:
-        C = stiffness_lag[0] * K
+        C = stiffness_lag[0] * K if stiffness_lag[0] else sparse.csr_array(K.shape)
         return K, C + mass_rate[0] * M if mass_rate[0] else C, M
     blocks *= stiffness_lag[:, None, None]
     masses *= mass_rate[:, None, None]
@@ -196,9 +205,11 @@ def _volume_operators(
 
 
 def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
-    """Element stiffness blocks (i, j, e, a, b) in N/m and masses (e, a, b) in kg."""
+    """Element stiffness blocks (k, e, a, b) in N/m for the components (i, j) = UPPER[k], and
+    masses (e, a, b) in kg. The blocks below the diagonal are these, transposed.
+    """
     m, n_nodes = mesh.tets.shape
-    blocks, masses = np.empty((3, 3, m, n_nodes, n_nodes)), np.empty((m, n_nodes, n_nodes))
+    blocks, masses = np.empty((6, m, n_nodes, n_nodes)), np.empty((m, n_nodes, n_nodes))
     projected = np.maximum(lam - LOCKING_FREE * mu, 0.0) if mesh.order == 2 else np.zeros(m)
     direct = lam - projected
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
@@ -215,15 +226,14 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
         shear = m2 * np.einsum("eiaib->eab", H)
         mean = np.einsum("eq,eqia->eia", volumes, gradients)
         mean *= np.sqrt(projected[slab] / volumes.sum(axis=1))[:, None, None]
-        for i in range(3):
-            for j in range(3):
-                block = blocks[i, j, slab]
-                np.multiply(l2, H[:, i, :, j], out=block)
-                block += m2 * H[:, j, :, i]
-                if i == j:
-                    block += shear
-                if projected[slab].any():
-                    block += mean[:, i, :, None] * mean[:, j, None, :]
+        for k, (i, j) in enumerate(UPPER):
+            block = blocks[k, slab]
+            np.multiply(l2, H[:, i, :, j], out=block)
+            block += m2 * H[:, j, :, i]
+            if i == j:
+                block += shear
+            if projected[slab].any():
+                block += mean[:, i, :, None] * mean[:, j, None, :]
         weights = rho[slab, None] * _jacobians(corners, 5, start)[2]
         masses[slab] = (weights @ NN).reshape(e, n_nodes, n_nodes)
     return blocks, masses
@@ -275,16 +285,24 @@ def _jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, 
 
 def _from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
     data = np.empty((len(pattern.indices), 3, 3))
-    for i in range(3):
-        for j in range(3):
-            data[:, i, j] = pattern.sum(blocks[i, j])
+    mirrored = pattern.mirrored()
+    for k, (i, j) in enumerate(UPPER):
+        data[:, i, j] = component = pattern.sum(blocks[k])
+        if i != j:
+            data[:, j, i] = component[mirrored]
     return sparse.bsr_array((data, pattern.indices, pattern.indptr)).tocsr()
 
 
 def _from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
-    n = len(pattern.indptr) - 1
-    nodal = sparse.csr_array((pattern.sum(masses), pattern.indices, pattern.indptr), shape=(n, n))
-    return sparse.kron(nodal, sparse.eye_array(3), format="csr")
+    """The mass matrix of nodes, repeated for each of the three components."""
+    nodal, lengths = pattern.sum(masses), np.repeat(np.diff(pattern.indptr), 3)
+    indptr = np.concatenate([[0], np.cumsum(lengths)])
+    # Entry k of a row comes from entry k of its node's row.
+    source = np.arange(indptr[-1]) + np.repeat(
+        np.repeat(pattern.indptr[:-1], 3) - indptr[:-1], lengths
+    )
+    component = np.repeat(np.tile(np.arange(3), len(pattern.indptr) - 1), lengths)
+    return sparse.csr_array((nodal[source], 3 * pattern.indices[source] + component, indptr))
 
 
 def _by_region(mesh: TetMesh, material: Material | Mapping[int, Material]) -> list[Material]:

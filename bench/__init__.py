@@ -1,0 +1,1 @@
+"""Measurements against what a user would pick instead; nothing here is asserted in tests."""
