@@ -1,9 +1,10 @@
-"""`python -m bench [elements across]`: assembly by every installed code, in turn, and growth."""
+"""`python -m bench [elements across]`: growth, our models in turn, and all codes in turn."""
 
 import os
 import platform
 import sys
 import time
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -11,7 +12,12 @@ import numpy as np
 import fem
 import meshes
 from bench.assembly import CODES
-from skinwave.effort import peak_memory
+from simple_model import point_kernel
+from skinwave import paper15
+from skinwave.effort import Clock, peak_memory, silent
+from skinwave.full import assembled
+from skinwave.plan import TRANSIENT_RATE
+from skinwave.simulation import answer, prepare
 
 
 def block(across: int) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +75,53 @@ def growth() -> None:
     print("time grows with unknowns to the power " + ", ".join(f"{e:.2f}" for e in exponents))
 
 
+def models() -> None:
+    """Ratios: the point kernel to one exp a sample; one more Tacton to the full time stepping."""
+    print("\nmodels, the default skin slab, AM 140 Hz + STM 20 mm")
+    tacton = dict(paper15.tactons())["am140-stm20"]
+    published = paper15.scenes("x", tacton)["none"].pressure
+    for seconds, probes, rate in ((1, 5, 40_000), (10, 200, 10_000)):
+        times, points = np.arange(seconds * rate) / rate, np.zeros((probes, 2)) + 0.004
+        kernel = _best(lambda: point_kernel(published, points, times))  # noqa: B023
+        plain = np.ones((len(times), probes))
+        exponential = _best(lambda: np.exp(plain))  # noqa: B023
+        print(
+            f"point kernel, {seconds} s at {rate / 1e3:g} kHz, {probes} probes: {kernel:.3f} s, "
+            f"{kernel / exponential:.1f} times one exp a sample"
+        )
+    scene = paper15.scenes("x", tacton)["skin-slab"]
+    started = time.perf_counter()
+    prepared = prepare(scene.body, scene.probe_points)
+    ready = time.perf_counter() - started
+    warm = _best(lambda: answer(prepared, scene))
+    ops = assembled(scene.body, None, Clock(), silent)[1]
+    push = np.ones(ops.n_dofs)
+    states = fem.transient(ops, lambda t: push, 1 / TRANSIENT_RATE)
+    next(states)  # factorises
+    steps = 200
+    started = time.perf_counter()
+    for _ in range(steps):
+        next(states)
+    full = (time.perf_counter() - started) / steps * TRANSIENT_RATE
+    print(
+        f"reduced model of {len(ops.free):,} unknowns: ready in {ready:.1f} s; one more Tacton "
+        f"{warm:.2f} s, 1/{full / warm:.0f} of {TRANSIENT_RATE:.0f} full time steps ({full:.0f} s, "
+        f"from {steps})"
+    )
+
+
+def _best(run: Callable[[], object], repeats: int = 3) -> float:
+    seconds = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        run()
+        seconds.append(time.perf_counter() - started)
+    return min(seconds)
+
+
 if __name__ == "__main__":
+    os.environ["SKINWAVE_CACHE"] = ""
     print(platform.processor() or platform.machine(), "python", platform.python_version())
     growth()  # first: the peak memory of a process never falls
+    models()
     assembly(int(sys.argv[1]) if len(sys.argv) > 1 else 40)

@@ -7,12 +7,13 @@ einsum in this package: e element, q quadrature point, a b element nodes, i j co
 n node, p probe, t time, f frequency, l derivative along an element edge.
 """
 
-from fem.assembly import Operators, assemble, facet_points, load_operator, probe_operator
+from fem.assembly import Operators, assemble
 from fem.harmonic import harmonic
 from fem.linear_solver import Factor, available, factorise
 from fem.materials import PRESETS, Material, from_young
 from fem.reduced import Poles, ReducedModel, poles, reduce, respond, transfer
 from fem.static import modes, static
+from fem.surface import facet_points, load_operator, probe_operator
 from fem.transient import Diverged, State, transient
 
 __all__ = [

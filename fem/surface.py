@@ -1,0 +1,98 @@
+"""The surface of a body: what pushes it, and what reads it.
+
+nodal forces = P q at the facets' quadrature points,  displacement into the body = S u
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from fem.elements import shape_derivatives, shape_functions, triangle_rule
+from meshes import TetMesh, facet_set
+from meshes.tetmesh import Floats, Ints
+
+
+def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
+    """P (3 n, k q): nodal forces in N of pressures in Pa at the points of `facet_points`.
+
+    Pressure pushes into the body, against the outward normal.
+    """
+    nodes = facet_set(mesh, facets)
+    N, normals = facet_geometry(mesh, nodes)  # normals carry the quadrature weight and area
+    k, q = normals.shape[:2]
+    forces = -np.einsum("qa,eqi->eaiq", N, normals)
+    rows = (3 * nodes[:, :, None, None] + np.arange(3)[:, None]).repeat(q, axis=3)
+    columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
+    shape = (mesh.n_dofs, k * q)
+    return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
+    """Quadrature points (k q, 3) in metre at which `load_operator` takes the pressure."""
+    nodes = facet_set(mesh, facets)
+    N = shape_functions(triangle_rule()[0], nodes.shape[1])
+    return np.einsum("qa,eai->eqi", N, mesh.points[nodes]).reshape(-1, 3)
+
+
+def probe_operator(
+    mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top"
+) -> sparse.csr_array:
+    """S (p, 3 n): displacement into the body, in metre, at surface points (p, 2 or 3).
+
+    A point is carried along z onto the facets; positive is the way a pressure pushes.
+
+    Raises
+    ------
+    ValueError
+        If a point lies beside the facets.
+    """
+    nodes = facet_set(mesh, facets)
+    points = np.atleast_2d(np.asarray(points, np.float64))[:, :2]
+    owner, barycentric = _locate(mesh.points[nodes[:, :3], :2], points)
+    normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    N = shape_functions(barycentric, nodes.shape[1])
+    values = -np.einsum("pa,pi->pai", N, normals)
+    columns = 3 * nodes[owner][:, :, None] + np.arange(3)
+    rows = np.broadcast_to(np.arange(len(points))[:, None, None], columns.shape)
+    shape = (len(points), mesh.n_dofs)
+    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
+    """The two edge tangents at one barycentric point (p, 3) per facet (p, a)."""
+    derivatives = shape_derivatives(barycentric, nodes.shape[1])
+    tangents = np.einsum("pal,pai->pli", derivatives, mesh.points[nodes])
+    return tangents[:, 0], tangents[:, 1]
+
+
+def facet_geometry(mesh: TetMesh, nodes: Ints) -> tuple[Floats, Floats]:
+    """Shape values (q, a) and outward normals (e, q, i) times area and quadrature weight."""
+    barycentric, weights = triangle_rule()
+    derivatives = shape_derivatives(barycentric, nodes.shape[1])
+    tangents = np.einsum("qal,eai->eqli", derivatives, mesh.points[nodes], optimize=True)
+    normals = np.cross(tangents[:, :, 0], tangents[:, :, 1]) / 2
+    return shape_functions(barycentric, nodes.shape[1]), normals * weights[:, None]
+
+
+def _locate(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """Which triangle (p,) of (k, 3, 2) each point (p, 2) lies in, and where (p, 3)."""
+    origin, edges = triangles[:, 0], triangles[:, 1:] - triangles[:, :1]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    standing = np.abs(area) < 1e-12 * (edges**2).sum(axis=(1, 2))
+    inverse_area = np.where(standing, np.nan, 1 / np.where(standing, 1, area))
+    owners, coordinates = [], []
+    for point in points:
+        x, y = (point - origin).T
+        second = (x * edges[:, 1, 1] - y * edges[:, 1, 0]) * inverse_area
+        third = (y * edges[:, 0, 0] - x * edges[:, 0, 1]) * inverse_area
+        inside = np.minimum(np.minimum(second, third), 1 - second - third)
+        owner = int(np.nanargmax(inside))
+        if inside[owner] < -1e-9:
+            x_mm, y_mm = 1e3 * point
+            raise ValueError(
+                f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
+            )
+        owners.append(owner)
+        coordinates.append([1 - second[owner] - third[owner], second[owner], third[owner]])
+    return np.array(owners), np.array(coordinates)
