@@ -228,7 +228,8 @@ def test_fem_and_fem_transient_agree_on_a_scene(name):
     assert coarse.displacement.shape == full.displacement.shape
 
 
-def test_preparing_says_what_it_cost():
+def test_preparing_says_what_it_cost(monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", "")
     scene = scenes("short", Tacton(am_frequency=210, duration=0.02))["skin-slab"]
     phases = []
     prepared = prepare(
