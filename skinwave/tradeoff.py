@@ -155,8 +155,8 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
     rows = [
         [
             m.candidate.name + (" *" if m.candidate.name in front else ""),
-            f"{100 * m.error:.2g}", f"{max(map(abs, m.line_errors.values()), default=0):.2f}",
-            f"{1e3 * m.lag:+.2f}", f"{m.cold:.2f}", f"{m.warm:.2f}",
+            f"{100 * m.error:.3g}", f"{max(map(abs, m.line_errors.values()), default=0):.2f}",
+            f"{1e3 * m.lag:+.2f}", f"{m.cold:.2g}", f"{m.warm:.2g}",
             f"{m.memory / 2**20:.0f}", f"{m.dofs:,}",
         ]
         for m in found.measured
@@ -222,8 +222,10 @@ def figure(found: Study) -> Figure:
                 s=[20 + m.memory / 2**22 for m in mine], color=colour, alpha=0.75, label=model,
             )  # fmt: skip
     ax.axhline(100 * found.self_convergence, color="0.5", ls=":", lw=1)
-    ax.text(ax.get_xlim()[0], 100 * found.self_convergence, " reference resolves", fontsize=8,
-            va="bottom", color="0.4")  # fmt: skip
+    ax.text(
+        0.01, 100 * found.self_convergence, "finest two runs differ", fontsize=8, va="bottom",
+        color="0.4", transform=ax.get_yaxis_transform(),
+    )  # fmt: skip
     ax.set(xscale="log", yscale="log", xlabel="first answer, s", ylabel="worst probe's error, %")
     ax.grid(alpha=0.3, which="both")
     legend = ax.legend(title="area: peak memory")
