@@ -15,7 +15,7 @@ from bench.assembly import CODES
 from simple_model import point_kernel
 from skinwave import paper15
 from skinwave.effort import Clock, peak_memory, silent
-from skinwave.full import assembled
+from skinwave.full import assembled, meshed
 from skinwave.plan import TRANSIENT_RATE
 from skinwave.simulation import answer, prepare
 
@@ -94,7 +94,7 @@ def models() -> None:
     prepared = prepare(scene.body, scene.probe_points)
     ready = time.perf_counter() - started
     warm = _best(lambda: answer(prepared, scene))
-    ops = assembled(scene.body, None, Clock(), silent)[1]
+    ops = assembled(meshed(scene.body, None, Clock(), silent), Clock(), silent)
     push = np.ones(ops.n_dofs)
     states = fem.transient(ops, lambda t: push, 1 / TRANSIENT_RATE)
     next(states)  # factorises

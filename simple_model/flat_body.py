@@ -219,7 +219,7 @@ def _check(pressure: MovingPressure) -> None:
 
 
 def _modulus(mu: float, viscosity: float, loss_factor: float, w: Complex) -> Complex:
-    # The sign of a hysteretic loss follows that of the frequency.
+    # Frequencies are never below 0 here, so that a hysteretic loss has one sign.
     return np.asarray(mu * (1 + 1j * loss_factor) + 1j * w * viscosity)
 
 

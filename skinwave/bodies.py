@@ -41,13 +41,12 @@ def build(body: Body, h: float | None = None) -> Build:
         raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
     if not np.isfinite(body.depth):
         raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
+    size = h or default_size(body)
     if body.kind == "sheet":
-        shorter = min(body.width, body.height)
-        thickness = max(body.depth, SHEET_THICKNESS * shorter)
-        mesh = sheet(body.width, body.height, thickness, h or shorter / SHEET_CELLS)
+        thickness = max(body.depth, SHEET_THICKNESS * min(body.width, body.height))
+        mesh = sheet(body.width, body.height, thickness, size)
         material = bending_equivalent(body.solid, body.depth / thickness)
     else:
-        size = h or min(SLAB_CELL, body.depth / 2)
         mesh = block((body.width, body.height, body.depth), size, grading=SLAB_GRADING)
         material = body.solid
     ends = {"bottom": body.base, "sides": body.sides}
@@ -58,6 +57,13 @@ def build(body: Body, h: float | None = None) -> Build:
         fixed={name: "xyz" for name, end in ends.items() if end == "clamped"},
         absorbing=np.vstack(leaky) if leaky else None,
     )
+
+
+def default_size(body: Body) -> float:
+    """Element size in metre of a body whose user asks for none."""
+    if body.kind == "sheet":
+        return min(body.width, body.height) / SHEET_CELLS
+    return min(SLAB_CELL, body.depth / 2)
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:

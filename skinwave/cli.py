@@ -1,4 +1,4 @@
-"""The command line: `skinwave run`, `skinwave compare`.
+"""The command line: `skinwave run`, `compare`, `tradeoff` and `plan`.
 
 Only argparse is imported before a command is known, so that help answers at once.
 """
@@ -41,13 +41,15 @@ def _parser() -> argparse.ArgumentParser:
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
     common.add_argument("--overwrite", action="store_true", help="replace an existing folder")
-    common.add_argument("--h", type=float, metavar="MM", help="element size, mm (default: planned)")
-    common.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
     common.add_argument("--quiet", action="store_true", help="no progress, no summary")
     common.add_argument("--json", action="store_true", help="summary as JSON")
     common.add_argument("--debug", action="store_true", help="traceback of an error")
 
-    run = commands.add_parser("run", parents=[common], help="one scene, one model")
+    knobs = argparse.ArgumentParser(add_help=False)
+    knobs.add_argument("--h", type=float, metavar="MM", help="element size, mm (default: planned)")
+    knobs.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
+
+    run = commands.add_parser("run", parents=[common, knobs], help="one scene, one model")
     run.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
     run.add_argument("--model", choices=("auto", *MODELS), default="auto")
     run.add_argument("--tolerance", type=float, default=0.05, help="relative error of waveforms")
@@ -55,7 +57,9 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
 
     compare = commands.add_parser(
-        "compare", parents=[common], help="point kernel beside finite elements (the main job)"
+        "compare",
+        parents=[common, knobs],
+        help="point kernel beside finite elements (the main job)",
     )
     compare.add_argument(
         "scene", nargs="?", default="paper-15", metavar="SCENE",

@@ -16,19 +16,20 @@ from skinwave.plan import TRANSIENT_RATE
 from skinwave.scene import Body, Scene
 
 
-def assembled(
-    body: Body, h: float | None, clock: Clock, report: Progress
-) -> tuple[Build, fem.Operators]:
-    """A body's mesh and operators."""
+def meshed(body: Body, h: float | None, clock: Clock, report: Progress) -> Build:
+    """A body's mesh and what it is made of."""
     with clock("mesh"):
         report("mesh", 0.0)
-        build = build_body(body, h)
+        return build_body(body, h)
+
+
+def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
+    """A meshed body's operators."""
     with clock("assemble"):
         report("assemble", 0.0)
-        operators = fem.assemble(
+        return fem.assemble(
             build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing
         )
-    return build, operators
 
 
 def transient_answer(
@@ -42,7 +43,8 @@ def transient_answer(
 ) -> Response:
     """The full time stepping in steps of dt, read between steps by a cubic spline."""
     clock = Clock()
-    build, operators = assembled(scene.body, h, clock, report)
+    build = meshed(scene.body, h, clock, report)
+    operators = assembled(build, clock, report)
     dt = dt or 1 / TRANSIENT_RATE
     steps = max(3, int(np.ceil(times[-1] / dt - 1e-9)))
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
@@ -71,7 +73,8 @@ def harmonic_answer(
 ) -> Response:
     """The steady state: one factorisation for each line of the load above the threshold."""
     clock = Clock()
-    build, operators = assembled(scene.body, h, clock, report)
+    build = meshed(scene.body, h, clock, report)
+    operators = assembled(build, clock, report)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     S = fem.probe_operator(build.mesh, scene.probe_points)
     with clock("lines"):

@@ -1,6 +1,6 @@
 """What a scene requires and no more: model, element size, rates, cost, and a reason for each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -125,7 +125,7 @@ def _highest_line(scene: Scene, tolerance: float) -> tuple[float, int]:
         return float(lines.frequencies.max()), len(np.unique(lines.frequencies))
     pressure = scene.pressure
     if pressure.focus != "gaussian":  # of the same width; only which lines matter is asked
-        pressure = type(pressure)(**{**vars(pressure), "focus": "gaussian"})
+        pressure = replace(pressure, focus="gaussian")
     f, a = steady_lines(compliance(body), pressure, scene.probe_points, threshold=tolerance / 100)
     power = (np.abs(a) ** 2 * np.where(f > 0, 0.5, 1.0)[:, None]).sum(axis=1)
     above = np.sqrt(np.append(np.cumsum(power[::-1])[::-1][1:], 0.0) / max(power.sum(), 1e-300))

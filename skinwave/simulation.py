@@ -10,9 +10,9 @@ from simple_model import Effort, MovingPressure, Response, flat_body, point_kern
 from simple_model.choices import choose
 from simple_model.focus import spot_reach, spot_width
 from skinwave import cache
-from skinwave.bodies import compliance
+from skinwave.bodies import Build, compliance
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.full import assembled, harmonic_answer, transient_answer
+from skinwave.full import assembled, harmonic_answer, meshed, transient_answer
 from skinwave.plan import (
     BAND,
     LOAD_RATE,
@@ -123,13 +123,18 @@ def prepare(
 ) -> Prepared:
     """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine."""
     clock = Clock()
-    name = cache.key(body, body.solid, h, probes, BAND, tolerance, versions())
+    build = meshed(body, h, clock, silent)
+    mesh, ends = build.mesh, (build.fixed, build.absorbing)
+    name = cache.key(
+        mesh.points, mesh.tets, build.material, *ends, probes, BAND, tolerance, versions()
+    )
     with clock("read from cache"):
         if entry := cache.load(name):
             poles = fem.Poles(**{field: entry[field] for field in ("values", "inputs", "outputs")})
             effort = Effort(**entry["meta"])
     if not entry:
-        return _prepared_anew(body, probes, progress or silent, h, solver, tolerance, name)
+        report = progress or silent
+        return _prepared_anew(body, build, probes, clock, report, solver, tolerance, name)
     effort = replace(effort, seconds=clock.seconds, peak_memory=peak_memory())
     return Prepared(
         probes=probes, poles=poles, load=entry["load"], points=entry["points"], effort=effort
@@ -138,16 +143,16 @@ def prepare(
 
 def _prepared_anew(
     body: Body,
+    build: Build,
     probes: Floats,
+    clock: Clock,
     report: Progress,
-    h: float | None,
     solver: str,
     tolerance: float,
     name: str,
 ) -> Prepared:
-    clock = Clock()
-    build, operators = assembled(body, h, clock, report)
-    mesh = build.mesh
+    report("mesh", 1.0)
+    mesh, operators = build.mesh, assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]

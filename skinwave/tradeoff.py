@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 
 from simple_model import Response, lines, tacton_lines
 from skinwave import report
-from skinwave.bodies import SHEET_CELLS, SLAB_CELL
+from skinwave.bodies import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
 from skinwave.figures import png
 from skinwave.scene import Scene
 from skinwave.simulation import answer, prepare, simulate
 
-REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the planned one
+REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.8, 0.67)  # of the two runs that the reference is accepted by
 BARS = (0.01, 0.05, 0.20)
 COLOURS = {
@@ -99,7 +99,7 @@ class Study:
 
 def candidates(scene: Scene) -> list[Candidate]:
     """Every model that can answer the scene, over the knobs that matter to it."""
-    h = planned_size(scene)
+    h = default_size(scene.body)
     sizes = [round(h * factor, 6) for factor in REFINEMENTS]
     found = [Candidate(model="point-kernel")]
     if scene.body.kind == "slab":
@@ -109,14 +109,6 @@ def candidates(scene: Scene) -> list[Candidate]:
     found += [Candidate(model="fem-transient", h=sizes[1], dt=dt) for dt in (5e-4, 2e-4, 1e-4)]
     found += [Candidate(model="fem-harmonic", h=sizes[1])]
     return found
-
-
-def planned_size(scene: Scene) -> float:
-    """Element size in metre of the scene's default mesh."""
-    body = scene.body
-    if body.kind == "sheet":
-        return min(body.width, body.height) / SHEET_CELLS
-    return min(SLAB_CELL, body.depth / 2)
 
 
 def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None = None) -> Study:
@@ -130,7 +122,7 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
     if scene.body.kind == "none":
         raise ValueError("a scene without a body has one model only; give it a sheet or a slab")
     todo = list(chosen or candidates(scene))
-    fine = [Candidate(model="fem", h=round(planned_size(scene) * f, 6)) for f in FINEST]
+    fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]
     results = {}
     for k, candidate in enumerate([*fine, *todo]):
         progress(candidate.name, k / (len(todo) + len(fine)))

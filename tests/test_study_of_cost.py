@@ -72,7 +72,7 @@ def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
     again = answer(prepare(*arguments, h=0.008), scene)
     assert phases == []
     np.testing.assert_array_equal(first.displacement, again.displacement)
-    prepare(*arguments, h=0.009)
+    prepare(*arguments, h=0.005)
     assert "reduce" in phases  # another mesh is another entry
 
 
