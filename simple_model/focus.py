@@ -86,11 +86,33 @@ def focal_spot(
     offsets = np.asarray(offsets, np.float64)
     if focus == "array":
         return _array_spot(height)(np.abs(offsets).clip(max=60e-3))
-    squared = offsets[..., 0] ** 2 + offsets[..., 1] ** 2
-    if focus == "main_lobe":
-        return np.sinc(np.sqrt(squared) / lobe_width(height)) ** 2
-    squared *= -0.5 / spot_width(height) ** 2
-    return np.exp(squared, out=np.asarray(squared))
+    scaled = (offsets / _scale(height, focus)) ** 2
+    return _round_spot(np.asarray(scaled[..., 0] + scaled[..., 1]), focus)
+
+
+def moved_spot(points: Floats, centres: Floats, height: float, focus: str) -> Floats:
+    """S (..., n) at points (n, 2) for the focus at centres (..., 2), in metre."""
+    if focus == "array":
+        return focal_spot(points - centres[..., None, :], height, focus)
+    # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way to have it.
+    x, c = points / _scale(height, focus), centres / _scale(height, focus)
+    left = np.stack([*np.moveaxis(-2 * c, -1, 0), (c**2).sum(axis=-1), np.ones(c.shape[:-1])], -1)
+    return _round_spot(left @ np.stack([*x.T, np.ones(len(x)), (x**2).sum(axis=1)]), focus)
+
+
+def _scale(height: float, focus: str) -> float:
+    """The length in metre in which a round spot is exp(-D^2) or (sin D / D)^2."""
+    return np.sqrt(2) * spot_width(height) if focus == "gaussian" else lobe_width(height) / np.pi
+
+
+def _round_spot(squared: Floats, focus: str) -> Floats:
+    """The spot at squared distances (...), which it overwrites."""
+    if focus == "gaussian":
+        return np.exp(np.negative(squared, out=squared), out=squared)
+    angle = np.sqrt(np.maximum(squared, 1e-18, out=squared), out=squared)  # 1 to the last digit
+    sinc = np.sin(angle)
+    sinc /= angle
+    return np.multiply(sinc, sinc, out=sinc)
 
 
 def spot_width(height: float) -> float:

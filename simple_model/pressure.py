@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike
 
 from simple_model.choices import choose
 from simple_model.drive import DRIVES
-from simple_model.focus import FOCI, NOMINAL_HEIGHT, focal_spot, relative_intensity
+from simple_model.focus import FOCI, NOMINAL_HEIGHT, moved_spot, relative_intensity
 from simple_model.tacton import Tacton, modulation
 from simple_model.trajectory import Floats
+
+IN_CACHE = 2**15  # samples worked on at a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +58,15 @@ class MovingPressure:
 
     def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
         """Pressure (..., n) in Pa at points (n, 2) in metre and times (...) in s."""
-        t = np.asarray(t, np.float64)
-        return self.gain(t)[..., None] * self.spot(points, self.tacton.trajectory.position(t))
+        t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)[:, :2]
+        gain, centres = self.gain(t).ravel(), self.tacton.trajectory.position(t).reshape(-1, 2)
+        pressure = np.empty((t.size, len(points)))
+        block = max(1, IN_CACHE // max(1, len(points)))
+        for start in range(0, t.size, block):
+            part = slice(start, start + block)
+            spot = moved_spot(points, centres[part], self.height, self.focus)
+            np.multiply(gain[part, None], spot, out=pressure[part])
+        return pressure.reshape(*t.shape, len(points))
 
     def gain(self, t: ArrayLike) -> Floats:
         """Pressure (...) in Pa at the focus at times (...) in s."""
@@ -71,5 +80,4 @@ class MovingPressure:
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
         """Relative pressure (..., n) at points (n, 2) with the focus at centres (..., 2)."""
         points = np.asarray(points, np.float64)[:, :2]
-        offsets = points - np.asarray(centre, np.float64)[..., None, :]
-        return focal_spot(offsets, self.height, self.focus)
+        return moved_spot(points, np.asarray(centre, np.float64), self.height, self.focus)
