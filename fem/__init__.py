@@ -11,13 +11,15 @@ from fem.assembly import Operators, assemble
 from fem.harmonic import harmonic
 from fem.linear_solver import Factor, available, factorise
 from fem.materials import PRESETS, Material, from_young
-from fem.reduced import Poles, ReducedModel, poles, reduce, respond, transfer
+from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
+from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.static import modes, static
 from fem.surface import facet_points, load_operator, probe_operator
 from fem.transient import Diverged, State, transient
 
 __all__ = [
     "PRESETS",
+    "Complex",
     "Diverged",
     "Factor",
     "Material",
@@ -27,11 +29,14 @@ __all__ = [
     "State",
     "assemble",
     "available",
+    "exponential_sum",
     "facet_points",
     "factorise",
     "from_young",
     "harmonic",
+    "line_response",
     "load_operator",
+    "load_subspace",
     "modes",
     "poles",
     "probe_operator",

@@ -31,9 +31,11 @@ class Factor:
     backend: str
 
 
-def available() -> tuple[str, ...]:
-    """Installed backends, the fastest first."""
-    found = {"pardiso": _mkl() is not None, "cholmod": _cholmod() is not None, "superlu": True}
+def available(*, complex_valued: bool = False) -> tuple[str, ...]:
+    """Installed backends for real or for complex matrices, the fastest first."""
+    # CHOLMOD has no complex symmetric factorisation, only the Hermitian one.
+    cholmod = _cholmod() is not None and not complex_valued
+    found = {"pardiso": _mkl() is not None, "cholmod": cholmod, "superlu": True}
     return tuple(name for name in BACKENDS if found[name])
 
 
@@ -50,12 +52,13 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     ValueError
         If the backend is unknown or not installed, or A is singular.
     """
-    names = available()
-    if backend == "auto":
-        # CHOLMOD has no complex symmetric factorisation, only the Hermitian one.
-        backend = next(n for n in names if n != "cholmod" or not np.iscomplexobj(A.data))
+    names = available(complex_valued=np.iscomplexobj(A.data))
+    backend = names[0] if backend == "auto" else backend
     if backend not in names:
-        raise ValueError(f"solver '{backend}' is not installed; choose one of {', '.join(names)}")
+        kind = " for complex matrices" if np.iscomplexobj(A.data) else ""
+        raise ValueError(
+            f"solver '{backend}' is not installed{kind}; choose one of {', '.join(names)}"
+        )
     A = sparse.csr_array(A)
     A.sort_indices()
     if not np.isfinite(A.data).all():

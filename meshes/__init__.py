@@ -7,6 +7,7 @@ from meshes.tetmesh import (
     boundary_facets,
     corner_volumes,
     facet_set,
+    half,
     quadratic,
 )
 
@@ -20,6 +21,7 @@ __all__ = [
     "extrude",
     "facet_set",
     "graded_axis",
+    "half",
     "quadratic",
     "sheet",
 ]

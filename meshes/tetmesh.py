@@ -141,6 +141,38 @@ def quadratic(mesh: TetMesh) -> TetMesh:
     )
 
 
+def half(mesh: TetMesh, axis: str) -> TetMesh:
+    """The part of a mesh where x (or y, z) is positive; its cut is the facet set `mirror_x`.
+
+    Raises
+    ------
+    MeshError
+        If tetrahedra cross the plane.
+    """
+    coordinate = mesh.points[:, "xyz".index(axis)]
+    away = np.where(np.abs(coordinate) < 1e-9 * np.abs(coordinate).max(), 0.0, coordinate)
+    side = np.sign(away[mesh.tets[:, :4]])
+    if ((side.min(axis=1) < 0) & (side.max(axis=1) > 0)).any():
+        raise MeshError(f"tetrahedra cross the plane {axis} = 0; mesh an even number of cells")
+    inside = side.max(axis=1) > 0
+    kept, tets = np.unique(mesh.tets[inside], return_inverse=True)
+    number = np.full(len(mesh.points), -1)
+    number[kept] = np.arange(len(kept))
+    tets = tets.reshape(-1, mesh.tets.shape[1])
+    facets = {
+        name: number[nodes[(away[nodes].max(axis=1) > 0) & (away[nodes].min(axis=1) >= 0)]]
+        for name, nodes in mesh.facets.items()
+    }
+    outer = boundary_facets(tets)
+    cut = outer[(away[kept][outer] == 0).all(axis=1)]
+    return TetMesh(
+        points=mesh.points[kept],
+        tets=tets,
+        region=mesh.region[inside],
+        facets=facets | {f"mirror_{axis}": cut},
+    )
+
+
 def _check(points: Floats, tets: Ints) -> None:
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"points have shape {points.shape}; give (n, 3) coordinates in metre")

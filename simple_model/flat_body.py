@@ -24,7 +24,7 @@ from scipy.special import jv
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, step
-from simple_model.steady import KNOTS, along_path, load_lines, path_knots, summed
+from simple_model.steady import along_path, harmonics, load_lines, path_knots, summed
 from simple_model.trajectory import Floats
 
 Complex = NDArray[np.complex128]
@@ -196,9 +196,8 @@ def flat_body(
     f_d = pressure.tacton.trajectory.drawing_frequency
     u = np.zeros((len(w), len(probes)), np.complex128)
     h = along_path(_on_path(compliance, pressure, probes, w - 1j * damping, NEGLIGIBLE))
-    harmonics = range(-KNOTS // 2 + 1, KNOTS // 2) if f_d else [0]
     largest = np.abs(h).max()
-    for m in harmonics:
+    for m in harmonics(h.shape[2]):
         if np.abs(h[:, :, m]).max() > 1e-7 * largest:
             driven = np.fft.fft(gain * np.exp(2j * np.pi * m * f_d * t))[: len(w)]
             u += h[:, :, m] * driven[:, None]
@@ -260,7 +259,7 @@ def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: 
 
 
 def _distances(pressure: MovingPressure, probes: Floats) -> Floats:
-    """Distances (p, KNOTS) in metre from the probes to knots of the path."""
+    """Distances (p, k) in metre from the probes to knots of the path."""
     return np.linalg.norm(probes[:, None] - path_knots(pressure), axis=2)
 
 
@@ -271,7 +270,7 @@ def _on_path(
     w: ArrayLike,
     negligible: float = 0.0,
 ) -> Complex:
-    """g (f, p, KNOTS) from knots of the path to the probes."""
+    """g (f, p, k) from knots of the path to the probes."""
     distance = _distances(pressure, probes)
     width = spot_width(pressure.height)
     if distance.size <= 2 * len(probes):

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
 from simple_model.tacton import modulation_at_phases, tones
 from simple_model.trajectory import Floats
 
 Complex = NDArray[np.complex128]
 
-KNOTS = 128  # positions along a closed path: all harmonics below 64 f_d
+FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
+KNOTS_PER_WIDTH = 8  # of the spot, which makes corners right to 1e-4
 PHASES = 8  # of each sinusoid: the drive laws are polynomials of second degree
 
 
@@ -38,8 +40,8 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
     """The lines whose pressure, at the path, exceeds a fraction of the strongest line's."""
     gain_f, gain_c = _gain_lines(pressure)
     f_d = pressure.tacton.trajectory.drawing_frequency
-    n = np.arange(-KNOTS // 2 + 1, KNOTS // 2) if f_d else np.zeros(1, int)
     of_spot = np.abs(along_path(_swept(pressure)))
+    n = harmonics(of_spot.shape[-1])
     f = (n[:, None] * f_d + gain_f).ravel()
     c = np.broadcast_to(gain_c, (len(n), len(gain_c))).ravel() * np.where(f > 1e-9, 2, 1)
     order = np.repeat(n, len(gain_f))
@@ -49,14 +51,28 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
 
 
 def path_knots(pressure: MovingPressure) -> Floats:
-    """Positions (KNOTS, 2) in metre along one period of the path; one if the focus rests."""
+    """Positions (k, 2) in metre along one period of the path; one if the focus rests.
+
+    They are the middles of k equal parts, between which corners and jumps of the path fall.
+    """
     path = pressure.tacton.trajectory
-    return path.at_phase(np.zeros(1) if path.is_static else np.arange(KNOTS) / KNOTS)
+    if path.is_static:
+        return path.at_phase(np.zeros(1))
+    enough = max(FEWEST_KNOTS, KNOTS_PER_WIDTH * path.length / spot_width(pressure.height))
+    k = 12 * int(np.ceil(enough / 12))
+    return path.at_phase((np.arange(k) + 0.5) / k)
+
+
+def harmonics(knots: int) -> NDArray[np.int_]:
+    """Orders of the harmonics of `along_path` that so many knots tell apart, ascending."""
+    return np.arange(-((knots - 1) // 2), (knots + 1) // 2)
 
 
 def along_path(values: Floats | Complex) -> Complex:
-    """Fourier coefficients (..., n) of values (..., KNOTS) along the path; -n is harmonic -n."""
-    return np.asarray(np.fft.fft(values, axis=-1) / values.shape[-1])
+    """Fourier coefficients (..., n) of values (..., k) at `path_knots`; -n is harmonic -n."""
+    k = values.shape[-1]
+    shift = np.exp(-1j * np.pi * np.fft.fftfreq(k))
+    return np.asarray(np.fft.fft(values, axis=-1) / k * shift)
 
 
 def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
@@ -68,9 +84,9 @@ def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
 
 
 def _swept(pressure: MovingPressure) -> Floats:
-    """The spot (8, KNOTS) at eight points of the path while the focus runs round."""
+    """The spot (8, k) at about eight points of the path while the focus runs round."""
     knots = path_knots(pressure)
-    return pressure.spot(knots[:: KNOTS // 8], knots).T
+    return pressure.spot(knots[:: max(1, len(knots) // 8)], knots).T
 
 
 def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:

@@ -6,13 +6,15 @@ from math import isfinite
 import numpy as np
 
 from fem.materials import Material
-from meshes import Grading, TetMesh, block, sheet
+from meshes import Grading, TetMesh, block, graded_axis, half, sheet
+from meshes.structured import round_up
 from meshes.tetmesh import Ints
 from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
 from skinwave.scene import Body
 
 SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
-SLAB_GRADING = Grading(radius=30e-3, growth=1.25, coarsest=6e-3)  # the palm-sized paths
+SLAB_GRADING = Grading(radius=30e-3, growth=1.25, coarsest=6e-3)
+FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m: the palm-sized paths; cells; of h
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and the fatter elements are far more accurate: thin ones lock.
@@ -27,10 +29,16 @@ class Build:
     material: Material
     fixed: dict[str, str]
     absorbing: Ints | None
+    symmetry: str = ""
 
 
-def build(body: Body, h: float | None = None) -> Build:
+def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
     """Mesh a flat body with cells of h in metre, or as fine as the scene set needs.
+
+    Parameters
+    ----------
+    symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
+        part with positive coordinates is meshed, and slides along these planes
 
     Raises
     ------
@@ -47,16 +55,38 @@ def build(body: Body, h: float | None = None) -> Build:
         mesh = sheet(body.width, body.height, thickness, size)
         material = bending_equivalent(body.solid, body.depth / thickness)
     else:
-        mesh = block((body.width, body.height, body.depth), size, grading=SLAB_GRADING)
+        mesh = block((body.width, body.height, body.depth), size, grading=_grading(size))
         material = body.solid
     ends = {"bottom": body.base, "sides": body.sides}
+    fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
+    for axis in symmetry:
+        mesh = half(mesh, axis)
+        fixed[f"mirror_{axis}"] = axis
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
     return Build(
         mesh=mesh,
         material=material,
-        fixed={name: "xyz" for name, end in ends.items() if end == "clamped"},
+        fixed=fixed,
         absorbing=np.vstack(leaky) if leaky else None,
+        symmetry=symmetry,
     )
+
+
+def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
+    """How many cells of h in metre `build` makes along x, y and downwards."""
+    sides = body.width, body.height
+    if body.kind == "sheet":
+        halves = [max(1, round_up(side / (2 * h))) for side in sides]
+        layers = 1
+    else:
+        halves = [len(graded_axis(side / 2, h, _grading(h))) - 1 for side in sides]
+        layers = len(graded_axis(body.depth, h, replace(_grading(h), radius=0.0))) - 1
+    x, y = (n if axis in symmetry else 2 * n for axis, n in zip("xy", halves, strict=True))
+    return x, y, layers
+
+
+def _grading(h: float) -> Grading:
+    return Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
 
 
 def default_size(body: Body) -> float:

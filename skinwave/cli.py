@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from skinwave.effort import Progress
+    from skinwave.plan import Plan
+    from skinwave.scene import Scene
 
 TITLE = "The paper's 15 Tactons: point kernel, paper and skin"
 MODELS = ("point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
@@ -76,6 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     plan = commands.add_parser("plan", help="what a scene requires, and why")
     plan.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
     plan.add_argument("--tolerance", type=float, default=0.05, help="relative error of waveforms")
+    plan.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    plan.add_argument("--h", type=float, metavar="MM", help="element size, mm")
+    plan.add_argument("--dt", type=float, metavar="S", help="time step of fem-transient, s")
     plan.add_argument("--json", action="store_true", help="the plan as JSON")
     plan.add_argument("--debug", action="store_true", help="traceback of an error")
     plan.set_defaults(command=_plan)
@@ -85,10 +90,9 @@ def _parser() -> argparse.ArgumentParser:
 def _plan(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
-    from skinwave.plan import plan
-    from skinwave.scene import read
+    from skinwave.scene_file import read
 
-    required = plan(read(options.scene), options.tolerance)
+    required = _required(options, read(options.scene))
     if options.json:
         print(json.dumps(asdict(required)))
         return 0
@@ -98,14 +102,30 @@ def _plan(options: argparse.Namespace) -> int:
     return 0
 
 
+def _required(options: argparse.Namespace, scene: "Scene") -> "Plan":
+    """The plan, with what the user has decided; what breaks the tolerance is warned of."""
+    from skinwave.plan import plan
+    from skinwave.simulation import check_knobs
+
+    model, h = None if options.model == "auto" else options.model, _metre(options.h)
+    check_knobs("auto", h=h, dt=options.dt)
+    required = plan(scene, options.tolerance, model=model, h=h, dt=options.dt)
+    for warning in required.warnings:
+        print(f"skinwave: warning: {warning}", file=sys.stderr)
+    return required
+
+
 def _run(options: argparse.Namespace) -> int:
     from skinwave.claims import Run
     from skinwave.files import output_folder
-    from skinwave.scene import BODIES, read
+    from skinwave.scene import BODIES
+    from skinwave.scene_file import read
     from skinwave.simulation import simulate
     from skinwave.study import write_single
 
     scene = read(options.scene)
+    if options.model != "auto" or options.h or options.dt:
+        _required(options, scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
@@ -131,7 +151,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _compare(options: argparse.Namespace) -> int:
     from skinwave.files import output_folder
-    from skinwave.scene import read
+    from skinwave.scene_file import read
     from skinwave.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
@@ -167,7 +187,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 def _tradeoff(options: argparse.Namespace) -> int:
     from skinwave.files import output_folder
-    from skinwave.scene import read
+    from skinwave.scene_file import read
     from skinwave.tradeoff import sentences, study, write
 
     scene = read(options.scene)

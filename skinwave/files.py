@@ -14,7 +14,7 @@ import numpy as np
 
 from simple_model import Effort
 from skinwave.claims import Run, Verdict
-from skinwave.scene import dumps
+from skinwave.scene_file import dumps
 
 LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",

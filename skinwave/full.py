@@ -12,15 +12,18 @@ from simple_model.steady import along_path, load_lines, path_knots, summed
 from skinwave.bodies import Build
 from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.plan import TRANSIENT_RATE
 from skinwave.scene import Body, Scene
 
+TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
 
-def meshed(body: Body, h: float | None, clock: Clock, report: Progress) -> Build:
+
+def meshed(
+    body: Body, h: float | None, clock: Clock, report: Progress, symmetry: str = ""
+) -> Build:
     """A body's mesh and what it is made of."""
     with clock("mesh"):
         report("mesh", 0.0)
-        return build_body(body, h)
+        return build_body(body, h, symmetry)
 
 
 def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
@@ -59,7 +62,8 @@ def transient_answer(
             stepped[k] = S @ state.displacement
             report("march", k / steps)
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
-    return _response("fem-transient", scene, times, displacement, clock, operators, steps, solver)
+    used = fem.available()[0] if solver == "auto" else solver
+    return _response("fem-transient", scene, times, displacement, clock, operators, steps, used)
 
 
 def harmonic_answer(
@@ -89,7 +93,8 @@ def harmonic_answer(
     waves = np.exp(2j * np.pi * times[:, None] * frequencies)
     displacement = (waves @ amplitudes).real
     count = len(frequencies)
-    return _response("fem-harmonic", scene, times, displacement, clock, operators, count, solver)
+    used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
+    return _response("fem-harmonic", scene, times, displacement, clock, operators, count, used)
 
 
 def _response(
@@ -107,7 +112,7 @@ def _response(
         dofs=len(operators.free),
         steps=steps,
         peak_memory=peak_memory(),
-        solver=fem.available()[0] if solver == "auto" else solver,
+        solver=solver,
         versions=versions(),
     )
     return Response(

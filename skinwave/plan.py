@@ -1,30 +1,31 @@
-"""What a scene requires and no more: model, element size, rates, cost, and a reason for each."""
+"""What a scene requires and no more: model, extent, element size, cost, and a reason for each."""
 
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import ceil
 
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.flat_body import AIR_DENSITY, steady_lines
+from simple_model.flat_body import AIR_DENSITY
 from simple_model.focus import spot_width
-from simple_model.steady import load_lines
-from skinwave.bodies import SHEET_CELLS, compliance
-from skinwave.scene import Scene
+from skinwave.bodies import cells, default_size
+from skinwave.estimates import (
+    FAR,
+    REFLECTED,
+    error_of_mesh,
+    highest_line,
+    is_flat,
+    mean_gain,
+    motion_lines,
+    waves_returned,
+)
+from skinwave.prepared import BAND, REDUCTION_TOLERANCE
+from skinwave.scene import Body, Scene
+from skinwave.sensitivity import Sensitivity, sensitivity
 
-SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
-# Hz of the load given to the reduced model: linear between two samples, its lines at 200 Hz
-# come out 0.03 % low, at 600 Hz 0.3 %.
-LOAD_RATE = 20_000.0
-TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
-BAND = 1000.0  # Hz up to which the reduced model must be right
-REDUCTION_TOLERANCE = 1e-3
-
-# Waveform errors measured on the default bodies against finer meshes, over six of the paper's
-# Tactons: slabs 2.4 % at 0.69 of the length scale below; sheets 0.9 % at 60 cells a side, and up
-# to eight times that where f_AM meets a resonance.
-SLAB_ERROR, SLAB_SIZE, SLAB_ORDER = 0.024, 0.69, 3.3
-SHEET_ERROR, SHEET_ORDER = 0.009, 2.4
+MESH_SHARE = 0.7  # of the tolerance; the rest is for everything else
+WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
+KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
 # One reduction at 78 k unknowns on two cores: s and bytes, and how they grow.
 REFERENCE_DOFS, REFERENCE_SECONDS, REFERENCE_BYTES, GROWTH = 78e3, 14.0, 1.0e9, 1.3
 
@@ -40,20 +41,39 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What to run: `model`, element size `h` in metre (None without a mesh), the highest line in
-    Hz that matters, predicted seconds and bytes of the first answer, and the reasons.
+    """What to run.
+
+    `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
+    element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
+    expected relative `error`; predicted `seconds` and bytes of `memory` of the first answer;
+    a reason for each; and `warnings` of what was asked for and is not enough.
     """
 
     model: str
-    h: float | None
-    highest: float
-    seconds: float
-    memory: float
-    rows: tuple[Row, ...]
+    body: Body
+    symmetry: str = ""
+    h: float | None = None
+    highest: float = 0.0
+    error: float = 0.0
+    seconds: float = 0.1
+    memory: float = 1e8
+    rows: tuple[Row, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
-def plan(scene: Scene, tolerance: float = 0.05) -> Plan:
+def plan(
+    scene: Scene,
+    tolerance: float = 0.05,
+    *,
+    model: str | None = None,
+    h: float | None = None,
+    dt: float | None = None,
+) -> Plan:
     """What answers a scene within a relative error of `tolerance` in its probes' waveforms.
+
+    Parameters
+    ----------
+    model, h, dt : what is decided already: a model's name, element size in metre, time step in s
 
     Raises
     ------
@@ -63,82 +83,126 @@ def plan(scene: Scene, tolerance: float = 0.05) -> Plan:
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     if scene.body.kind == "none":
-        model = Row(what="model", value="point-kernel", reason="there is no body to move")
-        return Plan(model="point-kernel", h=None, highest=0, seconds=0.1, memory=1e8, rows=(model,))
-    highest, lines = _highest_line(scene, tolerance)
+        row = Row(what="model", value="point-kernel", reason="there is no body to move")
+        return Plan(model="point-kernel", body=scene.body, rows=(row,))
+    if model == "point-kernel":
+        return _kernel(scene, tolerance)
+    spectrum = motion_lines(scene, tolerance)
+    highest = highest_line(*spectrum, tolerance)
     rows = [
         Row(
             what="highest line",
             value=f"{highest:.0f} Hz",
-            reason=f"of {lines} lines in the load; those above move the probes by less than "
-            f"{100 * tolerance / 3:.2g} % of the whole",
+            reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
+            f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    if _is_endless(scene):
-        rows += [
-            Row(
-                what="model",
-                value="flat-body",
-                reason="a homogeneous flat slab without sides that reflect: exact waves, no mesh",
-            ),
-            *_left_out(scene, highest),
-        ]
-        return Plan(
-            model="flat-body", h=None, highest=highest, seconds=2.0, memory=3e8, rows=tuple(rows)
-        )
-    return _with_elements(scene, tolerance, highest, rows)
+    returned = waves_returned(scene, _half_widths(scene.body), highest) if is_flat(scene) else 1.0
+    if model == "flat-body" or (model is None and returned <= WAVES_SHARE * tolerance):
+        return _without_mesh(scene, tolerance, highest, returned, rows)
+    return _with_elements(scene, tolerance, spectrum, rows, model or "fem", h, dt)
 
 
-def _with_elements(scene: Scene, tolerance: float, highest: float, rows: list[Row]) -> Plan:
-    h, dofs, reason = _element_size(scene, highest, tolerance)
+def _kernel(scene: Scene, tolerance: float) -> Plan:
+    row = Row(what="model", value="point-kernel", reason="as asked; nothing propagates in it")
+    warning = _exceeds("the point kernel", KERNEL_ERROR, tolerance, "use --model auto")
+    return Plan(
+        model="point-kernel", body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning
+    )
+
+
+def _without_mesh(
+    scene: Scene, tolerance: float, highest: float, returned: float, rows: list[Row]
+) -> Plan:
+    reason = "a homogeneous flat slab without sides that reflect: exact waves, no mesh"
+    if scene.body.sides != "absorbing":
+        reason = f"waves that come back from the sides are {100 * returned:.2g} %: take none"
+    warnings = _exceeds(
+        "flat-body, which lets no wave return from the sides,", returned, tolerance, "use fem"
+    )
+    rows = [
+        *rows,
+        Row(what="model", value="flat-body", reason="as asked" if warnings else reason),
+        *_left_out(scene, highest),
+    ]
+    return Plan(
+        model="flat-body", body=scene.body, highest=highest, error=returned, seconds=2.0,
+        memory=3e8, rows=tuple(rows), warnings=warnings,
+    )  # fmt: skip
+
+
+def _with_elements(
+    scene: Scene, tolerance: float, spectrum: tuple[Floats, Floats], rows: list[Row],
+    model: str, h: float | None, dt: float | None,
+) -> Plan:  # fmt: skip
+    highest = highest_line(*spectrum, tolerance)
+    symmetry = _symmetry(scene)
+    body, extent = _extent(scene, tolerance, highest)
+    scene = replace(scene, body=body)
+    known = sensitivity(scene)
+    size, reason = _element_size(scene, spectrum, MESH_SHARE * tolerance, known)
+    mesh_error = error_of_mesh(scene, spectrum, h or size, known)
+    step_error = known.value * (2 * np.pi * known.frequency * (dt or 0.0)) ** 2 / 12
+    start_error = known.start if model == "fem-harmonic" else 0.0
+    warnings = (
+        *_exceeds(
+            f"elements of {1e3 * (h or size):.3g} mm", mesh_error, tolerance,
+            f"{1e3 * size:.3g} mm are enough",
+        ),
+        *_exceeds(
+            f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
+            f"{1e3 * (dt or 0) * np.sqrt(tolerance / 4 / max(step_error, 1e-12)):.2g} ms is enough",
+        ),
+        *_exceeds(
+            "fem-harmonic, which leaves out how the motion starts,", start_error, tolerance,
+            "use fem",
+        ),
+    )  # fmt: skip
+    size = h or size
+    dofs = 3 * float(np.prod([2 * n + 1 for n in cells(body, size, symmetry)]))
     seconds = REFERENCE_SECONDS * (dofs / REFERENCE_DOFS) ** GROWTH
     memory = REFERENCE_BYTES * (dofs / REFERENCE_DOFS) ** GROWTH
-    droop = (2 * np.pi * highest / LOAD_RATE) ** 2 / 12
-    rows += [
-        Row(what="model", value="fem", reason=_why_elements(scene)),
-        Row(what="element size", value=f"{1e3 * h:.2f} mm, {dofs:,.0f} unknowns", reason=reason),
+    rows = [
+        *rows,
+        Row(what="model", value=model, reason=_why_elements(scene)),
+        *extent,
+        Row(
+            what="symmetry",
+            value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[symmetry],
+            reason=f"the load is its own mirror image across {' and '.join(symmetry)} = 0"
+            if symmetry
+            else "the path of the focus leaves the middle planes",
+        ),
+        Row(
+            what="element size",
+            value=f"{1e3 * size:.2f} mm, {dofs:,.0f} unknowns",
+            reason="as asked" if h else reason,
+        ),
         Row(
             what="reduction",
             value=f"{min(REDUCTION_TOLERANCE, tolerance / 50):.1g} up to {BAND:.0f} Hz",
             reason="a fiftieth of the tolerance: it costs little",
         ),
-        Row(
-            what="load rate",
-            value=f"{LOAD_RATE / 1e3:g} kHz",
-            reason=f"linear between samples, {100 * droop:.2g} % off at the highest line",
-        ),
         *_left_out(scene, highest),
         Row(
             what="cost",
             value=f"{seconds:.0f} s, {memory / 2**30:.1f} GiB",
-            reason="first answer on two cores; 0.2 s for each further Tacton on the same body",
+            reason="first answer on two cores; 0.05 s for each further Tacton on the same body",
         ),
     ]
-    return Plan(model="fem", h=h, highest=highest, seconds=seconds, memory=memory, rows=tuple(rows))
+    return Plan(
+        model=model, body=body, symmetry=symmetry, h=size, highest=highest,
+        error=mesh_error + step_error + start_error, seconds=seconds, memory=memory,
+        rows=tuple(rows), warnings=warnings,
+    )  # fmt: skip
 
 
-def _highest_line(scene: Scene, tolerance: float) -> tuple[float, int]:
-    """The line above which the probes' motion is negligible, and how many lines there are."""
-    body = scene.body
-    if body.kind == "slab" and body.base != "clamped":
-        lines = load_lines(scene.pressure, tolerance / 3)
-        return float(lines.frequencies.max()), len(np.unique(lines.frequencies))
-    pressure = scene.pressure
-    if pressure.focus != "gaussian":  # of the same width; only which lines matter is asked
-        pressure = replace(pressure, focus="gaussian")
-    f, a = steady_lines(compliance(body), pressure, scene.probe_points, threshold=tolerance / 100)
-    power = (np.abs(a) ** 2 * np.where(f > 0, 0.5, 1.0)[:, None]).sum(axis=1)
-    above = np.sqrt(np.append(np.cumsum(power[::-1])[::-1][1:], 0.0) / max(power.sum(), 1e-300))
-    return float(f[np.argmax(above <= tolerance / 3)]), len(f)
-
-
-def _is_endless(scene: Scene) -> bool:
-    body = scene.body
+def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
+    if error <= tolerance:
+        return ()
     return (
-        body.kind == "slab"
-        and body.sides == "absorbing"
-        and (body.base == "clamped" or not isfinite(body.depth))
-        and scene.pressure.focus == "gaussian"
+        f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
+        f"{100 * tolerance:g} %; {cure}",
     )
 
 
@@ -149,28 +213,60 @@ def _why_elements(scene: Scene) -> str:
     return f"the {body.sides} sides of this {body.kind} reflect; exact waves are endless"
 
 
-def _element_size(scene: Scene, highest: float, tolerance: float) -> tuple[float, float, str]:
-    """Element size in metre, unknowns, and the reason."""
-    body, width = scene.body, spot_width(scene.pressure.height)
-    share = tolerance / 2  # the other half is for everything else
+def _symmetry(scene: Scene) -> str:
+    """Axes across whose middle plane the load is its own mirror image at all times."""
+    path = scene.tacton.trajectory
+    if path.is_static:
+        path_points = path.at_phase(np.zeros(1))
+    else:
+        path_points = path.at_phase(np.linspace(0, 1, 25))
+    return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
+
+
+def _half_widths(body: Body) -> Floats:
+    return np.array([body.width, body.height]) / 2
+
+
+def _extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
+    """The body as far as waves come back from, and the reason if that is not all of it."""
+    body = scene.body
+    if body.kind != "slab" or body.base != "clamped":
+        return body, []
+    half = _half_widths(body)
+    cut = half.copy()
+    for axis in (0, 1):
+        alone = np.where(np.arange(2) == axis, half, FAR)
+        for shorter in np.arange(0.03, 0.8 * half[axis], 0.01):
+            alone[axis] = shorter
+            if waves_returned(scene, alone, highest, REFLECTED) <= tolerance / 10:
+                cut[axis] = shorter
+                break
+    if (cut == half).all():
+        return body, []
+    width, height = map(float, 2 * cut)
+    row = Row(
+        what="extent",
+        value=f"{1e3 * width:.0f} x {1e3 * height:.0f} mm",
+        reason=f"what comes back from further away is below {10 * tolerance:.2g} %; absorbing "
+        f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
+    )
+    return replace(body, width=width, height=height, sides="absorbing"), [row]
+
+
+def _element_size(
+    scene: Scene, spectrum: tuple[Floats, Floats], share: float, known: Sensitivity
+) -> tuple[float, str]:
+    """Element size in metre, and the reason."""
+    body = scene.body
+    sizes = default_size(body) * np.geomspace(3.0, 0.2, 200)
+    enough = [h for h in sizes if error_of_mesh(scene, spectrum, h, known) <= share]
+    size = enough[0] if enough else sizes[-1]
+    law = f"{100 * share:.2g} % by the measured error law; 1 % off in frequency moves the "
+    law += f"waveform by {known.value:.0f} %"
     if body.kind == "sheet":
-        cells = SHEET_CELLS * max(0.5, (SHEET_ERROR / share) ** (1 / SHEET_ORDER))
-        h = min(body.width, body.height) / cells
-        counts = [2 * np.ceil(side / h) + 1 for side in (body.width, body.height)]
-        return (
-            h,
-            9 * counts[0] * counts[1],
-            (
-                f"{cells:.0f} cells along the shorter side: {100 * share:.2g} % by the measured "
-                "error law, off resonance"
-            ),
-        )
-    wavelength = body.solid.shear_speed / max(highest, 1.0)
-    scale = min(width, wavelength / np.pi)
-    h = min(SLAB_SIZE * scale * (share / SLAB_ERROR) ** (1 / SLAB_ORDER), body.depth / 2)
-    dofs = REFERENCE_DOFS * (3e-3 / h) ** 2.3 * body.width * body.height / 0.01
-    which = "the focal spot" if scale == width else f"the wavelength at {highest:.0f} Hz"
-    return h, dofs, f"{100 * share:.2g} % by the measured error law, set by {which}"
+        count = ceil(min(body.width, body.height) / size)
+        return min(body.width, body.height) / count, f"{count:.0f} cells a side: {law}"
+    return min(size, body.depth / 2), law
 
 
 def _left_out(scene: Scene, highest: float) -> list[Row]:
@@ -182,7 +278,7 @@ def _left_out(scene: Scene, highest: float) -> list[Row]:
     mass = solid.density * body.depth
     k = (mass * (2 * np.pi * max(highest / 2, 20.0)) ** 2 / stiffness) ** 0.25
     air = 2 * AIR_DENSITY / k / mass
-    force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * _mean_gain(scene)
+    force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
     sag = 0.0056 * force * min(body.width, body.height) ** 2 / stiffness / body.depth
     shift = 1 - 1 / np.sqrt(1 + air)
     return [
@@ -200,8 +296,3 @@ def _left_out(scene: Scene, highest: float) -> list[Row]:
             else "the mean deflection is small",
         ),
     ]
-
-
-def _mean_gain(scene: Scene) -> float:
-    gain: Floats = scene.pressure.gain(np.arange(2000) / 2000 * scene.tacton.duration)
-    return float(abs(gain.mean()))

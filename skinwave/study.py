@@ -13,8 +13,10 @@ from skinwave.claims import Run, Verdict, evaluate
 from skinwave.effort import Progress, peak_memory
 from skinwave.figures import label, overview_figure, png, tacton_figure
 from skinwave.files import write_claims, write_lines, write_responses, write_run
-from skinwave.scene import BODIES, Scene, dumps, with_body
-from skinwave.simulation import Prepared, answer, check_knobs, prepare, simulate
+from skinwave.prepared import Prepared, answer, prepare
+from skinwave.scene import BODIES, Scene, with_body
+from skinwave.scene_file import dumps
+from skinwave.simulation import check_knobs, simulate
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 

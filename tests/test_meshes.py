@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import fem
 import meshes
 from meshes import MeshError, TetMesh
 
@@ -98,3 +99,28 @@ def test_broken_meshes_are_refused_with_what_and_where(fields, said):
 def test_unknown_facet_sets_are_named_with_the_known_ones():
     with pytest.raises(MeshError, match=r"no facet set 'lid'.*top"):
         meshes.facet_set(meshes.sheet(0.1, 0.1, 0.001, 0.05), "lid")
+
+
+@pytest.mark.parametrize("kind", ["sheet", "block"])
+def test_a_quarter_answers_like_the_whole_under_a_symmetric_load(kind):
+    if kind == "sheet":
+        mesh, ends = meshes.sheet(0.1, 0.08, 1e-3, 0.01), {"sides": "xyz"}
+    else:
+        mesh, ends = meshes.block((0.06, 0.06, 0.01), 0.005), {"bottom": "xyz"}
+    quarter = meshes.half(meshes.half(mesh, "x"), "y")
+    assert len(quarter.tets) == len(mesh.tets) // 4
+    answers = []
+    sliding = {"mirror_x": "x", "mirror_y": "y"}
+    for part, fixed in ((mesh, ends), (quarter, ends | sliding)):
+        ops = fem.assemble(part, fem.PRESETS["palm"], fixed=fixed)
+        points = fem.facet_points(part)
+        spot = np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / 4.35e-3**2)
+        u = fem.static(ops, fem.load_operator(part) @ spot)
+        answers.append(fem.probe_operator(part, [[0, 0], [0.01, 0], [0.013, 0.017]]) @ u)
+    np.testing.assert_allclose(answers[1], answers[0], rtol=1e-6)
+
+
+def test_a_mesh_that_its_middle_cuts_has_no_half():
+    line = np.linspace(-0.03, 0.03, 4)
+    with pytest.raises(meshes.MeshError, match="cross the plane x = 0"):
+        meshes.half(meshes.extrude(line, line, [-0.01, 0]), "x")

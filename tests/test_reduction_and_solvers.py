@@ -9,10 +9,14 @@ from scipy import sparse
 
 import fem
 import meshes
+import skinwave
 from fem import linear_solver
 from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.bodies import build as build_body
+from skinwave.field import field
 from skinwave.paper15 import scenes
-from skinwave.simulation import prepare, simulate
+from skinwave.prepared import prepare, reduced_lines
+from skinwave.simulation import simulate
 
 PROBES = np.column_stack([[0, 5, 10, 15, 20], np.zeros(5)]) * 1e-3
 CIRCLING = Tacton(
@@ -122,9 +126,9 @@ def reduced_for_circling(kind):
     return ops, P, points, S, load, fem.reduce(ops, S, 1000.0, 2e-4, loads=typical)
 
 
-def marched(ops, read, force, dt):
-    """(t, p) for 0.2 s from rest."""
-    states = islice(fem.transient(ops, force, dt), round(0.2 / dt))
+def marched(ops, read, force, dt, seconds=0.2):
+    """(t, p) from rest."""
+    states = islice(fem.transient(ops, force, dt), round(seconds / dt))
     return np.array([read @ state.displacement for state in states])
 
 
@@ -135,19 +139,20 @@ def misfit(candidate, reference):
 @pytest.mark.slow
 def test_the_reduced_model_follows_the_transient_from_rest():
     ops, P, points, S, load, model = reduced_for_circling("skin")
-    dt, knots = 2.5e-5, 600
+    dt = 2.5e-5
     full = marched(ops, S, lambda t: P @ load(points, t), dt)
+    frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
+    poles = fem.poles(model)
+    lines, start = fem.line_response(poles, forces, frequencies)
+    rates = np.concatenate([2j * np.pi * frequencies, poles.values])
     times = np.arange(len(full)) * dt
-    spots = load.spot(points, CIRCLING.trajectory.at_phase(np.linspace(0, 1, knots + 1)))
-    position = CIRCLING.trajectory.phase(times) * knots
-    forces = (model.basis.T @ (P @ spots.T)).T
-    reduced = fem.respond(fem.poles(model), forces, position, load.gain(times), dt)
+    reduced = fem.exponential_sum(rates, np.vstack([lines, start]), times)
     assert misfit(reduced, full) <= 1e-3
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["skin", "sheet"])
-def test_reduction_alone_costs_less_than_a_thousandth(kind):
+@pytest.mark.parametrize(("kind", "seconds"), [("skin", 1.0), ("sheet", 0.2)])
+def test_reduction_alone_costs_less_than_a_thousandth(kind, seconds):
     """Both marched by the same scheme at the same step, so that only the reduction differs."""
     ops, P, points, S, load, model = reduced_for_circling(kind)
     r = len(model.K)
@@ -156,8 +161,8 @@ def test_reduction_alone_costs_less_than_a_thousandth(kind):
         free=np.arange(r), n_dofs=r,
     )  # fmt: skip
     project = model.basis.T @ P
-    full = marched(ops, S, lambda t: P @ load(points, t), 1e-4)
-    reduced = marched(small, model.outputs, lambda t: project @ load(points, t), 1e-4)
+    full = marched(ops, S, lambda t: P @ load(points, t), 1e-4, seconds)
+    reduced = marched(small, model.outputs, lambda t: project @ load(points, t), 1e-4, seconds)
     assert misfit(reduced, full) <= 1e-3
 
 
@@ -203,6 +208,51 @@ def test_a_response_starts_from_rest_whatever_the_load_begins_with():
     # 2 Re(c (exp(s t) - 1)/s), the step response.
     expected = 2 * np.real(-0.5j * (np.exp((-3 + 40j) * t) - 1) / (-3 + 40j))
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_lines_from_rest_are_the_recurrence_at_a_fine_step():
+    poles = fem.Poles(
+        values=np.array([-30.0 + 400j, -900.0 + 0j]),
+        inputs=np.array([[1.0 + 0.5j], [2.0 + 0j]]),
+        outputs=np.array([[-0.5j, 0.1], [0.2, 0.3]]),
+    )
+    t = np.arange(5000) * 2e-5
+    load = 2.0 + np.real((1 - 0.5j) * np.exp(2j * np.pi * 90 * t))
+    recurrence = fem.respond(poles, np.ones((1, 1)), np.zeros(len(t)), load, 2e-5)
+    frequencies, forces = np.array([0.0, 90.0]), np.array([[2.0 + 0j], [1 - 0.5j]])
+    lines, start = fem.line_response(poles, forces, frequencies)
+    rates = np.concatenate([2j * np.pi * frequencies, poles.values])
+    summed = fem.exponential_sum(rates, np.vstack([lines, start]), t)
+    assert misfit(summed, recurrence) < 1e-5
+    # Chunks of times end nowhere in particular.
+    short = fem.exponential_sum(rates, np.vstack([lines, start]), t[:300])
+    np.testing.assert_allclose(short, summed[:300], atol=1e-15)
+
+
+def test_a_load_subspace_spans_the_load():
+    centres = np.linspace(-0.01, 0.01, 40)
+    x = np.linspace(-0.03, 0.03, 500)
+    loads = np.exp(-((x[:, None] - centres) ** 2) / 2 / 0.004**2)
+    columns = fem.load_subspace(loads, 1e-3)
+    assert columns.shape[1] < 12
+    np.testing.assert_allclose(columns.T @ columns, np.eye(columns.shape[1]), atol=1e-8)
+    left = loads - columns @ (columns.T @ loads)
+    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(loads)
+
+
+@pytest.mark.slow
+def test_a_field_is_the_transients_everywhere():
+    path = Trajectory(shape="circle", size=0.01, speed=6.0)
+    body = skinwave.Body(width=0.05, height=0.05, depth=0.01)
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path))
+    scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0),))
+    found = field(scene, np.arange(6) * 4e-3, tolerance=5e-3, h=0.005)
+    build = build_body(body, 0.005)
+    ops = fem.assemble(build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing)
+    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 2.5e-5), 0, 801, 160)
+    full = np.array([state.displacement for state in states]).reshape(found.displacement.shape)
+    assert np.linalg.norm(found.displacement - full) < 0.01 * np.linalg.norm(full)
 
 
 def test_an_unreachable_tolerance_is_said(monkeypatch):

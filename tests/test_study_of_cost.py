@@ -9,7 +9,8 @@ import pytest
 from skinwave import cache, loads, simulate
 from skinwave.paper15 import scenes, tactons
 from skinwave.plan import plan
-from skinwave.simulation import answer, prepare
+from skinwave.prepared import answer, prepare
+from skinwave.sensitivity import sensitivity
 from skinwave.tradeoff import Candidate, sentences, study, write
 
 SHORT = """
@@ -33,7 +34,11 @@ def test_the_plan_takes_exact_waves_where_there_are_any():
 
 @pytest.mark.parametrize(
     "text",
-    ["[body]\nkind = 'sheet'", "[body]\nsides = 'free'", "[focus]\nprofile = 'array'\n[body]"],
+    [
+        "[body]\nkind = 'sheet'",
+        "[body]\nsides = 'free'\nwidth_mm = 50\nheight_mm = 50",
+        "[focus]\nprofile = 'array'\n[body]",
+    ],
 )
 def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text):
     loose, tight = plan(loads(text), 0.1), plan(loads(text), 0.01)
@@ -49,6 +54,76 @@ def test_a_sheets_plan_says_what_it_leaves_out():
     rows = {row.what: row for row in plan(loads("[body]\nkind = 'sheet'")).rows}
     assert "%" in rows["left out: air"].value
     assert "stiffens" in rows["left out: stretching"].reason
+
+
+def test_sides_that_send_nothing_back_need_no_elements():
+    lossy = (
+        "material = {density_kg_m3=1000, shear_modulus_pa=10e3, poisson=0.499, viscosity_pa_s=9}"
+    )
+    text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
+    required = plan(loads(text), 0.05)
+    assert required.model == "flat-body"
+    assert 0 < required.error < 0.05
+    assert plan(loads(text), required.error / 2).model == "fem"
+
+
+def test_only_as_much_of_a_body_is_meshed_as_waves_come_back_from():
+    wide = "[focus]\nprofile = 'main_lobe'\n[body]\nwidth_mm = 600\nheight_mm = 60"
+    required = plan(loads("[tacton]\nam_frequency_hz = 200\n" + wide))
+    assert required.body.width < 0.3
+    assert required.body.height == 0.06
+    assert "extent" in {row.what for row in required.rows}
+
+
+@pytest.mark.parametrize(
+    ("path", "axes"),
+    [("", "xy"), ("shape='line'\nsize_mm=20\nspeed_m_per_s=5", "y"),
+     ("shape='circle'\nsize_mm=20\nspeed_m_per_s=5", "")],
+)  # fmt: skip
+def test_a_scene_is_halved_where_it_is_its_own_mirror_image(path, axes):
+    text = f"""
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+{path}
+[body]
+sides = "clamped"
+width_mm = 60
+height_mm = 60
+[probes]
+points_mm = [[0, 0], [-5, 3]]
+"""
+    scene = loads(text)
+    required = plan(scene, 0.3, model="fem")
+    assert required.symmetry == axes
+    whole = answer(prepare(scene.body, scene.probe_points, h=0.008), scene)
+    part = answer(prepare(scene.body, scene.probe_points, h=0.008, symmetry=axes), scene)
+    assert part.effort.dofs <= whole.effort.dofs / 2 ** len(axes) * 1.2
+    np.testing.assert_allclose(
+        part.displacement, whole.displacement, atol=2e-3 * np.abs(whole.displacement).max()
+    )
+
+
+def test_what_breaks_the_tolerance_is_said_with_its_number():
+    scene = loads("[tacton]\nam_frequency_hz = 140\n[body]\nkind = 'sheet'")
+    assert plan(scene, 0.05).warnings == ()
+    for arguments, sentence in [
+        ({"model": "point-kernel"}, "the point kernel will be wrong by about"),
+        ({"model": "flat-body"}, "which lets no wave return from the sides"),
+        ({"h": 0.005}, "elements of 5 mm will be wrong by about"),
+        ({"model": "fem-transient", "dt": 1e-3}, "a time step of 1 ms will be wrong by about"),
+        ({"model": "fem-harmonic"}, "leaves out how the motion starts"),
+    ]:
+        warnings = plan(scene, 0.05, **arguments).warnings
+        assert any(sentence in warning and "%" in warning for warning in warnings), sentence
+
+
+def test_a_sheet_near_a_resonance_is_more_sensitive():
+    text = "[tacton]\nam_frequency_hz = {}\n[body]\nkind = 'sheet'"
+    off, on = (sensitivity(loads(text.format(f))) for f in (80, 140))
+    assert on.value > 2 * off.value > 2
+    assert 60 < off.frequency < 200
+    assert plan(loads(text.format(140))).h < plan(loads(text.format(80))).h
 
 
 @pytest.mark.slow

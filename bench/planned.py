@@ -1,0 +1,112 @@
+"""Is the plan right? `python -m bench.planned [scenes]`: random scenes, planned and measured.
+
+For each scene and tolerance: the error of what `plan` chooses against the finest finite elements
+that this machine affords, and its time over that of the cheapest candidate that is good enough.
+Absorbing sides stand for an endless body: the reference's are moved twice as far away.
+"""
+
+import os
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from fem import Material
+from fem.materials import from_young
+from simple_model import MovingPressure, Response, Tacton, Trajectory
+from skinwave.bodies import default_size
+from skinwave.scene import Body, Scene
+from skinwave.simulation import simulate
+
+FINEST = (0.75, 0.65)  # of the default element size
+RUNGS = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
+TOLERANCES = (0.03, 0.05, 0.10, 0.20)
+
+
+def scene(seed: int) -> tuple[Scene, float]:
+    """A random scene, and the tolerance that is asked of it."""
+    pick = np.random.default_rng(seed)
+    shape = pick.choice(["point", "line", "circle", "square"])
+    size = float(pick.uniform(8e-3, 24e-3))
+    path = Trajectory(shape=str(shape), size=size, speed=float(pick.uniform(4, 14)))
+    am = float(pick.choice([0.0, pick.uniform(60, 240)]))
+    tacton = Tacton(am_frequency=am if shape != "point" else max(am, 80.0), duration=0.3,
+                    trajectory=path)  # fmt: skip
+    if pick.random() < 0.4:
+        side = float(pick.uniform(0.06, 0.12))
+        paper = from_young(density=800, young=float(pick.uniform(2e9, 6e9)), poisson=0.3,
+                           loss_factor=float(pick.uniform(0.02, 0.08)))  # fmt: skip
+        body = Body(
+            kind="sheet", material=paper, width=side, height=side, depth=1e-4,
+            base="free", sides="clamped",
+        )  # fmt: skip
+    else:
+        skin = Material(
+            density=1000, shear_modulus=float(pick.uniform(8e3, 50e3)), poisson=0.499,
+            viscosity=float(pick.uniform(3, 10)),
+        )  # fmt: skip
+        body = Body(
+            kind="slab", material=skin, width=0.07, height=0.07,
+            depth=float(pick.uniform(8e-3, 15e-3)),
+            sides=str(pick.choice(["absorbing", "clamped", "free"])),
+        )  # fmt: skip
+    probes = tuple((float(x), 0.0) for x in (0.0, 0.006, 0.014))
+    pressure = MovingPressure(tacton=tacton)
+    found = Scene(name=f"random {seed}", pressure=pressure, body=body, probes=probes)
+    return found, float(pick.choice(TOLERANCES))
+
+
+def error(candidate: Response, reference: Response) -> float:
+    """Worst probe's relative waveform error; a point kernel is scaled to fit."""
+    u, v = candidate.displacement, reference.displacement
+    if candidate.unit == "Pa":
+        u = u * (u * v).sum() / (u * u).sum()
+    return float((np.linalg.norm(u - v, axis=0) / np.linalg.norm(v, axis=0)).max())
+
+
+def timed(scene: Scene, model: str, **knobs: float) -> tuple[Response, float]:
+    started = time.perf_counter()
+    return simulate(scene, model, **knobs), time.perf_counter() - started
+
+
+def judge(seed: int) -> bool:
+    """Print one row; whether the planned answer is within the tolerance at a fair price."""
+    asked, tolerance = scene(seed)
+    body, h = asked.body, default_size(asked.body)
+    far = asked
+    if body.sides == "absorbing":
+        far = replace(asked, body=replace(body, width=2 * body.width, height=2 * body.height))
+    coarser, reference = (simulate(far, "fem", h=factor * h) for factor in FINEST)
+    own = error(coarser, reference)
+    planned, seconds = timed(asked, "auto", tolerance=tolerance)
+    wrong = error(planned, reference)
+    good = []
+    candidates = [("point-kernel", {}), *(("fem", {"h": h * rung}) for rung in RUNGS)]
+    if body.kind == "slab":
+        candidates.insert(1, ("flat-body", {}))
+    for model, knobs in candidates:
+        answer, cost = timed(asked, model, **knobs)
+        if error(answer, reference) <= tolerance:
+            good.append((cost, model, knobs))
+            break  # by rising cost: the first that is good enough is the cheapest
+    cost, best, knobs = min(good, default=(np.inf, "none", {}))
+    name = best + "".join(f" {1e3 * v:.1f} mm" for v in knobs.values())
+    shape, am = asked.tacton.trajectory.shape, asked.tacton.am_frequency
+    print(
+        f"{seed:>3} {body.kind:<6}{body.sides:<10} {shape:<7}{am:5.0f} Hz"
+        f" {100 * tolerance:5.0f} % {100 * wrong:7.2f} % (+-{100 * own:.2f})  {planned.model:<10}"
+        f"{seconds:6.1f} s  {name:<16}{cost:6.1f} s {seconds / cost:6.1f}",
+        flush=True,
+    )
+    return wrong <= tolerance, seconds <= 5 * cost
+
+
+if __name__ == "__main__":
+    os.environ["SKINWAVE_CACHE"] = ""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    print("    body             path       f_AM  asked   error (reference)   planned            "
+          "cheapest good enough   ratio")  # fmt: skip
+    held = np.array([judge(seed) for seed in range(count)])
+    print(f"{held[:, 0].sum()} of {count} within the tolerance, {held[:, 1].sum()} of {count} at "
+          "no more than five times the cheapest")  # fmt: skip

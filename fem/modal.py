@@ -1,0 +1,124 @@
+"""A reduced model in its own coordinates, and its motion under moving loads.
+
+    z' = pole z + inputs f(t),  probes = 2 Re(outputs z)
+
+Two ways in time, both exact for their loads: for any load, a recurrence from sample to sample;
+for a load of lines F exp(i w t), the lines themselves and the free vibration that the start leaves,
+
+    z(t) = inputs F [exp(i w t) - exp(pole t)] / (i w - pole)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, signal
+
+from fem.reduced import ReducedModel
+from meshes.tetmesh import Floats
+
+Complex = NDArray[np.complex128]
+CHUNK = 256  # times that share their exponentials
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Poles:
+    """The model in its own coordinates: z' = pole z + inputs f, probes = 2 Re(outputs z).
+
+    `values` (m,) in 1/s with imaginary part >= 0, `inputs` (m, r), `outputs` (p, m).
+    """
+
+    values: Complex
+    inputs: Complex
+    outputs: Complex
+
+
+def poles(model: ReducedModel, outputs: Floats | None = None) -> Poles:
+    """Diagonalise the model in first-order form, once; one of each conjugate pair is kept.
+
+    Parameters
+    ----------
+    outputs : (p, r), what is read off the reduced coordinates: the model's probes if not given
+    """
+    r = len(model.K)
+    companion = np.block([[np.zeros((r, r)), np.eye(r)], [-model.K, -model.C]])
+    values, vectors = linalg.eig(companion)
+    kept = values.imag >= 0
+    inverse = np.linalg.inv(vectors)[kept, r:]
+    # A real pole stands alone, so that twice the real part counts it double.
+    weight = np.where(values[kept].imag > 0, 1.0, 0.5)
+    read = model.outputs if outputs is None else outputs
+    return Poles(values=values[kept], inputs=inverse, outputs=(read @ vectors[:r, kept]) * weight)
+
+
+def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[Complex, Complex]:
+    """What a load Re sum_f forces exp(2 pi i f t), switched on at t = 0, makes of the probes.
+
+    Parameters
+    ----------
+    forces : (f, r) reduced forces of the lines, N kg^-1/2
+    frequencies : (f,) float, Hz
+
+    Returns
+    -------
+    lines : (f, p) complex amplitudes in metre of the steady state
+    start : (m, p) complex amplitudes of exp(pole t), which bring it to rest at t = 0
+    """
+    iw, values = 2j * np.pi * frequencies[:, None], poles.values
+    forwards = (forces @ poles.inputs.T) / (iw - values)  # (f, m)
+    backwards = (forces.conj() @ poles.inputs.T) / (-iw - values)
+    lines = forwards @ poles.outputs.T + (backwards @ poles.outputs.T).conj()
+    return lines, -(forwards + backwards).sum(axis=0)[:, None] * poles.outputs.T
+
+
+def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
+    """Re sum_j amplitudes (j, p) exp(rates (j,) t) at equally spaced times (t,) from 0: (t, p).
+
+    Exponentials are taken within one chunk of times and at the start of each, and multiplied.
+    """
+    j, p = amplitudes.shape
+    within = np.exp(rates * times[:CHUNK, None])
+    starts = np.exp(rates * times[::CHUNK, None])
+    driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, -1)
+    summed = within.real @ driven.real - within.imag @ driven.imag
+    return summed.reshape(len(within), -1, p).swapaxes(0, 1).reshape(-1, p)[: len(times)]
+
+
+def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt: float) -> Floats:
+    """Probe displacement (t, p) in metre from rest, exact for a load linear within each step.
+
+    Parameters
+    ----------
+    footprints : (k, r) reduced forces at k positions of the focus, N kg^-1/2 per Pa
+    position : (t,) float, where the focus is, in 0..k-1; between two positions linear
+    gain : (t,) float, Pa, pressure at the focus
+    dt : float, s
+    """
+    low = np.minimum(position.astype(np.int64), max(len(footprints) - 2, 0))
+    part = position - low
+    high = np.minimum(low + 1, len(footprints) - 1)
+    at_low, at_high = gain * (1 - part), gain * part
+    displacement = np.zeros((len(poles.outputs), len(gain)))
+    for value, modal, output in zip(
+        poles.values, poles.inputs @ footprints.T, poles.outputs.T, strict=True
+    ):
+        drive = at_low * modal[low] + at_high * modal[high]
+        decay, end, start = _step_weights(value * dt)
+        # The initial condition of the filter makes z(0) = 0 whatever the load begins with.
+        z, _ = signal.lfilter([dt * end, dt * start], [1, -decay], drive, zi=[-dt * end * drive[0]])
+        displacement += 2 * (output.real[:, None] * z.real - output.imag[:, None] * z.imag)
+    return displacement.T
+
+
+def _step_weights(x: complex) -> tuple[complex, complex, complex]:
+    """exp(x), and the weights of the load at the end and at the start of a step.
+
+    z(t + dt) = exp(x) z + dt int_0^1 exp(x (1 - s)) [(1 - s) g_0 + s g_1] ds
+    """
+    if abs(x) < 1e-2:  # series, where the closed forms cancel
+        end = 1 / 2 + x / 6 + x**2 / 24 + x**3 / 120 + x**4 / 720
+        whole = 1 + x / 2 + x**2 / 6 + x**3 / 24 + x**4 / 120 + x**5 / 720
+    else:
+        end = (np.exp(x) - 1 - x) / x**2
+        whole = (np.exp(x) - 1) / x
+    return np.exp(x), end, whole - end

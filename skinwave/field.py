@@ -1,0 +1,80 @@
+"""Motion of a whole body, for pictures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+import fem
+from meshes import TetMesh
+from meshes.tetmesh import Floats
+from simple_model import Effort
+from simple_model.steady import path_knots
+from skinwave.effort import Clock, Progress, peak_memory, silent, versions
+from skinwave.full import assembled, meshed
+from skinwave.prepared import BAND, reduced_lines
+from skinwave.scene import Scene
+from skinwave.simulation import check_knobs
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Field:
+    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s."""
+
+    mesh: TetMesh
+    times: Floats
+    displacement: Floats
+    effort: Effort
+
+
+def field(
+    scene: Scene,
+    times: Floats,
+    tolerance: float = 0.02,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> Field:
+    """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
+
+    The body is reduced to the subspace of the load along the path: what it takes grows with the
+    length of the path, and another path needs another reduction.
+
+    Raises
+    ------
+    ValueError
+        If the scene has no body, a number is out of range or the tolerance is out of reach.
+    """
+    check_knobs(solver, h=h)
+    clock, report = Clock(), progress or silent
+    build = meshed(scene.body, h, clock, report)
+    operators = assembled(build, clock, report)
+    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    with clock("factorise and reduce"):
+        report("factorise", 0.0)
+        spots = scene.pressure.spot(points, path_knots(scene.pressure))
+        seeds = fem.load_subspace(P @ spots.T, tolerance / 10)
+        model = fem.reduce(
+            operators, sparse.csr_array(seeds.T), BAND, tolerance,
+            solver=solver, progress=lambda fraction: report("reduce", fraction),
+        )  # fmt: skip
+    with clock("lines"):
+        poles = fem.poles(model, outputs=np.eye(len(model.K)))
+        frequencies, forces = reduced_lines(scene.pressure, points, P.T @ model.basis)
+        lines, start = fem.line_response(poles, forces, frequencies)
+        rates = np.concatenate([2j * np.pi * frequencies, poles.values])
+        coordinates = fem.exponential_sum(rates, np.vstack([lines, start]), times)
+        displacement = coordinates @ model.basis.T
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        reduced_dofs=len(model.K),
+        steps=len(frequencies),
+        peak_memory=peak_memory(),
+        solver=model.solver,
+        estimate=model.estimate,
+        versions=versions(),
+    )
+    displacement = displacement.reshape(len(times), -1, 3)
+    return Field(mesh=build.mesh, times=times, displacement=displacement, effort=effort)

@@ -1,0 +1,223 @@
+"""Scenes as TOML files: every key with its unit, every mistake with its cure."""
+
+import difflib
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from fem.materials import Material
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.choices import choose
+from skinwave.scene import BODIES, KINDS, Body, Scene
+
+
+def read(path: str | Path) -> Scene:
+    """The scene in a TOML file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or is not a scene: what, got, limit, cure in one sentence.
+    """
+    try:
+        return loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def loads(text: str) -> Scene:
+    """The scene in a TOML text; missing keys take the preset's value."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"not valid TOML: {error}") from None
+    sections = {"name": _text, **dict.fromkeys(SECTIONS, _table)}
+    top = _checked("scene", table, sections)
+    parts = {
+        section: _checked(f"[{section}]", top.get(section, {}), keys)
+        for section, keys in SECTIONS.items()
+    }
+    body = _body(parts["body"])
+    tacton, path = _split(parts["tacton"], ("shape", "size", "speed", "sweep"))
+    presets = {"drive": "linear", "focus": "main_lobe"} if body.kind == "none" else {}
+    pressure = MovingPressure(
+        tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **presets | parts["focus"]
+    )
+    return Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
+
+
+def dumps(scene: Scene) -> str:
+    """The complete scene as TOML; `loads` gives it back."""
+    tacton, path, pressure, body = (
+        scene.tacton,
+        scene.tacton.trajectory,
+        scene.pressure,
+        scene.body,
+    )
+    sources: dict[str, tuple[Any, ...]] = {
+        "tacton": (tacton, path),
+        "focus": (pressure,),
+        "body": (body,),
+        "probes": (scene,),
+    }
+    table: dict[str, Any] = {"name": scene.name}
+    for section, keys in SECTIONS.items():
+        table[section] = {}
+        for key, field in keys.items():
+            source = next(s for s in sources[section] if hasattr(s, field.name))
+            table[section][key] = field.write(getattr(source, field.name))
+    if body.kind == "none":
+        table["body"] = {"kind": "none"}
+    return tomli_w.dumps(table)
+
+
+@dataclass(frozen=True)
+class Field:
+    """A key of the file: the attribute behind it and how it is read and written."""
+
+    name: str
+    read: Callable[[str, Any], Any]
+    write: Callable[[Any], Any]
+
+
+def _number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{key} = {value!r} must be a number")
+    return float(value)
+
+
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{key} = {value!r} must be a text in quotes")
+    return value
+
+
+def _table(key: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"{key} = {value!r} must be a table, [{key}]")
+    return value
+
+
+def _pair(key: str, value: Any) -> tuple[float, float]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"{key} = {value!r} must be a pair of numbers, such as [1.0, 0.0]")
+    return _number(key, value[0]), _number(key, value[1])
+
+
+def _points(key: str, value: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(value, list):
+        raise ValueError(f"{key} = {value!r} must be a list of pairs, such as [[0, 0], [5, 0]]")
+    points = [_pair(key, point) for point in value]
+    for x, y in points:
+        if not (isfinite(x) and isfinite(y)):
+            raise ValueError(f"{key} has the point [{x}, {y}]; coordinates must be finite")
+    return tuple((x / 1e3, y / 1e3) for x, y in points)
+
+
+def _material(key: str, value: Any) -> str | Material:
+    if isinstance(value, str):
+        return value
+    values = _checked(f"[body.{key}]", _table(key, value), MATERIAL)
+    missing = [k for k in list(MATERIAL)[:3] if MATERIAL[k].name not in values]
+    if missing:
+        raise ValueError(f"[body.{key}] lacks {' and '.join(missing)}; give it, or name a preset")
+    return Material(**values)
+
+
+def _write_material(material: str | Material) -> Any:
+    if isinstance(material, str):
+        return material
+    return {key: field.write(getattr(material, field.name)) for key, field in MATERIAL.items()}
+
+
+def _scaled(name: str, per_unit: float = 1.0) -> Field:
+    """A number whose unit in the file is `per_unit` times smaller than inside."""
+    return Field(
+        name,
+        lambda key, value: _number(key, value) / per_unit,
+        lambda value: round(value * per_unit, 12) if per_unit != 1 else value,
+    )
+
+
+def _word(name: str) -> Field:
+    return Field(name, _text, str)
+
+
+MATERIAL = {
+    "density_kg_m3": _scaled("density"),
+    "shear_modulus_pa": _scaled("shear_modulus"),
+    "poisson": _scaled("poisson"),
+    "viscosity_pa_s": _scaled("viscosity"),
+    "loss_factor": _scaled("loss_factor"),
+}
+SECTIONS = {
+    "tacton": {
+        "amplitude_percent": _scaled("amplitude", 100),
+        "am_frequency_hz": _scaled("am_frequency"),
+        "second_am_frequency_hz": _scaled("second_am_frequency"),
+        "superposition": Field("superposition", _pair, list),
+        "envelope_frequency_hz": _scaled("envelope_frequency"),
+        "duration_s": _scaled("duration"),
+        "shape": _word("shape"),
+        "size_mm": _scaled("size", 1e3),
+        "speed_m_per_s": _scaled("speed"),
+        "sweep": _word("sweep"),
+    },
+    "focus": {
+        "height_mm": _scaled("height", 1e3),
+        "drive": _word("drive"),
+        "depth_of_modulation": _scaled("depth_of_modulation"),
+        "peak_pressure_pa": _scaled("peak_pressure"),
+        "profile": _word("focus"),
+    },
+    "body": {
+        "kind": _word("kind"),
+        "material": Field("material", _material, _write_material),
+        "width_mm": _scaled("width", 1e3),
+        "height_mm": _scaled("height", 1e3),
+        "depth_mm": _scaled("depth", 1e3),
+        "base": _word("base"),
+        "sides": _word("sides"),
+    },
+    "probes": {
+        "points_mm": Field(
+            "probes",
+            _points,
+            lambda points: [[round(1e3 * x, 9), round(1e3 * y, 9)] for x, y in points],
+        ),
+    },
+}
+
+
+def _body(values: dict[str, Any]) -> Body:
+    presets = {"none": "none", "sheet": "paper-sheet", "slab": "skin-slab"}
+    kind = values.get("kind", "slab")
+    choose("body kind", kind, KINDS)
+    return replace(BODIES[presets[kind]], **values)
+
+
+def _checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by attribute name, each read by its field; the nearest valid key for a wrong one."""
+    values = {}
+    for key, value in table.items():
+        if key not in keys:
+            near = difflib.get_close_matches(key, keys, 1, 0.0)
+            raise ValueError(f"{where} has the unknown key '{key}'; did you mean '{near[0]}'?")
+        field = keys[key]
+        if isinstance(field, Field):
+            values[field.name] = field.read(key, value)
+        else:
+            values[key] = field(key, value)
+    return values
+
+
+def _split(values: dict[str, Any], names: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+    inside = {name: value for name, value in values.items() if name in names}
+    return {n: v for n, v in values.items() if n not in names}, inside
