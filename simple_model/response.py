@@ -18,8 +18,9 @@ LINE_WINDOW = ("kaiser", 19.0)
 class Effort:
     """What an answer cost, and how it was found.
 
-    `seconds` by phase; `dofs` and `steps` solved for; `peak_memory` of the process in bytes;
-    `solver` used; `residual` and `estimate` relative; `versions` of what computed it.
+    `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
+    process in bytes; `solver` used; `estimate` of the relative error of the reduction;
+    `versions` of what computed it.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from skinwave.sensitivity import Sensitivity
 # frequencies are this much too high at so many cells a side, a slab's waveform this much wrong at
 # this share of the length scale below, when it is as sensitive to its frequencies as those were.
 SHEET_DETUNING, SHEET_MEASURED, SHEET_ORDER = 0.010, 30, 2.2
-SLAB_ERROR, SLAB_SIZE, SLAB_ORDER, SLAB_SENSITIVITY = 0.029, 0.69, 3.3, 5.0
+SLAB_ERROR, SLAB_SIZE, SLAB_ORDER, SLAB_SENSITIVITY = 0.040, 0.69, 3.3, 5.0
 REFLECTED = 0.3  # of a wave that meets an absorbing side
 FAR = 0.25  # m, beyond which waves are not followed
 
