@@ -47,6 +47,42 @@ def dilating(mu: float, lam: float) -> Manufactured:
     )
 
 
+def balanced(mu: float, lam: float) -> Manufactured:
+    """The first plus 5 grad psi / (1 + lam / mu): pressure and shear of like size at any nu."""
+    free, share = divergence_free(mu, lam), 5 / (1 + lam / mu)
+    return Manufactured(
+        u=lambda x: free.u(x) + share * _psi_gradient(x),
+        gradient=lambda x: free.gradient(x) + share * _psi_hessian(x),
+        force=lambda x: free.force(x) + (lam + 2 * mu) * 3 * np.pi**2 * share * _psi_gradient(x),
+    )
+
+
+def no_locking() -> Case:
+    """Errors on one mesh do not grow towards incompressibility."""
+    ladder = (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999)
+    errors = []
+    for poisson in ladder:
+        material = unit(poisson)
+        errors.append(_errors(12, material, balanced(1.0, material.first_lame)))
+    values, slopes = np.array(errors).T
+    at = [1 / (1 - 2 * poisson) for poisson in ladder]
+    return Case(
+        title="No locking: pressure and shear of like size, nu = 0.3 to 0.49999",
+        source=f"{MANUFACTURED}; Brenner and Sung, Math Comp 59:321 (1992): uniform in lambda",
+        mesh="unit cube, 12 cells a side, six tetrahedra a cell",
+        checks=(
+            below("relative error in L2, worst", values.max(), 3e-3),
+            below("relative error in H1 seminorm, worst", slopes.max(), 3e-2),
+        ),
+        plot=Plot(
+            x="1 / (1 - 2 nu)", y="relative error", log=True,
+            lines={"L2": (at, values), "H1 seminorm": (at, slopes)},
+        ),
+        note="Beyond nu = 0.45 pressure is constant in each element, which is of first order: "
+        "where it does not vanish, orders fall towards 2 and 1.",
+    )  # fmt: skip
+
+
 def manufactured(
     poisson: float,
     field: Callable[[float, float], Manufactured],

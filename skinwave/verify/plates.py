@@ -24,25 +24,28 @@ NAVIER = "Rayleigh-Lamb roots at k = pi hypot(m / a, n / b): Achenbach (1973), e
 
 
 def clamped_sheet() -> Case:
-    """A thin square with all edges held."""
+    """A quarter of a thin square with all edges held."""
     a, thickness = 0.1, 1e-3
     material = fem.from_young(density=80, young=4e6, poisson=0.3)
-    mesh = meshes.sheet(a, a, thickness, a / 44)
-    ops = fem.assemble(mesh, material)
+    half = np.linspace(0, a / 2, 23)
+    mesh = meshes.extrude(half, half, [-thickness, 0])
+    held = {"right": "xyz", "back": "xyz", "front": "y"}
+    even = fem.assemble(mesh, material, fixed={**held, "left": "x"})
+    odd = fem.assemble(mesh, material, fixed={**held, "left": "yz"})
     D = material.young * thickness**3 / 12 / (1 - 0.3**2)
     parameters, centre = references.clamped_plate()
     hz = parameters / a**2 * np.sqrt(D / (material.density * thickness)) / (2 * np.pi)
-    found, _ = fem.modes(ops, 3)
+    found = [fem.modes(ops, 1)[0][0] for ops in (even, odd)]
     P = fem.load_operator(mesh)
-    u = fem.probe_operator(mesh, [[0, 0]]) @ fem.static(ops, P @ np.ones(P.shape[1]))
+    u = fem.probe_operator(mesh, [[0, 0]]) @ fem.static(even, P @ np.ones(P.shape[1]))
     return Case(
         title="Clamped square sheet, thickness / side = 0.01",
         source="Kirchhoff's plate by Ritz: Young, J Appl Mech 17:448 (1950); "
         "Timoshenko and Woinowsky-Krieger (1959), table 35",
-        mesh=described(mesh, "44 by 44 by 1 cells"),
+        mesh=described(mesh, "a quarter, 22 by 22 by 1 cells"),
         checks=(
             relative("first natural frequency", found[0], hz[0], 0.01, "Hz"),
-            relative("third natural frequency", found[2], hz[2], 0.01, "Hz"),
+            relative("second natural frequency", found[1], hz[1], 0.01, "Hz"),
             relative("central deflection, 1 Pa", 1e3 * u[0], 1e3 * centre * a**4 / D, 0.01, "mm"),
         ),
     )

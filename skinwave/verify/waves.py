@@ -49,7 +49,7 @@ def steady_focus(frequency: float, poisson: float) -> Case:
 
 def lamb() -> Case:
     """A pulse of force on a half-space: pressure, shear and Rayleigh arrivals."""
-    mesh = sector(3.0, 0.07)
+    mesh = sector(3.0, 0.12)
     ops = fem.assemble(
         mesh, fem.Material(density=1, shear_modulus=1, poisson=0.25),
         fixed={"front": "y", "back": "x", "bottom": "xyz"}, absorbing="right",
@@ -59,24 +59,23 @@ def lamb() -> Case:
     push = P @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / spot**2)
     push /= 4 * np.abs(push[2::3].sum())
     dt, steps, radii = 0.0125, 260, np.array([1.0, 1.5])
-    S = fem.probe_operator(mesh, np.column_stack([radii, radii]) / np.sqrt(2))
+    S = fem.probe_operator(mesh, np.column_stack([radii, 0 * radii]))
     states = fem.transient(ops, lambda t: push * np.exp(-(((t - delay) / width) ** 2) / 2), dt)
     found = np.array([S @ s.displacement for s in islice(states, steps + 1)])
     t = np.arange(steps + 1) * dt
     exact = np.column_stack(
         [references.lamb_pulse(t, r, mu=1, shear_speed=1, delay=delay, width=width) for r in radii]
     )
-    arrival, expected = (t[np.argmin(u, axis=0)] for u in (found, exact))
     return Case(
         title="Lamb's problem: a pulse of force on a half-space, nu = 0.25",
         source="Pekeris, PNAS 41:469 (1955); Mooney, Bull Seismol Soc Am 64:473 (1974), convolved "
         "with a Gaussian pulse",
-        mesh=described(mesh, "a quarter in cylindrical cells; 6 elements in the shortest wave"),
+        mesh=described(mesh, "a quarter in cylindrical cells; 4 elements in the shortest wave"),
         checks=(
             misfit("vertical motion at r = 1, relative L2", found[:, 0], exact[:, 0], 0.05),
             misfit("vertical motion at r = 1.5, relative L2", found[:, 1], exact[:, 1], 0.05),
-            relative("Rayleigh speed from the trough at both (to one step)",
-                     0.5 / np.diff(_trough(t, found))[0], 0.5 / np.diff(_trough(t, exact))[0], 0.01),
+            relative("Rayleigh speed: 0.5 over the crest's time between both",
+                     0.5 / np.diff(_crest(t, found))[0], 0.5 / np.diff(_crest(t, exact))[0], 0.01),
         ),
         plot=Plot(
             x="c_s t / r, r = 1", y="mu u r / F", drawn=("closed form",),
@@ -220,9 +219,9 @@ def sector(length: float, h: float) -> TetMesh:
     return TetMesh(points=points, tets=box.tets, facets=box.facets)
 
 
-def _trough(t: Floats, u: Floats) -> Floats:
-    """Times of the lowest value of each column, by a parabola through three samples."""
-    k, columns = np.argmin(u, axis=0), np.arange(u.shape[1])
+def _crest(t: Floats, u: Floats) -> Floats:
+    """Times of the largest value of each column, by a parabola through three samples."""
+    k, columns = np.argmax(u, axis=0), np.arange(u.shape[1])
     a, b, c = u[k - 1, columns], u[k, columns], u[k + 1, columns]
     return t[k] + (t[1] - t[0]) * (a - c) / (a - 2 * b + c) / 2
 
@@ -252,7 +251,7 @@ def _reflected_sh(angle: float) -> float:
     q = 2 * np.pi * np.cos(angle)
     waves = np.exp(1j * q * np.outer(down, [-1, 1]))
     incident, reflected = np.linalg.lstsq(waves, u[edge], rcond=None)[0]
-    return abs(reflected / incident) if angle else abs(reflected / incident)
+    return float(abs(reflected / incident))
 
 
 def _reflected_in_plane(k: float, waves: Floats) -> Floats:
