@@ -209,12 +209,15 @@ def _tradeoff(options: argparse.Namespace) -> int:
 
 def _verify(options: argparse.Namespace) -> int:
     from skinwave.files import output_folder
-    from skinwave.verify.suite import run_suite, suite, summary_table
+    from skinwave.verify.page import summary_table
+    from skinwave.verify.suite import run_suite, suite
 
     entries = [entry for entry in suite() if not (options.quick and entry.slow)]
     out = options.out or Path("verification")
     with output_folder(out, overwrite=options.overwrite) as folder, _progress(options) as progress:
-        results = run_suite(entries, folder, progress, debug=options.debug)
+        results = run_suite(
+            entries, folder, progress, left_out=len(suite()) - len(entries), debug=options.debug
+        )
     failed = [result.entry.name for result in results if not result.case.passed]
     summary = {
         "out": str(out),

@@ -1,13 +1,13 @@
-"""One verification case, and what it is decided by."""
+"""One verification case, what it is decided by, and its place in the suite."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes import TetMesh
-from meshes.tetmesh import Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +61,32 @@ class Case:
         return max(self.checks, key=lambda c: np.inf if not c.passed else c.error / (c.bar or 1))
 
 
-def relative(what: str, value: float, reference: float, bar: float, unit: str = "") -> Check:
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A case by name; a slow one is left out of the quick suite."""
+
+    name: str
+    topic: str
+    run: Callable[[], Case]
+    slow: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Result:
+    """A finished case and the seconds it took."""
+
+    entry: Entry
+    case: Case
+    seconds: float
+
+
+def relative(
+    what: str, found: SupportsFloat, expected: SupportsFloat, bar: float, unit: str = ""
+) -> Check:
     """Relative error of one number."""
+    value, reference = float(found), float(expected)
     error = abs(value / reference - 1)
-    return Check(
-        what=what, value=float(value), reference=float(reference), error=error, bar=bar, unit=unit
-    )
+    return Check(what=what, value=value, reference=reference, error=error, bar=bar, unit=unit)
 
 
 def largest(what: str, found: ArrayLike, expected: ArrayLike, bar: float, unit: str = "") -> Check:
@@ -86,7 +106,7 @@ def misfit(what: str, found: ArrayLike, expected: ArrayLike, bar: float, unit: s
     return Check(what=what, value=value, reference=reference, error=error, bar=bar, unit=unit)
 
 
-def below(what: str, value: float, bar: float, unit: str = "") -> Check:
+def below(what: str, value: SupportsFloat, bar: float, unit: str = "") -> Check:
     """A number whose reference is 0, absolute."""
     return Check(
         what=what, value=float(value), reference=0.0, error=abs(float(value)), bar=bar, unit=unit
@@ -108,18 +128,6 @@ def order(what: str, sizes: ArrayLike, errors: ArrayLike, expected: float, band:
 def slope(sizes: ArrayLike, errors: ArrayLike) -> float:
     """Slope of log error against log size, by least squares."""
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
-
-
-def convergence(sizes: ArrayLike, expected: float, **errors: Floats) -> Plot:
-    """Errors over size on logarithmic axes, with the expected slope through the last of each."""
-    sizes = np.asarray(sizes, np.float64)
-    lines: dict[str, tuple[ArrayLike, ArrayLike]] = {}
-    for name, values in errors.items():
-        lines[name.replace("_", " ")] = (sizes, values)
-    last = min(np.asarray(values)[-1] for values in errors.values())
-    guide = f"slope {expected:g}"
-    lines[guide] = (sizes, last * (sizes / sizes[-1]) ** expected)
-    return Plot(x="size, relative", y="relative error", lines=lines, drawn=(guide,), log=True)
 
 
 def described(mesh: TetMesh, rest: str = "") -> str:

@@ -8,9 +8,9 @@ import numpy as np
 import fem
 import meshes
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
-from meshes.tetmesh import Floats
 from skinwave.verify.case import Case, Plot, below, order, slope
 from skinwave.verify.elements import Field, held_outside, unit
+from skinwave.verify.references import Floats
 
 DIRECTION = np.array([1.0, 2.0, 3.0])
 CURL = np.cross(np.eye(3), DIRECTION).T  # CURL @ grad = grad x DIRECTION

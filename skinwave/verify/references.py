@@ -1,16 +1,17 @@
 """Closed forms and series from the literature. Time is exp(+i w t); SI units throughout."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import quad, simpson
+from scipy.integrate import simpson
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.special import ellipe, ive, jv
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+Floats = NDArray[Any]  # float64
+Complex = NDArray[Any]  # complex128
 
 
 def boussinesq_disc(r: float, *, radius: float, young: float, poisson: float) -> float:
@@ -132,7 +133,7 @@ def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool
 
     thin = k * thickness / np.sqrt(6 * (1 - poisson))
     band = (0.85, 1.001 * np.sqrt(2 / (1 - poisson))) if symmetric else (0.3 * min(thin, 1), 0.9999)
-    w = k * np.linspace(*band, 2000)
+    w = k * np.linspace(band[0], band[1], 2000)
     values = np.array([balance(x) for x in w])
     first = int(np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))[0])
     return brentq(balance, w[first], w[first + 1], xtol=1e-13 * k)
@@ -259,14 +260,13 @@ def horizontal_shear_reflection(angle: Floats) -> Floats:
 def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Complex, Complex]:
     """Reflected (P, SV) displacement amplitudes of a viscous boundary, a row for each of P, SV in.
 
-    Lysmer and Kuhlemeyer (1969): stress = -density c_p, c_s times velocity, solved for plane
-    waves of wavenumber k along the boundary; ks is that of shear waves. Also returns the waves'
-    directions: rows P in, SV in, P out, SV out; along, towards the boundary, wavenumber.
+    Lysmer and Kuhlemeyer (1969): stress = -density c_p, c_s times velocity, for plane waves of
+    wavenumber k along the boundary; ks is that of shear waves. Also the waves: rows P in, SV in,
+    P out, SV out; motion along and towards the boundary, wavenumber towards it.
     """
     ratio = np.sqrt((1 - 2 * poisson) / (2 - 2 * poisson))
-    p, q = np.sqrt((ks * ratio) ** 2 - k**2 + 0j), np.sqrt(ks**2 - k**2 + 0j)
-    p, q = (np.where(v.imag > 0, -v, v) for v in (p, q))
     kp = ks * ratio
+    p, q = (np.sqrt(x**2 - k**2 + 0j).conj() for x in (kp, ks))
     waves = np.array(
         [[k / kp, p / kp, p], [q / ks, -k / ks, q], [k / kp, -p / kp, -p], [q / ks, k / ks, -q]]
     )
@@ -287,7 +287,7 @@ def generalized_alpha_step(wdt: float, radius: float) -> Floats:
     gamma, beta = 0.5 - am + af, (1 - am + af) ** 2 / 4
     after = [[1, 0, -beta], [0, 1, -gamma], [(1 - af) * wdt**2, 0, 1 - am]]
     before = [[1, 1, 0.5 - beta], [0, 1, 1 - gamma], [-af * wdt**2, 0, -am]]
-    return np.linalg.solve(after, before)
+    return np.linalg.solve(np.array(after), np.array(before))
 
 
 def driven_oscillator(t: float, *, damping: float, drive: float) -> float:
@@ -297,5 +297,5 @@ def driven_oscillator(t: float, *, damping: float, drive: float) -> float:
     """
     s, G = np.roots([1, damping, 1]), 1 / (1 - drive**2 + 1j * damping * drive)
     start = [-G.imag, -(1j * drive * G).imag]
-    free = np.linalg.solve([[1, 1], s], start) @ np.exp(t * s)
+    free = np.linalg.solve(np.array([np.ones(2), s]), np.array(start)) @ np.exp(t * s)
     return float((G * np.exp(1j * drive * t)).imag + free.real)

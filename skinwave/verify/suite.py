@@ -1,51 +1,19 @@
-"""The suite: which cases there are, running them, and the page that shows them."""
+"""The suite: which cases there are, and running them."""
 
 import json
 import math
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import asdict
 from functools import partial
-from html import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-
-from skinwave import report
 from skinwave.effort import Progress, versions
-from skinwave.figures import SPARE, png
 from skinwave.verify import elements, exact, plates, statics, stepping, waves
 from skinwave.verify import manufactured as fields
-from skinwave.verify.case import Case, Check, Plot
-
-SCOPE = (
-    "Verification asks whether the equations are solved right: every reference is a closed form, a "
-    "series or an integral from the literature, computed without this program's solvers. Whether "
-    "they are the right equations for a hand is another question, which only measurements answer. "
-    "A case passes if each of its errors is within its bar; the summary shows the error nearest "
-    "to its bar."
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Entry:
-    """A case by name; a slow one is left out of the quick suite."""
-
-    name: str
-    topic: str
-    run: Callable[[], Case]
-    slow: bool = False
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Result:
-    """A finished case and the seconds it took."""
-
-    entry: Entry
-    case: Case
-    seconds: float
+from skinwave.verify.case import Case, Check, Entry, Result
+from skinwave.verify.page import page
 
 
 def suite() -> tuple[Entry, ...]:
@@ -78,9 +46,10 @@ def _elements() -> Iterable[Entry]:
 
 
 DILATING = (
-    "Orders 3 and 2 need pressure to be linear in an element. Here, with nu above 0.45, the larger "
-    "part is constant: 2 and 1 are all that theory promises (Boffi, Brezzi and Fortin, Mixed Finite "
-    "Element Methods (2013), chapter 8) for a field whose pressure is many times its shear."
+    "Orders 3 and 2 need pressure to be linear in an element. Here, with nu above 0.45, the "
+    "larger part is constant: 2 and 1 are all that theory promises (Boffi, Brezzi and Fortin, "
+    "Mixed Finite Element Methods (2013), chapter 8) for a field whose pressure is many times its "
+    "shear."
 )
 
 
@@ -149,11 +118,17 @@ def _stepping() -> Iterable[Entry]:
 
 
 def run_suite(
-    entries: Iterable[Entry], folder: Path, progress: Progress, *, debug: bool = False
+    entries: Iterable[Entry],
+    folder: Path,
+    progress: Progress,
+    *,
+    left_out: int = 0,
+    debug: bool = False,
 ) -> list[Result]:
     """Run cases, leaving verify.json after each and index.html at the end.
 
-    An interrupt ends the running early; what is finished is still written.
+    An interrupt ends the running early; what is finished is still written. `left_out` says how
+    many cases were not asked for.
     """
     entries, results = list(entries), []
     try:
@@ -168,21 +143,8 @@ def run_suite(
         if not results:
             raise
     progress("draw", 1.0)
-    text = report.page("Verification", *_parts(results, len(entries)))
-    (folder / "index.html").write_text(text, encoding="utf-8")
+    (folder / "index.html").write_text(page(results, entries, left_out), encoding="utf-8")
     return results
-
-
-def summary_table(results: list[Result]) -> str:
-    """A line per case, and how many passed."""
-    width = max(len(r.case.title) for r in results)
-    rows = [f"{'case':<{width}}  {'value':>10}  {'reference':>10}  {'error':>8}  {'bar':>8}"]
-    for r in results:
-        c = r.case.worst
-        numbers = f"{c.value:>10.4g}  {c.reference:>10.4g}  {c.error:>8.1e}  {c.bar:>8.1e}"
-        rows.append(f"{r.case.title:<{width}}  {numbers}  {_word(r.case.passed)}")
-    failed = sum(not r.case.passed for r in results)
-    return "\n".join([*rows, f"{len(results) - failed} passed, {failed} failed"])
 
 
 def _guarded(entry: Entry) -> Case:
@@ -190,7 +152,7 @@ def _guarded(entry: Entry) -> Case:
     try:
         return entry.run()
     except (ValueError, ArithmeticError, MemoryError) as error:
-        check = Check(what="ran to its end (1 = yes)", value=0.0, reference=1.0, error=1.0, bar=0.0)
+        check = Check(what="ran to its end", value=0.0, reference=1.0, error=1.0, bar=0.0)
         return Case(
             title=f"{entry.name} broke off", source="", mesh="", checks=(check,), said=str(error)
         )
@@ -219,85 +181,3 @@ def _record(result: Result) -> dict[str, Any]:
     spent = round(result.seconds, 2)
     name = {"name": result.entry.name, "passed": case.passed, "seconds": spent}
     return {**name, **fields, "checks": checks}
-
-
-def _parts(results: list[Result], planned: int) -> list[str]:
-    """The page, as HTML."""
-    failed = sum(not r.case.passed for r in results)
-    state = f"{len(results) - failed} passed, {failed} failed"
-    if len(results) < planned:
-        state = f"Interrupted: {len(results)} of {planned} cases are finished. {state}"
-    named = ", ".join(f"{name} {version}" for name, version in versions().items())
-    spent = f"{sum(r.seconds for r in results):.0f} s. {named}."
-    rows = [
-        [
-            f'<a href="#{r.entry.name}">{escape(r.case.title)}</a>',
-            *_numbers(r.case.worst),
-            _verdict(r.case.passed),
-            f"{r.seconds:.1f}",
-        ]
-        for r in results
-    ]
-    header = ["case", "value", "reference", "error", "bar", "", "s"]
-    topics = dict.fromkeys(r.entry.topic for r in results)
-    return [
-        report.paragraph(f"{state}, {spent}"),
-        report.paragraph(SCOPE),
-        report.table(header, rows),
-        *(
-            report.section(topic, *(_shown(r) for r in results if r.entry.topic == topic))
-            for topic in topics
-        ),
-    ]
-
-
-def _shown(result: Result) -> str:
-    """One case on the page."""
-    case = result.case
-    rows = [[c.what, *_numbers(c), _verdict(c.passed)] for c in case.checks]
-    parts = [
-        f'<h3 id="{result.entry.name}">{escape(case.title)} {_verdict(case.passed)}</h3>',
-        f"<p><small>Source: {escape(case.source)}.<br>Mesh: {escape(case.mesh)}.</small></p>",
-        report.table(["quantity", "value", "reference", "error", "bar", ""], rows),
-    ]
-    if case.said:
-        parts.append(f"<p>It says: <code>{escape(case.said)}</code></p>")
-    if case.note:
-        parts.append(report.paragraph(case.note))
-    if case.plot:
-        parts.append(report.picture(png(_figure(case.plot), 90), case.title))
-    return "\n".join(parts)
-
-
-def _figure(plot: Plot) -> Figure:
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-    ax = figure.subplots()
-    colours = ("#0072B2", "#D55E00", *SPARE, "#000000")
-    measured = [name for name in plot.lines if name not in plot.drawn]
-    for k, name in enumerate(measured):
-        ax.plot(*plot.lines[name], marker="os^vD"[k % 5], ms=4, lw=1, label=name,
-                color=colours[k % len(colours)], ls="-" if not plot.drawn or plot.log else "")  # fmt: skip
-    for k, name in enumerate(plot.drawn):
-        ax.plot(*plot.lines[name], lw=1, color=("0.2", "0.6")[k % 2], label=name, zorder=1,
-                ls="--" if plot.log else "-")  # fmt: skip
-    if plot.log:
-        ax.set_xscale("log")
-        ax.set_yscale("log")
-    ax.set(xlabel=plot.x, ylabel=plot.y)
-    ax.grid(alpha=0.25)
-    ax.legend(fontsize=8, frameon=False)
-    return figure
-
-
-def _numbers(check: Check) -> list[str]:
-    unit = f" {check.unit}" if check.unit else ""
-    error = f"{check.error:.2g}" if np.isfinite(check.error) else "not a number"
-    return [f"{check.value:.5g}{unit}", f"{check.reference:.5g}{unit}", error, f"{check.bar:.2g}"]
-
-
-def _word(passed: bool) -> str:
-    return "passed" if passed else "FAILED"
-
-
-def _verdict(passed: bool) -> str:
-    return f'<span class="{"yes" if passed else "no"}">{_word(passed)}</span>'
