@@ -122,7 +122,7 @@ def manufactured(
         ),
         note=note
         or f"last pair of meshes: order {slope(sizes[-2:], errors[-2:, 0]):.2f} in L2, "
-        f"{slope(sizes[-2:], errors[-2:, 1]):.2f} in H1",
+        f"{slope(sizes[-2:], errors[-2:, 1]):.2f} in H1.",
     )
 
 

@@ -5,7 +5,10 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from skinwave import report
 from skinwave.effort import versions
@@ -91,7 +94,7 @@ def _shown(result: Result) -> str:
 
 
 def _figure(plot: Plot) -> Figure:
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    figure = Figure(figsize=(8.6, 3.4), layout="constrained")
     ax = figure.subplots()
     measured = [name for name in plot.lines if name not in plot.drawn]
     joined = "-" if plot.log or not plot.drawn else ""
@@ -108,10 +111,19 @@ def _figure(plot: Plot) -> Figure:
     if plot.log:
         ax.set_xscale("log")
         ax.set_yscale("log")
+        _tick_at(ax, plot, measured)
     ax.set(xlabel=plot.x, ylabel=plot.y)
     ax.grid(alpha=0.25)
-    ax.legend(fontsize=8, frameon=False)
+    figure.legend(fontsize=8, frameon=False, loc="outside right upper")
     return figure
+
+
+def _tick_at(ax: Axes, plot: Plot, names: list[str]) -> None:
+    """Few measured places are the ticks themselves."""
+    places = np.unique(np.concatenate([np.asarray(plot.lines[name][0]) for name in names]))
+    if len(places) <= 7:
+        ax.set_xticks(places, [f"{place:.3g}" for place in places])
+        ax.xaxis.set_minor_locator(NullLocator())
 
 
 def _quantity(check: Check) -> str:

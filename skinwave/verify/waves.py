@@ -72,8 +72,8 @@ def lamb() -> Case:
         "with a Gaussian pulse",
         mesh=described(mesh, "a quarter in cylindrical cells; 4 elements in the shortest wave"),
         checks=(
-            misfit("vertical motion at r = 1, relative L2", found[:, 0], exact[:, 0], 0.05),
-            misfit("vertical motion at r = 1.5, relative L2", found[:, 1], exact[:, 1], 0.05),
+            misfit("vertical motion at r = 1, relative L2", found[:, 0], exact[:, 0], 0.02),
+            misfit("vertical motion at r = 1.5, relative L2", found[:, 1], exact[:, 1], 0.02),
             relative("Rayleigh speed: 0.5 over the crest's time between both",
                      0.5 / np.diff(_crest(t, found))[0], 0.5 / np.diff(_crest(t, exact))[0], 0.01),
         ),
@@ -81,29 +81,38 @@ def lamb() -> Case:
             x="c_s t / r, r = 1", y="mu u r / F", drawn=("closed form",),
             lines={"finite elements": (t[::4], found[::4, 0]), "closed form": (t, exact[:, 0])},
         ),
-        note="No reflection reaches the probes: sides at r = 3, base at 3.",
+        note="The outside at r = 3 has dashpots, the base at depth 3 is held.",
     )  # fmt: skip
 
 
-def rayleigh_speed(poisson: float) -> Case:
-    """The speed of surface waves, by formula and from the vibration of a half wavelength."""
-    material = fem.Material(density=1, shear_modulus=1, poisson=poisson)
+def rayleigh_speed() -> Case:
+    """The speed of surface waves, by formula and from the vibration of half a wavelength."""
     down = meshes.graded_axis(2.5, 0.05, meshes.Grading(radius=0.3, growth=1.15))
     mesh = meshes.extrude(np.linspace(0, 0.5, 11), [0, 0.05], -down[::-1])
-    fixed = {"left": "x", "right": "x", "front": "y", "back": "y", "bottom": "xyz"}
-    hz, shapes = fem.modes(fem.assemble(mesh, material, fixed=fixed), 6)
-    top = np.unique(mesh.facets["top"])
-    waves = np.abs(np.cos(2 * np.pi * mesh.points[top, 0]) @ shapes[3 * top + 2])
-    ratio = references.rayleigh_ratio(poisson)
+    ladder, checks, measured = (0.0, 0.25, 0.45, 0.4999), [], []
+    for nu in ladder:
+        material = fem.Material(density=1, shear_modulus=1, poisson=nu)
+        ratio = references.rayleigh_ratio(nu)
+        measured.append(_surface_wave(mesh, material))
+        by_formula = material.rayleigh_speed
+        checks.append(
+            relative(f"material's formula: c_R / c_s, nu = {nu:g}", by_formula, ratio, 1e-9)
+        )
+        checks.append(
+            relative(f"finite elements: c_R / c_s, nu = {nu:g}", measured[-1], ratio, 1e-3)
+        )
+    fine = np.linspace(0, 0.5, 60)
     return Case(
-        title=f"Rayleigh waves, nu = {poisson:g}",
+        title="Rayleigh waves, nu = 0 to 0.4999",
         source="Rayleigh, Proc London Math Soc 17:4 (1885); Achenbach (1973), eq. 5.98",
         mesh=described(mesh, "half a wavelength between sliding ends, 2.5 wavelengths deep"),
-        checks=(
-            relative("material's formula: c_R / c_s", material.rayleigh_speed, ratio, 1e-9),
-            relative("finite elements: c_R / c_s", hz[np.argmax(waves)], ratio, 0.01),
+        checks=tuple(checks),
+        plot=Plot(
+            x="Poisson's ratio", y="c_R / c_s", drawn=("root",),
+            lines={"finite elements": (ladder, measured),
+                   "root": (fine, [references.rayleigh_ratio(nu) for nu in fine])},
         ),
-    )
+    )  # fmt: skip
 
 
 def plate_waves() -> Case:
@@ -157,7 +166,7 @@ def absorbed_pulse() -> Case:
         source=f"{LYSMER}: nothing returns at normal incidence",
         mesh=described(mesh, "50 cells high"),
         checks=(
-            below("later motion of the top / displacement", np.ptp(moved) / moved.mean(), 0.01),
+            below("later motion of the top / displacement", np.ptp(moved) / moved.mean(), 1e-3),
             relative("displacement = impulse / (density c_s area)", 1e6 * moved.mean(),
                      1e6 * momentum / (1000 * 5.0 * 4e-6), 0.01, "um"),
         ),
@@ -171,7 +180,7 @@ def oblique_shear() -> Case:
     found = np.array([_reflected_sh(np.radians(a)) for a in degrees])
     checks = [
         Check(what=f"reflected amplitude at {a:g} degrees (absolute)", value=f, reference=e,
-              error=abs(f - e), bar=0.01)
+              error=abs(f - e), bar=0.002)
         for a, f, e in zip(degrees, found, exact, strict=True)
     ]  # fmt: skip
     fine = np.linspace(0, 75, 100)
@@ -198,7 +207,7 @@ def oblique_in_plane() -> Case:
         for name, f, e in zip(("P", "SV"), found[row], exact[row], strict=True):
             checks.append(
                 Check(what=f"{kind} in at {degrees} degrees, {name} out (absolute)",
-                      value=abs(f), reference=abs(e), error=abs(f - e), bar=0.01)
+                      value=abs(f), reference=abs(e), error=abs(f - e), bar=0.003)
             )  # fmt: skip
     return Case(
         title="P and SV waves at an angle on a viscous boundary, nu = 0.25",
@@ -207,6 +216,15 @@ def oblique_in_plane() -> Case:
         checks=tuple(checks),
         note="Displacement amplitudes; complex differences are judged.",
     )
+
+
+def _surface_wave(mesh: TetMesh, material: fem.Material) -> float:
+    """Frequency of the mode that moves the top most like cos(2 pi x)."""
+    fixed = {"left": "x", "right": "x", "front": "y", "back": "y", "bottom": "xyz"}
+    hz, shapes = fem.modes(fem.assemble(mesh, material, fixed=fixed), 6)
+    top = np.unique(mesh.facets["top"])
+    wave = np.abs(np.cos(2 * np.pi * mesh.points[top, 0]) @ shapes[3 * top + 2])
+    return float(hz[np.argmax(wave)])
 
 
 def sector(length: float, h: float) -> TetMesh:
