@@ -19,10 +19,12 @@ HEADER = ("value", "reference", "error", "bar")
 COLOURS = ("#0072B2", "#D55E00", *SPARE, "#000000")
 SCOPE = (
     "Verification asks whether the equations are solved right: every reference is a closed form, a "
-    "series or an integral from the literature, computed without this program's solvers. Whether "
-    "they are the right equations for a hand is another question, which only measurements answer. "
-    "A case passes if each of its errors is within its bar; the summary shows the error nearest "
-    "to its bar."
+    "series or an integral from the literature, computed without this program's solvers; only the "
+    "two cases that put finite elements beside exact waves take those from the program, where the "
+    "cases on flat-body check them. Whether these are the right equations for a hand is another "
+    "question, which only measurements answer. Errors are relative unless they are called "
+    "absolute. A case passes if each of its errors is within its bar; the summary shows the one "
+    "nearest to its bar."
 )
 
 

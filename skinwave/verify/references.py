@@ -70,7 +70,7 @@ def half_space_kernel(
 
 
 def plate_kernel(k: Floats, w: float, *, stiffness: complex, mass: float, air: float) -> Complex:
-    """1 / [D k^4 - (m + 2 air / k) w^2], air on both sides: Cremer, Heckl and Petersson (2005), 6.6."""
+    """1 / [D k^4 - (m + 2 air / k) w^2]: Cremer, Heckl, Petersson, Structure-Borne Sound, 6.6."""
     return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
 
 
