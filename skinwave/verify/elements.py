@@ -1,6 +1,7 @@
 """What an element must do exactly, whatever its shape, and what it must refuse."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -113,7 +114,7 @@ def inverted() -> Case:
     points = mesh.points.copy()
     points[mesh.tets[3, 4]] += 2.0
     bent = _moved(mesh, points)
-    return refused(
+    case = refused(
         "Expected invalid: an inverted element is refused with its number",
         "Zienkiewicz and Taylor, The Finite Element Method, chapter 8: det J > 0",
         described(mesh, "one mid-side node moved by two edge lengths"),
@@ -121,6 +122,11 @@ def inverted() -> Case:
         MeshError,
         "is inverted",
     )
+    touched = np.flatnonzero((mesh.tets == mesh.tets[3, 4]).any(axis=1))
+    named = float(any(case.said.startswith(f"element {e} ") for e in touched))
+    what = "the element that it names has the moved node"
+    check = Check(what=what, value=named, reference=1.0, error=1 - named, bar=0.0)
+    return replace(case, checks=(*case.checks, check))
 
 
 def incompressible() -> Case:

@@ -121,7 +121,7 @@ def manufactured(
             x="h / side", y="relative error", lines=lines, drawn=tuple(list(lines)[2:]), log=True
         ),
         note=note
-        or f"last pair of meshes: order {slope(sizes[-2:], errors[-2:, 0]):.2f} in L2, "
+        or f"Last pair of meshes: order {slope(sizes[-2:], errors[-2:, 0]):.2f} in L2, "
         f"{slope(sizes[-2:], errors[-2:, 1]):.2f} in H1.",
     )
 
