@@ -227,8 +227,10 @@ def _verify(options: argparse.Namespace) -> int:
         "failures": failed,
         "seconds": round(sum(result.seconds for result in results), 1),
     }
-    _summarise(options, summary, f"open {out}/index.html\n{summary_table(results)}")
-    return 1 if failed or len(results) < len(entries) else 0
+    broken = len(results) < len(entries)
+    state = f"interrupted after {len(results)} of {len(entries)} cases; " if broken else ""
+    _summarise(options, summary, f"{state}open {out}/index.html\n{summary_table(results)}")
+    return 1 if failed or broken else 0
 
 
 def _summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:
