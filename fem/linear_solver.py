@@ -190,11 +190,13 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     """MKL PARDISO on the upper triangle: Cholesky if real, LDL^T if complex symmetric."""
     upper = sparse.csr_array(sparse.triu(A, format="csr"))
     n, kind = A.shape[0], 6 if np.iscomplexobj(A.data) else 2
-    values = np.ascontiguousarray(upper.data, np.complex128 if kind == 6 else np.float64)
+    # PARDISO perturbs pivots below an absolute bound: entries of about 1 make it a relative one.
+    scale = 2.0 ** np.round(np.log2(np.abs(upper.data).max(initial=1e-300)))
+    values = np.ascontiguousarray(upper.data / scale, np.complex128 if kind == 6 else np.float64)
     indptr, indices = (np.asarray(a + 1, np.int32) for a in (upper.indptr, upper.indices))
     handle, settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
     settings[0], settings[1], settings[7] = 1, 2, 0  # own settings, METIS, no refinement
-    settings[9], settings[23] = 8, 1  # perturbation of pivots, two-level factorisation
+    settings[9], settings[23] = 16, 1  # perturbation of pivots, two-level factorisation
 
     def call(phase: int, b: Array | None = None) -> Array:
         right = 1 if b is None or b.ndim == 1 else b.shape[1]
@@ -218,7 +220,9 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     call(12)
 
     def solve(b: Array) -> Array:
-        return np.ascontiguousarray(call(33, b))
+        x = np.ascontiguousarray(call(33, b))
+        x /= scale
+        return x
 
     weakref.finalize(solve, call, -1)
     return solve

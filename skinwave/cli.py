@@ -1,4 +1,4 @@
-"""The command line: `skinwave run`, `compare`, `tradeoff` and `plan`.
+"""The command line: `skinwave run`, `compare`, `tradeoff`, `plan` and `verify`.
 
 Only argparse is imported before a command is known, so that help answers at once.
 """
@@ -21,7 +21,7 @@ MODELS = ("point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 if it succeeded, 1 if it was interrupted, 2 if its input was wrong."""
+    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
     options = _parser().parse_args(arguments)
     try:
         return int(options.command(options))
@@ -84,6 +84,12 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--json", action="store_true", help="the plan as JSON")
     plan.add_argument("--debug", action="store_true", help="traceback of an error")
     plan.set_defaults(command=_plan)
+
+    verify = commands.add_parser(
+        "verify", parents=[common], help="closed forms and series against what this program answers"
+    )
+    verify.add_argument("--quick", action="store_true", help="only cases of a few seconds each")
+    verify.set_defaults(command=_verify)
     return parser
 
 
@@ -199,6 +205,32 @@ def _tradeoff(options: argparse.Namespace) -> int:
     summary = {"out": str(out), "accepted": found.accepted, "sentences": sentences(found)}
     _summarise(options, summary, "\n".join([*sentences(found), f"open {out}/index.html"]))
     return 0
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from skinwave.files import output_folder
+    from skinwave.verify.page import summary_table
+    from skinwave.verify.suite import run_suite, suite
+
+    entries = [entry for entry in suite() if not (options.quick and entry.slow)]
+    out = options.out or Path("verification")
+    with output_folder(out, overwrite=options.overwrite) as folder, _progress(options) as progress:
+        results = run_suite(
+            entries, folder, progress, left_out=len(suite()) - len(entries), debug=options.debug
+        )
+    failed = [result.entry.name for result in results if not result.case.passed]
+    summary = {
+        "out": str(out),
+        "passed": len(results) - len(failed),
+        "failed": len(failed),
+        "planned": len(entries),
+        "failures": failed,
+        "seconds": round(sum(result.seconds for result in results), 1),
+    }
+    broken = len(results) < len(entries)
+    state = f"interrupted after {len(results)} of {len(entries)} cases; " if broken else ""
+    _summarise(options, summary, f"{state}open {out}/index.html\n{summary_table(results)}")
+    return 1 if failed or broken else 0
 
 
 def _summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:

@@ -1,4 +1,4 @@
-"""Exact waves of endless bodies, against closed forms, published tables and each other."""
+"""Exact waves of endless bodies: what they say of a moving focus, and limits of each other."""
 
 import numpy as np
 import pytest
@@ -30,53 +30,6 @@ def circling(size, speed, am=0.0, **load):
     )
 
 
-def test_a_focus_at_rest_is_the_closed_form():
-    for poisson in (0.0, 0.3, 0.49, 0.5):
-        found = static(half_space(**FOREARM, poisson=poisson), [0.0])[0]
-        assert found == pytest.approx(
-            1e6 * (1 - poisson) * WIDTH * np.sqrt(np.pi / 2) / 7.86e3, rel=1e-5
-        )
-
-
-@pytest.mark.parametrize(
-    ("hz", "expected"),
-    [
-        (20, [0.3403, 0.2494, 0.1326, 0.0828, 0.0619, 0.0431]),
-        (80, [0.2636, 0.1755, 0.0812, 0.0550, 0.0407, 0.0187]),
-        (140, [0.1729, 0.1000, 0.0368, 0.0238, 0.0120, 0.0030]),
-        (191, [0.1188, 0.0622, 0.0193, 0.0120, 0.0054, 0.0021]),
-        (210, [0.1040, 0.0528, 0.0157, 0.0097, 0.0045, 0.0015]),
-    ],
-)
-def test_a_focus_on_the_forearm_is_the_published_table(hz, expected):
-    found = static(half_space(**FOREARM, poisson=0.5), RADII, hz)
-    np.testing.assert_allclose(found, expected, rtol=0.01, atol=6e-5)
-
-
-def test_phase_lags_as_published():
-    g = point_response(
-        half_space(**FOREARM, poisson=0.5),
-        [0.0],
-        2 * np.pi * np.array([20, 80, 140, 191, 210]),
-        WIDTH,
-    )
-    np.testing.assert_allclose(
-        np.degrees(np.angle(g[:, 0])), [-16.2, -60.0, -91.5, -109.1, -114.1], atol=0.1
-    )
-
-
-@pytest.mark.parametrize(
-    ("hz", "expected"),
-    [
-        (80, [4.12, 3.92, 3.46, 2.93, 2.46]),
-        (140, [2.33, 2.17, 1.81, 1.44, 1.17]),
-        (210, [1.52, 1.38, 1.08, 0.82, 0.66]),
-    ],
-)
-def test_a_focus_on_paper_with_air_is_the_published_row(hz, expected):
-    np.testing.assert_allclose(static(PAPER, RADII[:5], hz), expected, rtol=0.01)
-
-
 def test_deflection_is_greatest_when_the_focus_keeps_up_with_the_surface_wave():
     speeds = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 18]
     table = [
@@ -103,21 +56,6 @@ def test_deflection_is_greatest_when_the_focus_keeps_up_with_the_surface_wave():
     np.testing.assert_allclose(peaks, table, rtol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("size", "speed", "expected"),
-    [
-        (0.01, 6, [0.422, 0.07, 0.01]),
-        (0.02, 12, [0.970, 0.19, 0.05]),
-        (0.03, 18, [1.136, 0.30, 0.11]),
-    ],
-)
-def test_a_circling_focus_on_paper_has_the_published_harmonics(size, speed, expected):
-    f, a = steady_lines(PAPER, circling(size, speed), [[size / 2, 0.0]])
-    found = [1e6 * abs(a[np.argmin(abs(f - n * 190.98593)), 0]) for n in (1, 2, 3)]
-    assert found[0] == pytest.approx(expected[0], rel=0.01)
-    np.testing.assert_allclose(np.array(found[1:]) / found[0], expected[1:], atol=0.006)
-
-
 def test_the_paper_sheet_contradicts_that_f_am_is_always_highest():
     """d = 30 mm on the path: f_d and the difference line beat f_AM, as published."""
     f, a = steady_lines(PAPER, circling(0.03, 18, am=140), [[0.015, 0.0]])
@@ -133,15 +71,6 @@ def test_a_deep_slab_is_a_half_space_and_a_shallow_one_is_stiffer():
     np.testing.assert_allclose(deep, space, rtol=1e-3, atol=1e-5 * abs(space).max())
     rest = static(slab(**FOREARM, poisson=0.4999, depth=0.005), RADII)
     assert rest[0] < 0.6 * static(half_space(**FOREARM, poisson=0.4999), [0.0])[0]
-
-
-def test_a_slabs_resonance_is_its_quarter_wave():
-    """Uniform pressure on a column, nu = 0: thickness resonance at c_p / 4 H."""
-    body = slab(density=1000, shear_modulus=25e3, poisson=0.0, depth=0.02, loss_factor=0.02)
-    hz = np.linspace(40, 140, 2001)
-    g = body(np.array([1e-3 + 0j]), 2 * np.pi * hz[:, None].astype(complex))
-    c_p = np.sqrt(2 * 25e3 / 1000)
-    assert hz[np.argmax(np.abs(g[:, 0]))] == pytest.approx(c_p / 4 / 0.02, rel=2e-3)
 
 
 @pytest.mark.parametrize(

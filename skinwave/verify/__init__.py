@@ -1,0 +1,1 @@
+"""Verification: what finite elements and exact waves must reproduce, from outside this project."""

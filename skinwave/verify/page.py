@@ -1,0 +1,148 @@
+"""The page and the table that show finished cases."""
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from skinwave import report
+from skinwave.effort import versions
+from skinwave.figures import SPARE, png
+from skinwave.verify.case import Check, Entry, Plot, Result
+
+HEADER = ("value", "reference", "error", "bar")
+COLOURS = ("#0072B2", "#D55E00", *SPARE, "#000000")
+SCOPE = (
+    "Verification asks whether the equations are solved right: every reference is a closed form, a "
+    "series or an integral from the literature, computed without this program's solvers; only the "
+    "two cases that put finite elements beside exact waves take those from the program, where the "
+    "cases on flat-body check them. Whether these are the right equations for a hand is another "
+    "question, which only measurements answer. Errors are relative unless they are called "
+    "absolute. A case passes if each of its errors is within its bar; the summary shows the one "
+    "nearest to its bar."
+)
+
+
+def page(results: list[Result], planned: Sequence[Entry], left_out: int) -> str:
+    """index.html: a summary of all cases, then each with its source, mesh, checks and plot."""
+    failed = sum(not r.case.passed for r in results)
+    state = f"{len(results) - failed} passed, {failed} failed"
+    if len(results) < len(planned):
+        state = f"Interrupted: {len(results)} of {len(planned)} cases are finished. {state}"
+    if left_out:
+        state += f"; {left_out} slower cases are left out (skinwave verify without --quick)"
+    named = ", ".join(f"{name} {version}" for name, version in versions().items())
+    spent = sum(r.seconds for r in results)
+    topics = dict.fromkeys(r.entry.topic for r in results)
+    return report.page(
+        "Verification",
+        report.paragraph(f"{state}. {spent:.0f} s with {named}."),
+        report.paragraph(SCOPE),
+        _summary(results),
+        *(
+            report.section(topic, *(_shown(r) for r in results if r.entry.topic == topic))
+            for topic in topics
+        ),
+    )
+
+
+def summary_table(results: list[Result]) -> str:
+    """A line per case, and how many passed."""
+    width = max(len(r.case.title) for r in results)
+    rows = [f"{'case':<{width}}  {'value':>10}  {'reference':>10}  {'error':>8}  {'bar':>8}"]
+    for r in results:
+        c = r.case.worst
+        numbers = f"{c.value:>10.4g}  {c.reference:>10.4g}  {c.error:>8.1e}  {c.bar:>8.1e}"
+        rows.append(f"{r.case.title:<{width}}  {numbers}  {_word(r.case.passed)}")
+    failed = sum(not r.case.passed for r in results)
+    return "\n".join([*rows, f"{len(results) - failed} passed, {failed} failed"])
+
+
+def _summary(results: list[Result]) -> str:
+    rows = [
+        [
+            f'<a href="#{r.entry.name}">{escape(r.case.title)}</a>'
+            f"<br><small>{escape(_quantity(r.case.worst))}</small>",
+            *_numbers(r.case.worst),
+            _verdict(r.case.passed),
+            f"{r.seconds:.1f}",
+        ]
+        for r in results
+    ]
+    return report.table(["case, and its check nearest to the bar", *HEADER, "", "s"], rows)
+
+
+def _shown(result: Result) -> str:
+    """One case on the page."""
+    case = result.case
+    rows = [[_quantity(c), *_numbers(c), _verdict(c.passed)] for c in case.checks]
+    parts = [
+        f'<h3 id="{result.entry.name}">{escape(case.title)} {_verdict(case.passed)}</h3>',
+        f"<p><small>Source: {escape(case.source)}.<br>Mesh: {escape(case.mesh)}.</small></p>",
+        report.table(["quantity", *HEADER, ""], rows),
+    ]
+    if case.said:
+        parts.append(f"<p>It says: <code>{escape(case.said)}</code></p>")
+    if case.note:
+        parts.append(report.paragraph(case.note))
+    if case.plot:
+        parts.append(report.picture(png(_figure(case.plot), 90), case.title))
+    return "\n".join(parts)
+
+
+def _figure(plot: Plot) -> Figure:
+    figure = Figure(figsize=(8.6, 3.4), layout="constrained")
+    ax = figure.subplots()
+    measured = [name for name in plot.lines if name not in plot.drawn]
+    joined = "-" if plot.log or not plot.drawn else ""
+    for k, name in enumerate(measured):
+        style: dict[str, Any] = {
+            "marker": "os^vD"[k % 5],
+            "color": COLOURS[k % len(COLOURS)],
+            "ls": joined,
+        }
+        ax.plot(*plot.lines[name], ms=4, lw=1, label=name, **style)
+    for k, name in enumerate(plot.drawn):
+        style = {"color": ("0.2", "0.6")[k % 2], "ls": "--" if plot.log else "-"}
+        ax.plot(*plot.lines[name], lw=1, label=name, zorder=1, **style)
+    if plot.log:
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        _tick_at(ax, plot, measured)
+    ax.set(xlabel=plot.x, ylabel=plot.y)
+    ax.grid(alpha=0.25)
+    figure.legend(fontsize=8, frameon=False, loc="outside right upper")
+    return figure
+
+
+def _tick_at(ax: Axes, plot: Plot, names: list[str]) -> None:
+    """Few measured places are the ticks themselves."""
+    places = np.unique(np.concatenate([np.asarray(plot.lines[name][0]) for name in names]))
+    if len(places) <= 7:
+        ax.set_xticks(places, [f"{place:.3g}" for place in places])
+        ax.xaxis.set_minor_locator(NullLocator())
+
+
+def _quantity(check: Check) -> str:
+    return f"{check.what}, {check.unit}" if check.unit else check.what
+
+
+def _numbers(check: Check) -> list[str]:
+    """Value, reference, error and bar; a question of yes or no has no bar."""
+    if check.bar == 0 and check.reference == 1:
+        return ["yes" if check.passed else "no", "yes", "", ""]
+    error = f"{check.error:.2g}" if math.isfinite(check.error) else "not a number"
+    return [f"{check.value:.5g}", f"{check.reference:.5g}", error, f"{check.bar:.2g}"]
+
+
+def _word(passed: bool) -> str:
+    return "passed" if passed else "FAILED"
+
+
+def _verdict(passed: bool) -> str:
+    return f'<span class="{"yes" if passed else "no"}">{_word(passed)}</span>'

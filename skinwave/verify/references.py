@@ -1,0 +1,298 @@
+"""Closed forms and series from the literature. Time is exp(+i w t); SI units throughout."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import simpson
+from scipy.linalg import eigh
+from scipy.optimize import brentq
+from scipy.special import ellipe, ive, jv
+
+Floats = NDArray[Any]  # float64
+Complex = NDArray[Any]  # complex128
+
+
+def boussinesq_disc(r: float, *, radius: float, young: float, poisson: float) -> float:
+    """Deflection under a disc of 1 Pa on a half-space, r <= radius; 4 (1 - nu^2) a E(r/a) / pi E.
+
+    K L Johnson, Contact Mechanics (1985), eq. 3.29a.
+    """
+    return float(4 * (1 - poisson**2) * radius * ellipe((r / radius) ** 2) / np.pi / young)
+
+
+def gaussian_at_rest(r: Floats, *, width: float, shear_modulus: float, poisson: float) -> Floats:
+    """Deflection of a half-space under exp(-r^2 / 2 s^2) Pa.
+
+    Boussinesq's kernel (1 - nu) / (mu k) and Gradshteyn and Ryzhik, 6.618.1.
+    """
+    x = (r / width) ** 2 / 4
+    return (1 - poisson) * width * np.sqrt(np.pi / 2) / shear_modulus * ive(0, x)
+
+
+def gaussian_mean_pressure(r: Floats, depth: Floats, *, width: float, poisson: float) -> Floats:
+    """Minus a third of the trace of stress below the same push; harmonic, 2 (1 + nu) / 3 at top.
+
+    Johnson (1985), eqs. 3.18: the trace under a point force is -(1 + nu) F z / (pi R^3).
+    """
+    k = np.linspace(0, 8 / width, 801)
+    kernel = np.exp(-((k * width) ** 2) / 2 - depth[:, None] * k) * jv(0, r[:, None] * k) * k
+    return 2 * (1 + poisson) / 3 * width**2 * simpson(kernel, x=k, axis=1)
+
+
+def gaussian_on_bonded_layer(
+    r: Floats, *, width: float, shear_modulus: float, poisson: float, depth: float
+) -> Floats:
+    """The same push on a layer bonded to a rigid base.
+
+    Vorovich, Aleksandrov and Babeshko, Nonclassical Mixed Problems (1974): the half-space's
+    kernel times L(u) = (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2), c = 3 - 4 nu.
+    """
+    k = np.linspace(1e-9, 8, 4001) / width
+    u, c = k * depth, 3 - 4 * poisson
+    e = np.exp(-2 * u)
+    layer = (c * (1 - e**2) - 4 * u * e) / (c * (1 + e**2) + (4 * u**2 + 1 + c**2) * e)
+    spot = width**2 * np.exp(-((k * width) ** 2) / 2) * (1 - poisson) / shear_modulus * layer
+    return simpson(spot * jv(0, r[:, None] * k), x=k, axis=1)
+
+
+def half_space_kernel(
+    k: Floats, w: float, *, density: float, mu: complex, poisson: float
+) -> Complex:
+    """Deflection per pressure of wavenumber k: Lamb, Phil Trans R Soc A 203:1 (1904), eq. 36.
+
+    -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, with a complex modulus.
+    """
+    ks2 = density * w**2 / mu
+    bp, bs = np.sqrt(k**2 - ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)), np.sqrt(k**2 - ks2 + 0j)
+    return -bp * ks2 / mu / ((2 * k**2 - ks2) ** 2 - 4 * k**2 * bp * bs)
+
+
+def plate_kernel(k: Floats, w: float, *, stiffness: complex, mass: float, air: float) -> Complex:
+    """1 / [D k^4 - (m + 2 air / k) w^2]: Cremer, Heckl, Petersson, Structure-Borne Sound, 6.6."""
+    return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
+
+
+def gaussian_response(
+    kernel: Callable[[Floats], Complex],
+    r: Floats,
+    *,
+    width: float,
+    circle: float = 0.0,
+    harmonic: int = 0,
+) -> Complex:
+    """Hankel's integral of a kernel along the real axis, for a Gaussian push of 1 Pa.
+
+    On a circle of radius R, harmonic n of the turning push moves radius r by
+    int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk (Graf's addition theorem,
+    Abramowitz and Stegun 9.1.79). Sneddon, Fourier Transforms (1951), section 56.
+    """
+    k = np.geomspace(1e-6, 8, 200_001) / width
+    common = width**2 * np.exp(-((k * width) ** 2) / 2) * kernel(k) * jv(harmonic, k * circle) * k
+    return np.array([simpson(common * jv(harmonic, k * x) * k, x=np.log(k)) for x in r])
+
+
+def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisson: float) -> float:
+    """Deflection of the loaded face of a free strip, plane strain, under 1 Pa times sin(k x).
+
+    Filon, Phil Trans R Soc A 201:63 (1903); Timoshenko and Goodier (1970), article 24.
+    """
+    x = k * thickness
+    bending = (np.cosh(x) + 1) / (np.sinh(x) - x) if x > 1e-2 else 12 / x**3 * (1 + x**2 / 5)
+    squeezing = (np.cosh(x) - 1) / (np.sinh(x) + x)
+    return float((1 - poisson) / (2 * shear_modulus * k) * (bending + squeezing))
+
+
+def rayleigh_ratio(poisson: float) -> float:
+    """c_R / c_s: x^6 - 8 x^4 + (24 - 16 g) x^2 - 16 (1 - g) = 0, g = (c_s / c_p)^2.
+
+    Rayleigh, Proc London Math Soc 17:4 (1885); Achenbach, Wave Propagation (1973), eq. 5.98.
+    """
+    g = (1 - 2 * poisson) / (2 - 2 * poisson)
+    roots = np.roots([1, -8, 24 - 16 * g, -16 * (1 - g)])
+    squares = roots[np.abs(roots.imag) < 1e-9].real
+    return float(np.sqrt(squares[(squares > 0) & (squares < 1)].min()))
+
+
+def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool = False) -> float:
+    """w / c_s in 1/m of the lowest wave of a free plate, bending (A0) or stretching (S0).
+
+    Rayleigh (1888), Lamb, Proc R Soc A 93:114 (1917); Achenbach (1973), eqs. 6.68 and 6.69.
+    """
+    half, g = thickness / 2, (1 - 2 * poisson) / (2 - 2 * poisson)
+
+    def balance(w: float) -> float:
+        a, b = np.sqrt(k**2 - g * w**2 + 0j), np.sqrt(k**2 - w**2 + 0j)
+        a, b = (a, b) if symmetric else (b, a)
+        one = (2 * k**2 - w**2) ** 2 * np.cosh(a * half) * np.sinh(b * half) / b
+        return float((one - 4 * k**2 * a * np.sinh(a * half) * np.cosh(b * half)).real)
+
+    thin = k * thickness / np.sqrt(6 * (1 - poisson))
+    band = (0.85, 1.001 * np.sqrt(2 / (1 - poisson))) if symmetric else (0.3 * min(thin, 1), 0.9999)
+    w = k * np.linspace(band[0], band[1], 2000)
+    values = np.array([balance(x) for x in w])
+    first = int(np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))[0])
+    return brentq(balance, w[first], w[first + 1], xtol=1e-13 * k)
+
+
+def clamped_plate() -> tuple[Floats, float]:
+    """w a^2 sqrt(m / D) (ascending) and central deflection D w / q a^4 of a clamped square plate.
+
+    Ritz's method with the polynomials (1 - x^2)^2 x^n; Young, J Appl Mech 17:448 (1950) has
+    35.99 and 73.41 with six beam functions, Timoshenko (1959), table 35, 0.00126.
+    """
+    x, weight = np.polynomial.legendre.leggauss(40)
+    shapes = [np.polynomial.Legendre.basis(n) for n in range(14)]
+    clamp = np.polynomial.Polynomial([1, 0, -2, 0, 1])
+    basis = [clamp * s.convert(kind=np.polynomial.Polynomial) for s in shapes]
+    f, second = (np.array([b.deriv(d)(x) if d else b(x) for b in basis]) for d in (0, 2))
+    mass, bend, cross = ((p * weight) @ q.T for p, q in ((f, f), (second, second), (second, f)))
+    K = np.kron(bend, mass) + np.kron(cross, cross.T)
+    K = K + np.kron(mass, bend) + np.kron(cross.T, cross)
+    parameters = 4 * np.sqrt(eigh(K, np.kron(mass, mass), eigvals_only=True)[:3])
+    centre = np.array([b(0.0) for b in basis])
+    load = f @ weight
+    return parameters, float(np.kron(centre, centre) @ np.linalg.solve(K, np.kron(load, load)) / 16)
+
+
+def moving_force_on_beam(t: Floats, *, speed: float, critical: float, period: float) -> Floats:
+    """Mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported beam.
+
+    Fryba, Vibration of Solids and Structures under Moving Loads (1972), eq. 1.31: a sum over
+    modes n; `speed` over `critical` is alpha, `period` that of the first mode.
+    """
+    w1, alpha, total = 2 * np.pi / period, speed / critical, np.zeros_like(t)
+    for n in range(1, 60, 2):
+        wn, drive = n**2 * w1, n * alpha * w1
+        wave = np.sin(drive * t) - drive / wn * np.sin(wn * t)
+        total += np.sin(n * np.pi / 2) * wave * w1**2 / (wn**2 - drive**2)
+    return total * 96 / np.pi**4
+
+
+def circling_force_on_plate(
+    t: Floats, probe: tuple[float, float], *, side: float, circle: float, hz: float, width: float,
+    density: float, thickness: float, modulus: float, poisson: float, lag: float,
+) -> Floats:  # fmt: skip
+    """Deflection of a simply supported square plate under a Gaussian push of 1 Pa, from rest.
+
+    Navier's modal sum (Leissa, Vibration of Plates (1969), section 4.1), each mode's Duhamel
+    integral exact for a load that is linear between the times t (equally spaced from 0); modal
+    damping w^2 lag / 2. The push circles the centre of the plate, beginning on the x axis.
+    """
+    n = np.arange(1, 24)
+    kx, ky = (a.ravel() for a in np.meshgrid(n * np.pi / side, n * np.pi / side))
+    mass, D = density * thickness, modulus * thickness**3 / 12 / (1 - poisson**2)
+    w = (kx**2 + ky**2) * np.sqrt(D / mass)
+    rate = -(w**2) * lag / 2 + 1j * np.sqrt(w**2 - (w**2 * lag / 2) ** 2 + 0j)
+    angle = 2 * np.pi * hz * t[:, None]
+    x, y = side / 2 + circle * np.cos(angle), side / 2 + circle * np.sin(angle)
+    spot = 2 * np.pi * width**2 * np.exp(-(kx**2 + ky**2) * width**2 / 2)
+    load = spot * np.sin(kx * x) * np.sin(ky * y) * 4 / mass / side**2
+    step = rate * (t[1] - t[0])
+    grown = np.exp(step)
+    whole, ramp = (grown - 1) / rate, (grown - 1 - step) / step / rate
+    z, total = np.zeros(len(w), np.complex128), np.zeros(len(t))
+    for i in range(1, len(t)):
+        z = grown * z + (whole - ramp) * load[i - 1] + ramp * load[i]
+        total[i] = z.imag / rate.imag @ (np.sin(kx * probe[0]) * np.sin(ky * probe[1]))
+    return total
+
+
+def layered_column(
+    w: Floats, lengths: list[float], densities: list[float], moduli: list[Complex]
+) -> Complex:
+    """Top displacement per top stress of a column of layers, from the base, which is held.
+
+    Meirovitch, Principles and Techniques of Vibrations (1997), section 7.6: tan(k L) / (k M) of
+    one layer, joined by the addition theorem of the tangent; M complex with loss.
+    """
+    below = np.zeros_like(w, np.complex128)
+    for length, density, modulus in zip(lengths, densities, moduli, strict=True):
+        k = w * np.sqrt(density / modulus)
+        turn, stiffness = np.tan(k * length), k * modulus
+        below = (below + turn / stiffness) / (1 - below * stiffness * turn)
+    return below
+
+
+def lamb_pulse(
+    t: Floats, r: float, *, mu: float, shear_speed: float, delay: float, width: float
+) -> Floats:
+    """Vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N, nu 1/4.
+
+    Pekeris, Proc Natl Acad Sci 41:469 (1955); the step response as Mooney, Bull Seismol Soc Am
+    64:473 (1974) writes it, convolved with the derivative of the force.
+    """
+    s, g = np.sqrt(3), np.sqrt(3 + np.sqrt(3)) / 2
+    x, weight = np.polynomial.legendre.leggauss(400)
+
+    def early(tau: Floats) -> Floats:
+        rest = np.sqrt(3 * s - 5) / np.sqrt(tau**2 - (3 - s) / 4) - s / np.sqrt(tau**2 - 0.25)
+        return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2) + rest) / 32
+
+    def late(tau: Floats) -> Floats:
+        return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2)) / 16
+
+    def convolved(step: Callable[[Floats], Floats], low: float, high: float) -> Floats:
+        """tau = g sin(angle) takes the root at the Rayleigh arrival away."""
+        low, high = np.arcsin(low / g), np.arcsin(high / g)
+        angle = (low + high) / 2 + (high - low) / 2 * x
+        tau, d_tau = g * np.sin(angle), g * np.cos(angle) * weight * (high - low) / 2
+        since = (t[:, None] - delay - tau * r / shear_speed) / width
+        slope = -since / width * np.exp(-(since**2) / 2)
+        return slope @ (step(tau) * d_tau) * r / shear_speed
+
+    after = 3 / 8 * np.exp(-(((t - delay - g * r / shear_speed) / width) ** 2) / 2)
+    return (convolved(early, 1 / s, 1) + convolved(late, 1, g) + after) / (np.pi * mu * r)
+
+
+def horizontal_shear_reflection(angle: Floats) -> Floats:
+    """(cos a - 1) / (cos a + 1): a viscous boundary under SH waves.
+
+    Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969); Achenbach (1973), section 5.5.
+    """
+    return (np.cos(angle) - 1) / (np.cos(angle) + 1)
+
+
+def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Complex, Complex]:
+    """Reflected (P, SV) displacement amplitudes of a viscous boundary, a row for each of P, SV in.
+
+    Lysmer and Kuhlemeyer (1969): stress = -density c_p, c_s times velocity, for plane waves of
+    wavenumber k along the boundary; ks is that of shear waves. Also the waves: rows P in, SV in,
+    P out, SV out; motion along and towards the boundary, wavenumber towards it.
+    """
+    ratio = np.sqrt((1 - 2 * poisson) / (2 - 2 * poisson))
+    kp = ks * ratio
+    p, q = (np.sqrt(x**2 - k**2 + 0j).conj() for x in (kp, ks))
+    waves = np.array(
+        [[k / kp, p / kp, p], [q / ks, -k / ks, q], [k / kp, -p / kp, -p], [q / ks, k / ks, -q]]
+    )
+    along, into, kz = waves.T
+    lam = 1 / ratio**2 - 2
+    normal = lam * (k * along + kz * into) + 2 * kz * into - ks / ratio * into
+    shear = kz * along + k * into - ks * along
+    boundary = np.array([normal, shear])
+    return -np.linalg.solve(boundary[:, 2:], boundary[:, :2]).T, waves
+
+
+def generalized_alpha_step(wdt: float, radius: float) -> Floats:
+    """Map (3, 3) of (u, dt v, dt^2 a) over one step of the undamped oscillator.
+
+    Chung and Hulbert, J Appl Mech 60:371 (1993), eqs. 2 to 7 with the parameters of eq. 25.
+    """
+    am, af = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
+    gamma, beta = 0.5 - am + af, (1 - am + af) ** 2 / 4
+    after = [[1, 0, -beta], [0, 1, -gamma], [(1 - af) * wdt**2, 0, 1 - am]]
+    before = [[1, 1, 0.5 - beta], [0, 1, 1 - gamma], [-af * wdt**2, 0, -am]]
+    return np.linalg.solve(np.array(after), np.array(before))
+
+
+def driven_oscillator(t: float, *, damping: float, drive: float) -> float:
+    """u'' + damping u' + u = sin(drive t) from rest: particular and free solution.
+
+    Meirovitch (1997), sections 3.2 and 3.3.
+    """
+    s, G = np.roots([1, damping, 1]), 1 / (1 - drive**2 + 1j * damping * drive)
+    start = [-G.imag, -(1j * drive * G).imag]
+    free = np.linalg.solve(np.array([np.ones(2), s]), np.array(start)) @ np.exp(t * s)
+    return float((G * np.exp(1j * drive * t)).imag + free.real)
