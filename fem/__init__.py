@@ -8,6 +8,7 @@ n node, p probe, t time, f frequency, l derivative along an element edge.
 """
 
 from fem.assembly import Operators, assemble
+from fem.energy import Spent, audited, imbalance, power_imbalance
 from fem.harmonic import harmonic
 from fem.linear_solver import Factor, available, factorise
 from fem.materials import PRESETS, Material, from_young
@@ -26,19 +27,23 @@ __all__ = [
     "Operators",
     "Poles",
     "ReducedModel",
+    "Spent",
     "State",
     "assemble",
+    "audited",
     "available",
     "exponential_sum",
     "facet_points",
     "factorise",
     "from_young",
     "harmonic",
+    "imbalance",
     "line_response",
     "load_operator",
     "load_subspace",
     "modes",
     "poles",
+    "power_imbalance",
     "probe_operator",
     "reduce",
     "respond",

@@ -20,6 +20,7 @@ class Effort:
 
     `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
     process in bytes; `solver` used; `estimate` of the relative error of the reduction;
+    `energy_imbalance`, relative, between the work of the load and what has become of it;
     `versions` of what computed it.
     """
 
@@ -30,6 +31,7 @@ class Effort:
     peak_memory: int = 0
     solver: str = "none"
     estimate: float = 0.0
+    energy_imbalance: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
 
 

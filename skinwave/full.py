@@ -1,5 +1,6 @@
 """Answers without reduction: every time step, every line, and exact waves of endless bodies."""
 
+from functools import lru_cache
 from itertools import islice
 
 import numpy as np
@@ -14,6 +15,7 @@ from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.scene import Body, Scene
 
+MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
 
 
@@ -35,6 +37,22 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
         )
 
 
+def checked_energy(imbalance: float) -> float:
+    """The imbalance, if it is small enough to trust an answer.
+
+    Raises
+    ------
+    ArithmeticError
+        If it is not.
+    """
+    if not imbalance <= MOST_IMBALANCE:
+        raise ArithmeticError(
+            f"the energy balance is off by {100 * imbalance:.2g} %, above the limit of "
+            f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
+        )
+    return imbalance
+
+
 def transient_answer(
     scene: Scene,
     times: Floats,
@@ -54,16 +72,24 @@ def transient_answer(
     S = fem.probe_operator(build.mesh, scene.probe_points)
     stepped = np.empty((steps + 1, len(scene.probes)))
     report("factorise", 0.0)
+
+    @lru_cache(maxsize=4)
+    def force(t: float) -> Floats:
+        return P @ scene.pressure(points, t)
+
     with clock("march"):
-        states = fem.transient(
-            operators, lambda t: P @ scene.pressure(points, t), dt, solver=solver
-        )
-        for k, state in enumerate(islice(states, steps + 1)):
+        states = fem.transient(operators, force, dt, solver=solver)
+        audited = fem.audited(operators, islice(states, steps + 1), force)
+        for k, (state, spent) in enumerate(audited):
             stepped[k] = S @ state.displacement
             report("march", k / steps)
+            if k == steps:
+                energy = checked_energy(fem.imbalance(operators, state, spent))
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
-    return _response("fem-transient", scene, times, displacement, clock, operators, steps, used)
+    return _response(
+        "fem-transient", scene, times, displacement, clock, operators, steps, used, energy
+    )
 
 
 def harmonic_answer(
@@ -87,14 +113,22 @@ def harmonic_answer(
         patterns = lines.coefficients[:, None] * spots.T[lines.harmonics]
         frequencies, pressures = summed(lines.frequencies, patterns)
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
+        energy = 0.0
         for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):
             report("lines", k / len(frequencies))
-            amplitudes[k] = S @ fem.harmonic(operators, P @ pressure, f, solver=solver)[0]
+            force = P @ pressure
+            u = fem.harmonic(operators, force, f, solver=solver)
+            amplitudes[k] = S @ u[0]
+            free = operators.free
+            one = fem.power_imbalance(operators.C, force[None, free], u[:, free], np.array([f]))
+            energy = max(energy, checked_energy(one))
     waves = np.exp(2j * np.pi * times[:, None] * frequencies)
     displacement = (waves @ amplitudes).real
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
-    return _response("fem-harmonic", scene, times, displacement, clock, operators, count, used)
+    return _response(
+        "fem-harmonic", scene, times, displacement, clock, operators, count, used, energy
+    )
 
 
 def _response(
@@ -106,6 +140,7 @@ def _response(
     operators: fem.Operators,
     steps: int,
     solver: str,
+    energy: float,
 ) -> Response:
     effort = Effort(
         seconds=clock.seconds,
@@ -113,6 +148,7 @@ def _response(
         steps=steps,
         peak_memory=peak_memory(),
         solver=solver,
+        energy_imbalance=energy,
         versions=versions(),
     )
     return Response(

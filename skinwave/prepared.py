@@ -12,7 +12,7 @@ from simple_model.steady import along_path, load_lines, path_knots, summed
 from skinwave import cache
 from skinwave.bodies import Build
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.full import assembled, meshed
+from skinwave.full import assembled, checked_energy, meshed
 from skinwave.scene import Body, Scene
 
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
@@ -30,12 +30,15 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 class Prepared:
     """A body ready to answer any Tacton at its probes.
 
-    `poles` of the reduced model; `load` (k, r): reduced forces of unit pressure at the surface
-    points (k, 2).
+    `poles` of the reduced model, which give its coordinates (r,), and `damping` (r, r);
+    `read` (p, r): displacement of the probes; `load` (k, r): reduced forces of unit pressure at
+    the surface points (k, 2).
     """
 
     probes: Floats
     poles: fem.Poles
+    damping: Floats
+    read: Floats
     load: Floats
     points: Floats
     effort: Effort
@@ -64,14 +67,13 @@ def prepare(
     with clock("read from cache"):
         if entry := cache.load(name):
             poles = fem.Poles(**{field: entry[field] for field in ("values", "inputs", "outputs")})
+            arrays = {field: entry[field] for field in ("damping", "read", "load", "points")}
             effort = Effort(**entry["meta"])
     if not entry:
         report = progress or silent
         return _prepared_anew(body, build, probes, clock, report, solver, tolerance, name)
     effort = replace(effort, seconds=clock.seconds, peak_memory=peak_memory())
-    return Prepared(
-        probes=probes, poles=poles, load=entry["load"], points=entry["points"], effort=effort
-    )
+    return Prepared(probes=probes, poles=poles, effort=effort, **arrays)
 
 
 def _prepared_anew(
@@ -99,7 +101,10 @@ def _prepared_anew(
             progress=lambda fraction: report("reduce", fraction),
         )
     with clock("diagonalise"):
-        poles, load = fem.poles(model), P.T @ model.basis
+        poles = fem.poles(model, outputs=np.eye(len(model.K)))
+        arrays = {
+            "damping": model.C, "read": model.outputs, "load": P.T @ model.basis, "points": points
+        }  # fmt: skip
     effort = Effort(
         seconds=clock.seconds,
         dofs=len(operators.free),
@@ -109,9 +114,8 @@ def _prepared_anew(
         estimate=model.estimate,
         versions=versions(),
     )
-    arrays = {"values": poles.values, "inputs": poles.inputs, "outputs": poles.outputs}
-    cache.store(name, asdict(effort), **arrays, load=load, points=points)
-    return Prepared(probes=probes, poles=poles, load=load, points=points, effort=effort)
+    cache.store(name, asdict(effort), **asdict(poles), **arrays)
+    return Prepared(probes=probes, poles=poles, effort=effort, **arrays)
 
 
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
@@ -131,7 +135,9 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         progress("lines", 0.0)
     with clock("lines"):
         frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
-        lines, start = fem.line_response(prepared.poles, forces, frequencies)
+        motion, start = fem.line_response(prepared.poles, forces, frequencies)
+        energy = checked_energy(fem.power_imbalance(prepared.damping, forces, motion, frequencies))
+        lines, start = motion @ prepared.read.T, start @ prepared.read.T
         strength = np.abs(lines).max(axis=1)
         heard = strength > NEGLIGIBLE_LINE * strength.max()
         rates = np.concatenate([2j * np.pi * frequencies[heard], prepared.poles.values])
@@ -140,6 +146,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         prepared.effort,
         seconds={**prepared.effort.seconds, **clock.seconds},
         steps=int(heard.sum()),
+        energy_imbalance=energy,
         peak_memory=peak_memory(),
     )
     return Response(

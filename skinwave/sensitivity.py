@@ -47,7 +47,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
         """Steady state and start (t, p) where all natural frequencies are higher by this much."""
         higher = np.asarray(values * (1 + moved), np.complex128)
         poles = replace(coarse.poles, values=higher)
-        lines, start = fem.line_response(poles, forces, frequencies)
+        lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
         return (
             fem.exponential_sum(np.asarray(2j * np.pi * frequencies), lines, times),
             fem.exponential_sum(higher, start, times),

@@ -149,7 +149,15 @@ def _write_page(
     shown = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
     overview = overview_figure(shown, min(2, len(runs[0].scene.probes) - 1))
     shown_first = _picture(folder, "overview", overview, OVERVIEW_CAPTION)
-    efforts = {body: p.effort for body, p in prepared.items()}
+    efforts = {
+        body: replace(
+            p.effort,
+            energy_imbalance=max(
+                r.response.effort.energy_imbalance for r in runs if r.body == body
+            ),
+        )
+        for body, p in prepared.items()
+    }
     parts = [
         *_introduction(outcome, groups),
         shown_first,

@@ -14,6 +14,7 @@ from fem import linear_solver
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import build as build_body
 from skinwave.field import field
+from skinwave.full import checked_energy
 from skinwave.paper15 import scenes
 from skinwave.prepared import prepare, reduced_lines
 from skinwave.simulation import simulate
@@ -290,3 +291,27 @@ def test_preparing_says_what_it_cost(monkeypatch):
     assert prepared.effort.dofs > 1000
     assert prepared.effort.peak_memory > 1e7
     assert 0 < prepared.effort.estimate <= 1e-3
+
+
+@pytest.mark.parametrize("model", ["fem", "fem-harmonic", "fem-transient"])
+def test_every_element_answer_accounts_for_its_energy(model):
+    path = Trajectory(shape="circle", size=0.01, speed=6.0)
+    scene = skinwave.Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.02, trajectory=path)),
+        body=skinwave.Body(width=0.04, height=0.04, depth=0.01),
+        probes=((0.0, 0.0),),
+    )
+    assert 0 < simulate(scene, model, h=0.008).effort.energy_imbalance < 1e-9
+
+
+def test_an_answer_that_makes_energy_is_refused():
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.006)
+    ops = fem.assemble(mesh, fem.PRESETS["palm"])
+    push = fem.load_operator(mesh) @ np.ones(fem.load_operator(mesh).shape[1])
+    states = list(islice(fem.transient(ops, lambda t: push, 1e-4), 50))
+    *_, (state, spent) = fem.audited(ops, iter(states), lambda t: push)
+    assert fem.imbalance(ops, state, spent) < 1e-9
+    *_, (state, spent) = fem.audited(ops, iter(states), lambda t: 1.1 * push)
+    assert 0.05 < fem.imbalance(ops, state, spent) < 0.15
+    with pytest.raises(ArithmeticError, match="energy balance is off by 9"):
+        checked_energy(fem.imbalance(ops, state, spent))
