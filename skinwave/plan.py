@@ -157,6 +157,7 @@ def _with_elements(
             "fem-harmonic, which leaves out how the motion starts,", start_error, tolerance,
             "use fem",
         ),
+        *_under_resolved(h or size, spot_width(scene.pressure.height)),
     )  # fmt: skip
     size = h or size
     dofs = 3 * float(np.prod([2 * n + 1 for n in cells(body, size, symmetry)]))
@@ -211,6 +212,15 @@ def _why_elements(scene: Scene) -> str:
     if scene.pressure.focus != "gaussian":
         return f"exact waves need a Gaussian focus, not '{scene.pressure.focus}'"
     return f"the {body.sides} sides of this {body.kind} reflect; exact waves are endless"
+
+
+def _under_resolved(h: float, width: float) -> tuple[str, ...]:
+    if h <= 2 * width:
+        return ()
+    return (
+        f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focus, "
+        f"{1e3 * width:.2g} mm: they keep its force but not its shape; make them smaller",
+    )
 
 
 def _symmetry(scene: Scene) -> str:

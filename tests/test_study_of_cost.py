@@ -111,6 +111,7 @@ def test_what_breaks_the_tolerance_is_said_with_its_number():
         ({"model": "point-kernel"}, "the point kernel will be wrong by about"),
         ({"model": "flat-body"}, "which lets no wave return from the sides"),
         ({"h": 0.005}, "elements of 5 mm will be wrong by about"),
+        ({"h": 0.01}, "keep its force but not its shape"),
         ({"model": "fem-transient", "dt": 1e-3}, "a time step of 1 ms will be wrong by about"),
         ({"model": "fem-harmonic"}, "leaves out how the motion starts"),
     ]:

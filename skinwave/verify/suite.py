@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from skinwave.effort import Progress, versions
-from skinwave.verify import elements, exact, plates, statics, stepping, waves
+from skinwave.verify import elements, exact, extremes, plates, statics, stepping, waves
 from skinwave.verify import manufactured as fields
 from skinwave.verify.case import Case, Check, Entry, Result
 from skinwave.verify.page import page
@@ -19,7 +19,7 @@ from skinwave.verify.page import page
 def suite() -> tuple[Entry, ...]:
     """Every case, in the order of the page."""
     return (
-        *_elements(), *_statics(), *_plates(), *_waves(), *_exact(), *_stepping(),
+        *_elements(), *_statics(), *_plates(), *_waves(), *_exact(), *_stepping(), *_extremes(),
     )  # fmt: skip
 
 
@@ -109,6 +109,16 @@ def _stepping() -> Iterable[Entry]:
     yield Entry(name="extreme-steps", topic=topic, run=stepping.extreme_steps)
     yield Entry(name="kelvin-voigt", topic=topic, run=stepping.columns)
     yield Entry(name="units", topic=topic, run=stepping.units)
+
+
+def _extremes() -> Iterable[Entry]:
+    topic = "The load at its extremes"
+    yield Entry(name="focus-speeds", topic=topic, run=extremes.focus_speeds)
+    yield Entry(name="modulation-frequencies", topic=topic, run=extremes.modulation_frequencies)
+    yield Entry(name="narrow-focus", topic=topic, run=extremes.narrow_focus)
+    yield Entry(name="degenerate-paths", topic=topic, run=extremes.degenerate_paths)
+    yield Entry(name="durations", topic=topic, run=extremes.durations)
+    yield Entry(name="sampling", topic=topic, run=extremes.sampling)
 
 
 def run_suite(
