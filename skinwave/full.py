@@ -16,6 +16,7 @@ from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.scene import Body, Scene
 
 MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
+CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
 
 
@@ -37,17 +38,17 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
         )
 
 
-def checked_energy(imbalance: float) -> float:
+def checked_energy(imbalance: float, when: str = "") -> float:
     """The imbalance, if it is small enough to trust an answer.
 
     Raises
     ------
-    ArithmeticError
+    Diverged
         If it is not.
     """
     if not imbalance <= MOST_IMBALANCE:
-        raise ArithmeticError(
-            f"the energy balance is off by {100 * imbalance:.2g} %, above the limit of "
+        raise fem.Diverged(
+            f"the energy balance is off by {100 * imbalance:.2g} %{when}, above the limit of "
             f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
         )
     return imbalance
@@ -83,8 +84,10 @@ def transient_answer(
         for k, (state, spent) in enumerate(audited):
             stepped[k] = S @ state.displacement
             report("march", k / steps)
-            if k == steps:
-                energy = checked_energy(fem.imbalance(operators, state, spent))
+            if k % CHECKED_EACH == 0 or k == steps:
+                energy = checked_energy(
+                    fem.imbalance(operators, state, spent), f" at t = {state.time:g} s, step {k}"
+                )
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
     return _response(

@@ -1,6 +1,7 @@
 """Every solver gives the same answer, and the reduced model gives the large one's."""
 
 import sys
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -313,5 +314,26 @@ def test_an_answer_that_makes_energy_is_refused():
     assert fem.imbalance(ops, state, spent) < 1e-9
     *_, (state, spent) = fem.audited(ops, iter(states), lambda t: 1.1 * push)
     assert 0.05 < fem.imbalance(ops, state, spent) < 0.15
-    with pytest.raises(ArithmeticError, match="energy balance is off by 9"):
+    with pytest.raises(fem.Diverged, match="energy balance is off by 9"):
         checked_energy(fem.imbalance(ops, state, spent))
+
+
+def test_a_march_that_blows_up_stops_within_a_few_steps(monkeypatch):
+    """Displacements that double at every step stand for whatever makes energy."""
+    scene = skinwave.Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.2)),
+        body=skinwave.Body(width=0.04, height=0.04, depth=0.01),
+        probes=((0.0, 0.0),),
+    )
+    marched = fem.transient
+    steps = []
+
+    def exploding(operators, force, dt, **knobs):
+        for k, state in enumerate(marched(operators, force, dt, **knobs)):
+            steps.append(k)
+            yield replace(state, displacement=state.displacement * 2.0 ** max(0, k - 60))
+
+    monkeypatch.setattr("skinwave.full.fem.transient", exploding)
+    with pytest.raises(fem.Diverged, match=r"at t = 0.005 s, step 100, above the limit of 1 %"):
+        simulate(scene, "fem-transient", h=0.008)
+    assert steps[-1] < 102
