@@ -17,6 +17,8 @@ _HOMES = {
     "loads": "scene_file",
     "dumps": "scene_file",
     "simulate": "simulation",
+    "Field": "motion",
+    "field": "motion",
     "Agreement": "comparison",
     "compare": "comparison",
 }

@@ -14,8 +14,8 @@ import skinwave
 from fem import linear_solver
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import build as build_body
-from skinwave.field import field
 from skinwave.full import checked_energy
+from skinwave.motion import field
 from skinwave.paper15 import scenes
 from skinwave.prepared import prepare, reduced_lines
 from skinwave.simulation import simulate
