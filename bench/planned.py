@@ -19,7 +19,7 @@ from skinwave.bodies import default_size
 from skinwave.scene import Body, Scene
 from skinwave.simulation import simulate
 
-FINEST = (0.75, 0.65)  # of the default element size
+FINEST = 0.7  # of the default element size
 RUNGS = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
 
@@ -28,7 +28,7 @@ def scene(seed: int) -> tuple[Scene, float]:
     """A random scene, and the tolerance that is asked of it."""
     pick = np.random.default_rng(seed)
     shape = pick.choice(["point", "line", "circle", "square"])
-    size = float(pick.uniform(8e-3, 24e-3))
+    size = float(pick.uniform(6e-3, 20e-3))
     path = Trajectory(shape=str(shape), size=size, speed=float(pick.uniform(4, 14)))
     am = float(pick.choice([0.0, pick.uniform(60, 240)]))
     tacton = Tacton(am_frequency=am if shape != "point" else max(am, 80.0), duration=0.3,
@@ -47,11 +47,11 @@ def scene(seed: int) -> tuple[Scene, float]:
             viscosity=float(pick.uniform(3, 10)),
         )  # fmt: skip
         body = Body(
-            kind="slab", material=skin, width=0.07, height=0.07,
+            kind="slab", material=skin, width=0.05, height=0.05,
             depth=float(pick.uniform(8e-3, 15e-3)),
             sides=str(pick.choice(["absorbing", "clamped", "free"])),
         )  # fmt: skip
-    probes = tuple((float(x), 0.0) for x in (0.0, 0.006, 0.014))
+    probes = tuple((float(x), 0.0) for x in (0.0, 0.005, 0.010))
     pressure = MovingPressure(tacton=tacton)
     found = Scene(name=f"random {seed}", pressure=pressure, body=body, probes=probes)
     return found, float(pick.choice(TOLERANCES))
@@ -77,8 +77,7 @@ def judge(seed: int) -> bool:
     far = asked
     if body.sides == "absorbing":
         far = replace(asked, body=replace(body, width=2 * body.width, height=2 * body.height))
-    coarser, reference = (simulate(far, "fem", h=factor * h) for factor in FINEST)
-    own = error(coarser, reference)
+    reference = simulate(far, "fem", h=FINEST * h)
     planned, seconds = timed(asked, "auto", tolerance=tolerance)
     wrong = error(planned, reference)
     good = []
@@ -95,7 +94,7 @@ def judge(seed: int) -> bool:
     shape, am = asked.tacton.trajectory.shape, asked.tacton.am_frequency
     print(
         f"{seed:>3} {body.kind:<6}{body.sides:<10} {shape:<7}{am:5.0f} Hz"
-        f" {100 * tolerance:5.0f} % {100 * wrong:7.2f} % (+-{100 * own:.2f})  {planned.model:<10}"
+        f" {100 * tolerance:5.0f} % {100 * wrong:7.2f} %  {planned.model:<10}"
         f"{seconds:6.1f} s  {name:<16}{cost:6.1f} s {seconds / cost:6.1f}",
         flush=True,
     )
@@ -105,7 +104,7 @@ def judge(seed: int) -> bool:
 if __name__ == "__main__":
     os.environ["SKINWAVE_CACHE"] = ""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
-    print("    body             path       f_AM  asked   error (reference)   planned            "
+    print("    body             path       f_AM  asked   error   planned            "
           "cheapest good enough   ratio")  # fmt: skip
     held = np.array([judge(seed) for seed in range(count)])
     print(f"{held[:, 0].sum()} of {count} within the tolerance, {held[:, 1].sum()} of {count} at "

@@ -13,7 +13,6 @@ from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
 from skinwave.scene import Body
 
 SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
-SLAB_GRADING = Grading(radius=30e-3, growth=1.25, coarsest=6e-3)
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m: the palm-sized paths; cells; of h
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per

@@ -1,0 +1,328 @@
+"""What a user of each code does with a `Problem`: assemble K and M, and factorise M + c K.
+
+Nothing else of a code is needed to step in time, so that all share one loop. Loads and probes are
+those of the mesh's nodes, carried over by `to_nodes`; only assembly and factorisation differ.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu, spsolve
+from scipy.spatial import cKDTree
+
+from bench.problem import Problem
+
+Solve = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass
+class Assembled:
+    """`K` and `M` multiply vectors of the code's own unknowns by `@`.
+
+    `to_nodes` (3 n, unknowns) gives the displacement of the nodes, component fastest;
+    `factorise(c, free)` solves with M + c K on the free unknowns and leaves 0 on the others.
+    """
+
+    seconds: float
+    K: Any
+    M: Any
+    to_nodes: sparse.csr_array
+    factorise: Callable[[float, np.ndarray], Solve]
+
+    def check(self, nodes: np.ndarray) -> tuple[float, float]:
+        """Strain energy in J of u = (x^2, x y, 0), and mass in kg: the same for all codes."""
+        x, y, _ = nodes.T
+        bent, moved = np.zeros((2, *nodes.shape))
+        bent[:, 0], bent[:, 1], moved[:, 0] = x * x, x * y, 1
+        transfer = sparse.csc_matrix(self.to_nodes)  # spsolve wants its old kind of matrix
+        u, one = (spsolve(transfer, values.ravel()) for values in (bent, moved))
+        return float(u @ (self.K @ u) / 2), float(one @ (self.M @ one))
+
+
+def skinwave(p: Problem) -> Assembled:
+    import fem
+    import meshes
+
+    mesh = meshes.TetMesh(points=p.nodes, tets=p.cells)
+    material = fem.Material(density=p.rho, shear_modulus=p.mu, poisson=p.nu)
+    started = time.perf_counter()
+    ops = fem.assemble(mesh, material, fixed=np.zeros(mesh.points.shape, bool))
+    seconds = time.perf_counter() - started
+    return _scipy(seconds, ops.K, ops.M, np.arange(mesh.n_dofs), lambda A: fem.factorise(A).solve)
+
+
+def scikit_fem(p: Problem) -> Assembled:
+    from skfem import Basis, BilinearForm, ElementTetP2, ElementVector, MeshTet
+    from skfem.helpers import ddot, dot, eye, sym_grad, trace
+
+    mesh = MeshTet(np.ascontiguousarray(p.points.T), np.ascontiguousarray(p.tets.T))
+
+    @BilinearForm
+    def stiffness(u: Any, v: Any, w: Any) -> Any:
+        e = sym_grad(u)
+        return ddot(2 * p.mu * e + p.lam * eye(trace(e), 3), sym_grad(v))
+
+    @BilinearForm
+    def mass(u: Any, v: Any, w: Any) -> Any:
+        return p.rho * dot(u, v)
+
+    started = time.perf_counter()
+    basis = Basis(mesh, ElementVector(ElementTetP2()), intorder=2)
+    K = stiffness.assemble(basis)
+    M = mass.assemble(Basis(mesh, basis.elem, intorder=4))
+    seconds = time.perf_counter() - started
+    component = np.empty(K.shape[0], int)
+    for i in range(3):
+        component[basis.nodal_dofs[i]] = component[basis.edge_dofs[i]] = i
+    # Its example 19 steps in time with SciPy's splu as it is.
+    return _scipy(seconds, K, M, 3 * _matched(basis.doflocs.T, p.nodes) + component, _superlu)
+
+
+def ngsolve(p: Problem) -> Assembled:
+    import ngsolve as ng
+    from netgen.meshing import Element2D, Element3D, FaceDescriptor, MeshPoint, Pnt
+    from netgen.meshing import Mesh as NetgenMesh
+
+    raw = NetgenMesh(dim=3)
+    numbers = [raw.Add(MeshPoint(Pnt(*point))) for point in p.points.tolist()]
+    for tet in p.tets.tolist():
+        raw.Add(Element3D(1, [numbers[i] for i in tet]))
+    raw.Add(FaceDescriptor(surfnr=1, domin=1, bc=1))
+    for face in p.surface.tolist():
+        raw.Add(Element2D(1, [numbers[i] for i in face]))
+    mesh = ng.Mesh(raw)
+    started = time.perf_counter()
+    space = ng.VectorH1(mesh, order=2)
+    u, v = space.TnT()
+
+    def strain(w: Any) -> Any:
+        return ng.Sym(ng.Grad(w))
+
+    elastic = 2 * p.mu * ng.InnerProduct(strain(u), strain(v)) + p.lam * ng.div(u) * ng.div(v)
+    with ng.TaskManager():
+        K = ng.BilinearForm(elastic * ng.dx).Assemble()
+        M = ng.BilinearForm(p.rho * u * v * ng.dx).Assemble()
+    seconds = time.perf_counter() - started
+
+    def factorise(c: float, free: np.ndarray) -> Solve:
+        A = M.mat.CreateMatrix()
+        A.AsVector().data = M.mat.AsVector() + c * K.mat.AsVector()
+        return _of_arrays(A.Inverse(ng.BitArray(free.tolist()), inverse="sparsecholesky"))
+
+    class Product:
+        def __init__(self, matrix: Any) -> None:
+            self._of = _of_arrays(matrix)
+
+        def __matmul__(self, x: np.ndarray) -> np.ndarray:
+            return self._of(x)
+
+    products = (Product(matrix.mat) for matrix in (K, M))
+    return Assembled(seconds, *products, _from_hierarchical(p, mesh), factorise)
+
+
+def _of_arrays(operator: Any) -> Solve:
+    """An operator of NGSolve on numpy arrays; the copies are a few thousandths of its work."""
+    x, y = operator.CreateColVector(), operator.CreateRowVector()
+
+    def apply(values: np.ndarray) -> np.ndarray:
+        x.FV().NumPy()[:] = values
+        y.data = operator * x
+        return y.FV().NumPy().copy()
+
+    return apply
+
+
+def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
+    """Nodal values of NGSolve's unknowns: values at corners, then one bubble for each edge."""
+    import ngsolve as ng
+
+    ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
+    middles = (p.points[ends[:, 0]] + p.points[ends[:, 1]]) / 2
+    node, corners, edges = _matched(middles, p.nodes), len(p.points), len(ends)
+    bubble = ng.GridFunction(ng.H1(mesh, order=2))
+    bubble.vec[corners] = 1
+    height = bubble(mesh(*middles[0]))
+    rows = np.concatenate([np.arange(corners), node, node, node])
+    columns = np.concatenate([np.arange(corners), *ends.T, corners + np.arange(edges)])
+    values = np.concatenate([np.ones(corners), np.full(2 * edges, 0.5), np.full(edges, height)])
+    scalar = sparse.csr_array((values, (rows, columns)), shape=(len(p.nodes), corners + edges))
+    # Unknowns are ordered component by component, ours node by node.
+    by_component = sparse.csr_array(sparse.kron(np.eye(3), scalar))
+    return by_component[np.arange(3 * len(p.nodes)).reshape(3, -1).T.ravel()]
+
+
+def felupe(p: Problem) -> Assembled:
+    import felupe as fe
+
+    mesh = fe.Mesh(p.nodes, p.cells, "tetra10")
+    started = time.perf_counter()
+    region = fe.RegionQuadraticTetra(mesh)
+    field = fe.FieldContainer([fe.Field(region, dim=3)])
+    umat = fe.LinearElastic(E=2 * p.mu * (1 + p.nu), nu=p.nu)
+    K = fe.SolidBody(umat, field).assemble.matrix()
+    fine = fe.RegionQuadraticTetra(mesh, quadrature=fe.quadrature.Tetrahedron(order=5))
+    heavy = fe.FieldContainer([fe.Field(fine, dim=3)])
+    M = fe.SolidBody(umat, heavy, density=p.rho).assemble.mass()
+    seconds = time.perf_counter() - started
+    # Its Newton solver calls SciPy's spsolve, which is splu for a single right-hand side.
+    return _scipy(seconds, K, M, np.arange(K.shape[0]), _superlu)
+
+
+def sfepy(p: Problem) -> Assembled:
+    from sfepy.base.base import Struct, output
+    from sfepy.discrete import FieldVariable, Integral, Material
+    from sfepy.discrete.fem import FEDomain, Field, Mesh
+    from sfepy.mechanics.matcoefs import stiffness_from_lame
+    from sfepy.solvers import Solver
+    from sfepy.terms import Term
+
+    output.set_output(quiet=True)
+    cells = [np.asarray(p.tets, np.int32)]
+    mesh = Mesh.from_data("body", p.points, None, cells, [np.zeros(len(p.tets), np.int32)], ["3_4"])
+    domain = FEDomain("domain", mesh)
+    omega = domain.create_region("Omega", "all")
+    started = time.perf_counter()
+    space = Field.from_args("u", np.float64, "vector", omega, approx_order=2)
+    u = FieldVariable("u", "unknown", space)
+    v = FieldVariable("v", "test", space, primary_var_name="u")
+    m = Material("m", D=stiffness_from_lame(3, p.lam, p.mu), rho=p.rho)
+    elastic = Term.new("dw_lin_elastic(m.D, v, u)", Integral("i", 2), omega, m=m, v=v, u=u)
+    inertia = Term.new("dw_dot(m.rho, v, u)", Integral("j", 4), omega, m=m, v=v, u=u)
+    matrices = []
+    for term in (elastic, inertia):
+        term.setup()
+        matrices.append(_sfepy_matrix(term, u))
+    seconds = time.perf_counter() - started
+
+    def factorised(A: Any) -> Solve:
+        # As its example of elastodynamics does: factorised once, kept for all steps.
+        conf = Struct(name="ls", kind="ls.auto_direct", use_presolve=True, use_mtx_digest=False)
+        solver = Solver.any_from_conf(conf)
+        solver.presolve(A, use_mtx_digest=False)
+        return lambda b: solver(b, mtx=A)
+
+    nodes = _matched(space.get_coor(), p.nodes)
+    return _scipy(seconds, *matrices, (3 * nodes[:, None] + np.arange(3)).ravel(), factorised)
+
+
+def _sfepy_matrix(term: Any, u: Any) -> Any:
+    blocks, _ = term.evaluate(mode="weak", diff_var="u", standalone=True, asm_obj=None)
+    econn = u.field.econn
+    n, a = len(econn), econn.shape[1]
+    # Element matrices are ordered component by component.
+    dofs = (3 * econn[:, None, :] + np.arange(3)[None, :, None]).reshape(n, 3 * a)
+    rows = np.repeat(dofs, 3 * a, axis=1).ravel()
+    columns = np.tile(dofs, (1, 3 * a)).ravel()
+    size = 3 * u.field.n_nod
+    return sparse.coo_array((np.ravel(blocks), (rows, columns)), shape=(size, size)).tocsr()
+
+
+def dolfinx(p: Problem) -> Assembled:
+    """Version 0.5, which is what Debian 12 has; its names have changed since."""
+    import ufl
+    from dolfinx import fem, mesh
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    coordinates = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.tetrahedron, 1))
+    body = mesh.create_mesh(MPI.COMM_SELF, p.tets, p.points, coordinates)
+    started = time.perf_counter()
+    space = fem.VectorFunctionSpace(body, ("Lagrange", 2))
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+
+    def strain(w: Any) -> Any:
+        return ufl.sym(ufl.grad(w))
+
+    # Constants, so that the compiled forms serve every material.
+    mu, lam, rho = (fem.Constant(body, value) for value in (p.mu, p.lam, p.rho))
+    elastic = 2 * mu * ufl.inner(strain(u), strain(v)) + lam * ufl.div(u) * ufl.div(v)
+    K, M = (
+        fem.petsc.assemble_matrix(fem.form(term * ufl.dx))
+        for term in (elastic, rho * ufl.inner(u, v))
+    )
+    K.assemble()
+    M.assemble()
+    seconds = time.perf_counter() - started
+
+    def factorise(c: float, free: np.ndarray) -> Solve:
+        A = M.copy()
+        A.axpy(c, K, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        A.zeroRowsColumns(np.flatnonzero(~free).astype(np.int32))
+        A.setOption(PETSc.Mat.Option.SPD, True)
+        solver = PETSc.KSP().create(MPI.COMM_SELF)
+        solver.setOperators(A)
+        solver.setType("preonly")
+        solver.getPC().setType("cholesky")
+        solver.getPC().setFactorSolverType("mumps")
+        solver.setUp()
+        x = A.createVecRight()
+
+        def solve(b: np.ndarray) -> np.ndarray:
+            solver.solve(PETSc.Vec().createWithArray(np.where(free, b, 0)), x)
+            return x.array.copy()
+
+        return solve
+
+    nodes = _matched(space.tabulate_dof_coordinates(), p.nodes)
+    numbers = (3 * nodes[:, None] + np.arange(3)).ravel()
+    plain = (sparse.csr_array(A.getValuesCSR()[::-1], shape=A.getSize()) for A in (K, M))
+    return Assembled(seconds, *plain, _renumbered(numbers), factorise)
+
+
+def _scipy(
+    seconds: float, K: Any, M: Any, numbers: np.ndarray, factorised: Callable[[Any], Solve]
+) -> Assembled:
+    """Matrices of SciPy; unknown i is the mesh's component `numbers[i]`."""
+
+    def factorise(c: float, free: np.ndarray) -> Solve:
+        kept = np.flatnonzero(free)
+        solve = factorised(sparse.csr_array(M + c * K)[kept][:, kept])
+
+        def on_all(b: np.ndarray) -> np.ndarray:
+            x = np.zeros(len(b))
+            x[kept] = solve(b[kept])
+            return x
+
+        return on_all
+
+    return Assembled(seconds, K, M, _renumbered(numbers), factorise)
+
+
+def _superlu(A: Any) -> Solve:
+    return splu(A.tocsc()).solve
+
+
+def _renumbered(numbers: np.ndarray) -> sparse.csr_array:
+    n = len(numbers)
+    return sparse.csr_array((np.ones(n), (numbers, np.arange(n))), shape=(n, n))
+
+
+def _matched(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Number of the node at each point."""
+    distance, number = cKDTree(nodes).query(points)
+    if distance.max() > 1e-9:
+        raise ValueError(f"a point lies {distance.max():g} m from every node")
+    return number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Code:
+    """How a code is called, by which name it is installed, and the solver it steps with."""
+
+    assemble: Callable[[Problem], Assembled]
+    package: str
+    solver: str
+
+
+CODES = {
+    "skinwave": Code(assemble=skinwave, package="skinwave", solver="fem.factorise"),
+    "scikit-fem": Code(assemble=scikit_fem, package="scikit-fem", solver="SuperLU (scipy splu)"),
+    "ngsolve": Code(assemble=ngsolve, package="ngsolve", solver="sparsecholesky"),
+    "felupe": Code(assemble=felupe, package="felupe", solver="SuperLU (scipy splu)"),
+    "sfepy": Code(assemble=sfepy, package="sfepy", solver="SuperLU (auto_direct)"),
+    "dolfinx": Code(assemble=dolfinx, package="fenics-dolfinx", solver="MUMPS Cholesky (PETSc)"),
+}
