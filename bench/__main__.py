@@ -16,7 +16,7 @@ def main() -> None:
     parser.add_argument("tables", nargs="*", metavar="TABLE", help=", ".join(TABLES))
     parser.add_argument("--across", type=int, default=40, help="cells across, of assembly")
     parser.add_argument(
-        "--h", type=float, default=5.0, help="mm, elements of waves: 5 is 25 k unknowns, 2.9 89 k"
+        "--h", type=float, default=4.7, help="mm, elements of waves: 4.7 is 30 k unknowns, 2.9 89 k"
     )
     asked = parser.parse_args()
     if unknown := set(asked.tables) - set(TABLES):

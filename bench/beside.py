@@ -22,13 +22,14 @@ import meshes
 from bench import codes
 from bench.child import march
 from bench.codes import CODES
-from bench.own import reduced, slab_mesh
 from bench.problem import Problem
 from skinwave import paper15
-from skinwave.prepared import Prepared, answer, sample_times
+from skinwave.bodies import build
+from skinwave.prepared import answer, prepare, sample_times
 from skinwave.scene import PROBES, Body, Scene
 
 SKIN = replace(fem.PRESETS["palm"], poisson=0.45)
+BODY = Body(material=SKIN, sides="free")
 TACTON = "am140-stm20"
 SMALL = 9e-3  # m, elements of the small mesh, on which waveforms are compared
 SHORT = 0.1  # s of those waveforms
@@ -100,13 +101,12 @@ unknowns, to skinwave's steps and to its reduced model"""
 
 
 def ours(h: float) -> tuple[float, float]:
-    """Seconds of the first Tacton and of all fifteen, from the mesh on."""
-    mesh = slab_mesh(h)
+    """Seconds of the first Tacton and of all fifteen, meshing included."""
     scenes = {name: scene_of(tacton) for name, tacton in paper15.tactons()}
     first, every = [], []
     for _ in range(2):
         started = time.perf_counter()
-        prepared = cold(mesh)
+        prepared = prepare(BODY, np.array(PROBES), h=h)
         ready = time.perf_counter() - started
         seconds = {}
         for name, scene in scenes.items():
@@ -116,10 +116,6 @@ def ours(h: float) -> tuple[float, float]:
         first.append(ready + seconds[TACTON])
         every.append(ready + sum(seconds.values()))
     return min(first), min(every)
-
-
-def cold(mesh: meshes.TetMesh) -> Prepared:
-    return reduced(mesh, fem.assemble(mesh, SKIN, fixed="bottom"))
 
 
 def slowest_rate() -> int:
@@ -141,7 +137,7 @@ def slowest_rate() -> int:
 
 def reduced_waveform() -> np.ndarray:
     scene = scene_of(replace(the_tacton(), duration=SHORT))
-    return answer(cold(slab_mesh(SMALL)), scene).displacement
+    return answer(prepare(BODY, np.array(PROBES), h=SMALL), scene).displacement
 
 
 def the_tacton() -> paper15.Tacton:
@@ -172,7 +168,7 @@ def block(across: int) -> Problem:
 
 def problem(h: float, rate: int, seconds: float) -> Problem:
     """The skin slab under the Tacton, in `rate` steps a second."""
-    mesh, times = slab_mesh(h), np.arange(round(seconds * rate) + 1) / rate
+    mesh, times = build(BODY, h).mesh, np.arange(round(seconds * rate) + 1) / rate
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)
     pushed = np.flatnonzero(abs(P).sum(axis=1) > 0)
     fixed = np.zeros(mesh.points.shape, bool)

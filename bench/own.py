@@ -8,43 +8,16 @@ from unittest import mock
 import numpy as np
 
 import fem
-import meshes
-from simple_model import Effort, point_kernel
+from simple_model import point_kernel
 from skinwave import paper15
+from skinwave.bodies import build
 from skinwave.effort import Clock, peak_memory, silent
 from skinwave.full import TRANSIENT_RATE, assembled, meshed
-from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared, answer, prepare, typical_spots
+from skinwave.prepared import answer, prepare
 from skinwave.scene import PROBES, Body
 
-SIZES = (9e-3, 5e-3, 3.5e-3, 2.7e-3, 1.8e-3, 1.35e-3)  # m, of elements: 10 k to 500 k unknowns
+SIZES = (7e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.4e-3)  # m, of elements: 10 k to 500 k unknowns
 MOST_MEMORY = 12 * 2**30  # bytes
-
-
-def slab_mesh(h: float) -> meshes.TetMesh:
-    """The default skin slab, fine where the focus travels."""
-    grading = meshes.Grading(radius=0.03, growth=1.25, coarsest=0.006)
-    return meshes.block((0.1, 0.1, 0.015), h, grading=grading)
-
-
-def reduced(mesh: meshes.TetMesh, ops: fem.Operators) -> Prepared:
-    """The body ready to answer any Tacton at the probes, as the product prepares it."""
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
-    model = fem.reduce(
-        ops,
-        fem.probe_operator(mesh, PROBES),
-        BAND,
-        REDUCTION_TOLERANCE,
-        loads=P @ typical_spots(Body(), points),
-    )
-    return Prepared(
-        probes=np.array(PROBES),
-        poles=fem.poles(model, outputs=np.eye(len(model.K))),
-        damping=model.C,
-        read=model.outputs,
-        load=P.T @ model.basis,
-        points=points,
-        effort=Effort(),
-    )
 
 
 def growth() -> None:
@@ -55,13 +28,13 @@ def growth() -> None:
     sizes, costs = [], []
     before = peak_memory()
     for h in SIZES:
-        mesh = slab_mesh(h)
+        mesh = build(Body(), h).mesh
         unknowns = mesh.n_dofs - 3 * len(np.unique(mesh.facets["bottom"]))
         # Memory grows with the power 1.2 at most; a size must fit before it is tried.
         if sizes and before + costs[-1][-1] * (unknowns / sizes[-1]) ** 1.2 > MOST_MEMORY:
             print(f"{unknowns:9,} skipped: more than {MOST_MEMORY / 2**30:.0f} GiB")
             continue
-        assemble, factorise, solves, total = reduction(mesh)
+        assemble, factorise, solves, total = reduction(h)
         sizes.append(unknowns)
         costs.append((total, factorise, peak_memory() - before))
         print(
@@ -76,7 +49,7 @@ def growth() -> None:
     )
 
 
-def reduction(mesh: meshes.TetMesh) -> tuple[float, float, float, float]:
+def reduction(h: float) -> tuple[float, float, float, float]:
     """Seconds to assemble, to factorise, in solves, and in all until the model can answer."""
     spent = {"factorise": 0.0, "solve": 0.0}
 
@@ -92,11 +65,10 @@ def reduction(mesh: meshes.TetMesh) -> tuple[float, float, float, float]:
         return fem.Factor(solve=solve, backend=factor.backend)
 
     started = time.perf_counter()
-    ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
-    assemble = time.perf_counter() - started
     with mock.patch("fem.reduced.factorise", factorise):
-        reduced(mesh, ops)
-    return assemble, spent["factorise"], spent["solve"], time.perf_counter() - started
+        prepared = prepare(Body(), np.array(PROBES), h=h)
+    total = time.perf_counter() - started
+    return prepared.effort.seconds["assemble"], spent["factorise"], spent["solve"], total
 
 
 def models() -> None:

@@ -94,13 +94,14 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _plan(options: argparse.Namespace) -> int:
-    from dataclasses import asdict
+    from dataclasses import asdict, replace
 
     from skinwave.scene_file import read
 
     required = _required(options, read(options.scene))
     if options.json:
-        print(json.dumps(asdict(required)))
+        table = asdict(replace(required, prepared=None))
+        print(json.dumps({key: value for key, value in table.items() if key != "prepared"}))
         return 0
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
     for row in required.rows:

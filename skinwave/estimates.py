@@ -11,13 +11,7 @@ from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
 from skinwave.bodies import compliance
 from skinwave.scene import Scene
-from skinwave.sensitivity import Sensitivity
 
-# Measured on the default bodies over Tactons of the paper, against finer meshes: a sheet's natural
-# frequencies are this much too high at so many cells a side, a slab's waveform this much wrong at
-# this share of the length scale below, when it is as sensitive to its frequencies as those were.
-SHEET_DETUNING, SHEET_MEASURED, SHEET_ORDER = 0.010, 30, 2.2
-SLAB_ERROR, SLAB_SIZE, SLAB_ORDER, SLAB_SENSITIVITY = 0.040, 0.69, 3.3, 5.0
 REFLECTED = 0.3  # of a wave that meets an absorbing side
 FAR = 0.25  # m, beyond which waves are not followed
 
@@ -88,22 +82,6 @@ def waves_returned(
     g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
     return min(1.0, reflected * float(np.sqrt(power[1:].sum(axis=0) / power[0]).max()))
-
-
-def error_of_mesh(
-    scene: Scene, spectrum: tuple[Floats, Floats], h: float, known: Sensitivity
-) -> float:
-    """Expected relative error of the worst probe's waveform with elements of h metre."""
-    body = scene.body
-    if body.kind == "sheet":
-        count = min(body.width, body.height) / h
-        return min(1.0, known.value * SHEET_DETUNING * (SHEET_MEASURED / count) ** SHEET_ORDER)
-    frequencies, shares = spectrum
-    wavelength = body.solid.shear_speed / np.maximum(frequencies, 1.0)
-    scale = np.minimum(spot_width(scene.pressure.height), wavelength / np.pi)
-    of_line = np.minimum(1.0, SLAB_ERROR * (h / (SLAB_SIZE * scale)) ** SLAB_ORDER)
-    error = float(np.sqrt((of_line[:, None] ** 2 * shares).sum(axis=0).max()))
-    return min(1.0, error * max(1.0, known.value / SLAB_SENSITIVITY))
 
 
 def mean_gain(scene: Scene) -> float:

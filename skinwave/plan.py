@@ -1,33 +1,30 @@
 """What a scene requires and no more: model, extent, element size, cost, and a reason for each."""
 
-from dataclasses import dataclass, replace
-from math import ceil
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.flat_body import AIR_DENSITY
 from simple_model.focus import spot_width
-from skinwave.bodies import cells, default_size
+from skinwave.effort import Progress
 from skinwave.estimates import (
     FAR,
     REFLECTED,
-    error_of_mesh,
     highest_line,
     is_flat,
     mean_gain,
     motion_lines,
     waves_returned,
 )
-from skinwave.prepared import BAND, REDUCTION_TOLERANCE
+from skinwave.full import TRANSIENT_RATE
+from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared
+from skinwave.refinement import AIM, ORDER, Refined, refined
 from skinwave.scene import Body, Scene
-from skinwave.sensitivity import Sensitivity, sensitivity
+from skinwave.sensitivity import sensitivity
 
-MESH_SHARE = 0.7  # of the tolerance; the rest is for everything else
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
 KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
-# One reduction at 78 k unknowns on two cores: s and bytes, and how they grow.
-REFERENCE_DOFS, REFERENCE_SECONDS, REFERENCE_BYTES, GROWTH = 78e3, 14.0, 1.0e9, 1.3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +43,8 @@ class Plan:
     `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
     element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
     expected relative `error`; predicted `seconds` and bytes of `memory` of the first answer;
-    a reason for each; and `warnings` of what was asked for and is not enough.
+    a reason for each; `warnings` of what was asked for and is not enough; and the body `prepared`
+    on the mesh that was found.
     """
 
     model: str
@@ -59,6 +57,7 @@ class Plan:
     memory: float = 1e8
     rows: tuple[Row, ...] = ()
     warnings: tuple[str, ...] = ()
+    prepared: Prepared | None = field(default=None, repr=False)
 
 
 def plan(
@@ -68,12 +67,15 @@ def plan(
     model: str | None = None,
     h: float | None = None,
     dt: float | None = None,
+    solver: str = "auto",
+    progress: Progress | None = None,
 ) -> Plan:
     """What answers a scene within a relative error of `tolerance` in its probes' waveforms.
 
     Parameters
     ----------
     model, h, dt : what is decided already: a model's name, element size in metre, time step in s
+    solver, progress : for the meshes that are tried where the scene needs elements
 
     Raises
     ------
@@ -83,6 +85,8 @@ def plan(
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     if scene.body.kind == "none":
+        if model not in (None, "point-kernel"):
+            raise ValueError(f"{model} needs a body; choose a sheet or a slab, or point-kernel")
         row = Row(what="model", value="point-kernel", reason="there is no body to move")
         return Plan(model="point-kernel", body=scene.body, rows=(row,))
     if model == "point-kernel":
@@ -100,12 +104,34 @@ def plan(
     returned = waves_returned(scene, _half_widths(scene.body), highest) if is_flat(scene) else 1.0
     if model == "flat-body" or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, highest, returned, rows)
-    return _with_elements(scene, tolerance, spectrum, rows, model or "fem", h, dt)
+    body, extent = _extent(scene, tolerance, highest)
+    rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *extent]
+    symmetry = _symmetry(scene) if model in (None, "fem") else ""
+    found = refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver, h=h)
+    scene = replace(scene, body=body)
+    step_error, start_error = _march_errors(scene, model, dt)
+    return Plan(
+        model=model or "fem", body=body, symmetry=symmetry, h=found.h, highest=highest,
+        error=found.error + step_error + start_error,
+        seconds=sum(found.prepared.effort.seconds.values()),
+        memory=found.prepared.effort.peak_memory,
+        rows=(*rows, *_element_rows(scene, tolerance, symmetry, found, highest, h)),
+        warnings=(
+            *_exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
+                      f"about {1e3 * _enough(found, tolerance):.2g} mm is"),
+            *_exceeds(f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
+                      "a smaller one is"),
+            *_exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
+                      tolerance, "fem is"),
+            *_under_resolved(found.h, spot_width(scene.pressure.height)),
+        ),
+        prepared=found.prepared,
+    )  # fmt: skip
 
 
 def _kernel(scene: Scene, tolerance: float) -> Plan:
     row = Row(what="model", value="point-kernel", reason="as asked; nothing propagates in it")
-    warning = _exceeds("the point kernel", KERNEL_ERROR, tolerance, "use --model auto")
+    warning = _exceeds("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
     return Plan(
         model="point-kernel", body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning
     )
@@ -118,7 +144,7 @@ def _without_mesh(
     if scene.body.sides != "absorbing":
         reason = f"waves that come back from the sides are {100 * returned:.2g} %: take none"
     warnings = _exceeds(
-        "flat-body, which lets no wave return from the sides,", returned, tolerance, "use fem"
+        "flat-body, which lets no wave return from the sides,", returned, tolerance, "fem is"
     )
     rows = [
         *rows,
@@ -131,42 +157,11 @@ def _without_mesh(
     )  # fmt: skip
 
 
-def _with_elements(
-    scene: Scene, tolerance: float, spectrum: tuple[Floats, Floats], rows: list[Row],
-    model: str, h: float | None, dt: float | None,
-) -> Plan:  # fmt: skip
-    highest = highest_line(*spectrum, tolerance)
-    symmetry = _symmetry(scene)
-    body, extent = _extent(scene, tolerance, highest)
-    scene = replace(scene, body=body)
-    known = sensitivity(scene)
-    size, reason = _element_size(scene, spectrum, MESH_SHARE * tolerance, known)
-    mesh_error = error_of_mesh(scene, spectrum, h or size, known)
-    step_error = known.value * (2 * np.pi * known.frequency * (dt or 0.0)) ** 2 / 12
-    start_error = known.start if model == "fem-harmonic" else 0.0
-    warnings = (
-        *_exceeds(
-            f"elements of {1e3 * (h or size):.3g} mm", mesh_error, tolerance,
-            f"{1e3 * size:.3g} mm are enough",
-        ),
-        *_exceeds(
-            f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
-            f"{1e3 * (dt or 0) * np.sqrt(tolerance / 4 / max(step_error, 1e-12)):.2g} ms is enough",
-        ),
-        *_exceeds(
-            "fem-harmonic, which leaves out how the motion starts,", start_error, tolerance,
-            "use fem",
-        ),
-        *_under_resolved(h or size, spot_width(scene.pressure.height)),
-    )  # fmt: skip
-    size = h or size
-    dofs = 3 * float(np.prod([2 * n + 1 for n in cells(body, size, symmetry)]))
-    seconds = REFERENCE_SECONDS * (dofs / REFERENCE_DOFS) ** GROWTH
-    memory = REFERENCE_BYTES * (dofs / REFERENCE_DOFS) ** GROWTH
-    rows = [
-        *rows,
-        Row(what="model", value=model, reason=_why_elements(scene)),
-        *extent,
+def _element_rows(
+    scene: Scene, tolerance: float, symmetry: str, found: Refined, highest: float, h: float | None
+) -> list[Row]:
+    effort = found.prepared.effort
+    return [
         Row(
             what="symmetry",
             value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[symmetry],
@@ -176,26 +171,36 @@ def _with_elements(
         ),
         Row(
             what="element size",
-            value=f"{1e3 * size:.2f} mm, {dofs:,.0f} unknowns",
-            reason="as asked" if h else reason,
+            value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} unknowns",
+            reason=f"{'as asked' if h else 'refined until good enough'}: {1e3 * found.coarser:.2f} "
+            f"mm differ by so much that an error of {100 * found.error:.2g} % is left",
         ),
         Row(
             what="reduction",
-            value=f"{min(REDUCTION_TOLERANCE, tolerance / 50):.1g} up to {BAND:.0f} Hz",
-            reason="a fiftieth of the tolerance: it costs little",
+            value=f"{effort.reduced_dofs} unknowns, {effort.estimate:.0e} up to {BAND:.0f} Hz",
+            reason=f"asked for {min(REDUCTION_TOLERANCE, tolerance / 50):.1g}: it costs little",
         ),
         *_left_out(scene, highest),
         Row(
             what="cost",
-            value=f"{seconds:.0f} s, {memory / 2**30:.1f} GiB",
-            reason="first answer on two cores; 0.05 s for each further Tacton on the same body",
+            value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
+            reason="the last mesh; 0.05 s for each further Tacton on the same body",
         ),
     ]
-    return Plan(
-        model=model, body=body, symmetry=symmetry, h=size, highest=highest,
-        error=mesh_error + step_error + start_error, seconds=seconds, memory=memory,
-        rows=tuple(rows), warnings=warnings,
-    )  # fmt: skip
+
+
+def _march_errors(scene: Scene, model: str | None, dt: float | None) -> tuple[float, float]:
+    """Expected relative errors of a time step, and of leaving out how the motion starts."""
+    if model not in ("fem-transient", "fem-harmonic"):
+        return 0.0, 0.0
+    known = sensitivity(scene)
+    # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, section 9.1).
+    step = known.value * (2 * np.pi * known.frequency * (dt or 1 / TRANSIENT_RATE)) ** 2 / 12
+    return (min(1.0, step), 0.0) if model == "fem-transient" else (0.0, known.start)
+
+
+def _enough(found: Refined, tolerance: float) -> float:
+    return found.h * (AIM * tolerance / found.error) ** (1 / ORDER)
 
 
 def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
@@ -203,7 +208,7 @@ def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str,
         return ()
     return (
         f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
-        f"{100 * tolerance:g} %; {cure}",
+        f"{100 * tolerance:g} %; {cure} enough",
     )
 
 
@@ -261,22 +266,6 @@ def _extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[
         f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
     )
     return replace(body, width=width, height=height, sides="absorbing"), [row]
-
-
-def _element_size(
-    scene: Scene, spectrum: tuple[Floats, Floats], share: float, known: Sensitivity
-) -> tuple[float, str]:
-    """Element size in metre, and the reason."""
-    body = scene.body
-    sizes = default_size(body) * np.geomspace(3.0, 0.2, 200)
-    enough = [h for h in sizes if error_of_mesh(scene, spectrum, h, known) <= share]
-    size = enough[0] if enough else sizes[-1]
-    law = f"{100 * share:.2g} % by the measured error law; 1 % off in frequency moves the "
-    law += f"waveform by {known.value:.0f} %"
-    if body.kind == "sheet":
-        count = ceil(min(body.width, body.height) / size)
-        return min(body.width, body.height) / count, f"{count:.0f} cells a side: {law}"
-    return min(size, body.depth / 2), law
 
 
 def _left_out(scene: Scene, highest: float) -> list[Row]:

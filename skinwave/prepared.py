@@ -18,6 +18,7 @@ from skinwave.scene import Body, Scene
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
 BAND = 1000.0  # Hz up to which the reduced model must be right
 REDUCTION_TOLERANCE = 1e-3
+POLES, ARRAYS = ("values", "inputs", "outputs"), ("damping", "read", "load", "points")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
 
 
@@ -65,15 +66,17 @@ def prepare(
         mesh.points, mesh.tets, build.material, *ends, probes, BAND, tolerance, versions()
     )
     with clock("read from cache"):
-        if entry := cache.load(name):
-            poles = fem.Poles(**{field: entry[field] for field in ("values", "inputs", "outputs")})
-            arrays = {field: entry[field] for field in ("damping", "read", "load", "points")}
-            effort = Effort(**entry["meta"])
-    if not entry:
+        entry = cache.load(name) or {}
+    if not {*POLES, *ARRAYS, "meta"} <= set(entry):  # none, or that of another version
         report = progress or silent
         return _prepared_anew(body, build, probes, clock, report, solver, tolerance, name)
-    effort = replace(effort, seconds=clock.seconds, peak_memory=peak_memory())
-    return Prepared(probes=probes, poles=poles, effort=effort, **arrays)
+    effort = Effort(**entry["meta"])
+    return Prepared(
+        probes=probes,
+        poles=fem.Poles(**{name: entry[name] for name in POLES}),
+        effort=replace(effort, seconds=clock.seconds, peak_memory=peak_memory()),
+        **{name: entry[name] for name in ARRAYS},
+    )
 
 
 def _prepared_anew(

@@ -50,27 +50,26 @@ def simulate(
     check_knobs(solver, h=h, dt=dt)
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    body, symmetry = scene.body, ""
     if model == "auto" or (model.startswith("fem") and h is None):
-        required = plan(scene, tolerance, model=None if model == "auto" else model, h=h, dt=dt)
-        model, h, body = required.model, required.h, required.body
-        symmetry = required.symmetry if model == "fem" else ""
+        asked = None if model == "auto" else model
+        required = plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
+        if required.model == "fem" and required.prepared:
+            return answer(required.prepared, scene, progress)
+        model, h, scene = required.model, required.h, replace(scene, body=required.body)
     times = sample_times(scene)
     if model == "point-kernel":
         return point_kernel(scene.pressure, scene.probe_points, times)
     if model == "flat-body":
         return flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
     report = progress or silent
-    scene = replace(scene, body=body)
     if model == "fem-transient":
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-harmonic":
         return harmonic_answer(scene, times, report, h=h, solver=solver, threshold=tolerance / 50)
     reduction = min(REDUCTION_TOLERANCE, tolerance / 50)
     prepared = prepare(
-        body, scene.probe_points, report,
-        h=h, solver=solver, tolerance=reduction, symmetry=symmetry,
-    )  # fmt: skip
+        scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction
+    )
     return answer(prepared, scene, report)
 
 
