@@ -12,7 +12,7 @@ from skinwave import paper15, report
 from skinwave.claims import Run, Verdict, evaluate
 from skinwave.effort import Progress, peak_memory
 from skinwave.figures import label, overview_figure, png, tacton_figure
-from skinwave.files import write_claims, write_lines, write_responses, write_run
+from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.prepared import Prepared, answer, prepare
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
@@ -94,8 +94,7 @@ def run_study(
 
 def write_single(folder: Path, run: Run) -> None:
     """The folder of one run, with its page."""
-    folder.rmdir()
-    write_run(folder, run)
+    fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
     parts = [
         report.picture(png(figure), _caption(run.tacton, [run]), "tacton"),
