@@ -156,13 +156,13 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from skinwave.files import output_folder
+    from skinwave.files import folder_name, output_folder
     from skinwave.scene_file import read
     from skinwave.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)
-    scenes = paper_scenes() if scene is None else own_scenes(scene, scene.name)
+    scenes = paper_scenes() if scene is None else own_scenes(scene, folder_name(scene.name))
     out = options.out or Path("paper-15" if paper else f"{Path(options.scene).stem}-compared")
     with output_folder(out, overwrite=options.overwrite) as folder, _progress(options) as progress:
         outcome = run_study(

@@ -4,6 +4,7 @@ import contextlib
 import csv
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,6 +23,7 @@ LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
     "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
 )  # fmt: skip
+RESERVED = ("figures", "overview")  # what a study names itself
 
 
 @contextmanager
@@ -92,6 +94,12 @@ def _remove(aside: Path, above: Iterable[Path]) -> None:
     with contextlib.suppress(OSError):
         for folder in above:
             folder.rmdir()
+
+
+def folder_name(name: str) -> str:
+    """A scene's name as that of a folder: within the one above it, and none that a study has."""
+    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:80]
+    return plain if plain not in ("", *RESERVED) else f"scene_{plain}"
 
 
 def write_run(folder: Path, run: Run) -> None:
