@@ -31,7 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, ArithmeticError, MemoryError, OSError) as error:
         if options.debug:
             raise
-        print(f"skinwave: {' '.join(str(error).split())}", file=sys.stderr)
+        said = " ".join(str(error).split()) or "not enough memory; take larger elements"
+        print(f"skinwave: {said}", file=sys.stderr)
         return 2
 
 
