@@ -139,6 +139,8 @@ def _with_elements(
     symmetry = _symmetry(scene)
     body, extent = _extent(scene, tolerance, highest)
     scene = replace(scene, body=body)
+    if h:
+        cells(body, h)  # refuses what cannot be meshed before anything is computed
     known = sensitivity(scene)
     size, reason = _element_size(scene, spectrum, MESH_SHARE * tolerance, known)
     mesh_error = error_of_mesh(scene, spectrum, h or size, known)
@@ -236,7 +238,7 @@ def _extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[
     cut = half.copy()
     for axis in (0, 1):
         alone = np.where(np.arange(2) == axis, half, FAR)
-        for shorter in np.arange(0.03, 0.8 * half[axis], 0.01):
+        for shorter in np.arange(0.03, min(0.8 * half[axis], FAR), 0.01):
             alone[axis] = shorter
             if waves_returned(scene, alone, highest, REFLECTED) <= tolerance / 10:
                 cut[axis] = shorter
