@@ -19,7 +19,8 @@ from skinwave.estimates import (
     motion_lines,
     waves_returned,
 )
-from skinwave.prepared import BAND, REDUCTION_TOLERANCE
+from skinwave.full import step_count
+from skinwave.prepared import BAND, REDUCTION_TOLERANCE, sample_times
 from skinwave.scene import Body, Scene
 from skinwave.sensitivity import Sensitivity, sensitivity
 
@@ -78,10 +79,12 @@ def plan(
     Raises
     ------
     ValueError
-        If the tolerance is not between 0 and 1.
+        If the tolerance is not between 0 and 1, or h or dt cannot be computed with.
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    if dt is not None:
+        step_count(float(sample_times(scene)[-1]), dt)
     if scene.body.kind == "none":
         row = Row(what="model", value="point-kernel", reason="there is no body to move")
         return Plan(model="point-kernel", body=scene.body, rows=(row,))
