@@ -67,8 +67,8 @@ class TetMesh:
         region = region if region.size else np.zeros(len(tets), np.int64)
         if region.shape != (len(tets),) or region.min() < 0:
             raise MeshError(
-                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per element, "
-                "0 or above"
+                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per "
+                "element, 0 or above"
             )
         facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
@@ -235,7 +235,7 @@ def _oriented(points: Floats, tets: Ints) -> Ints:
     longest = np.linalg.norm(corners[:, :, 1] - corners[:, :, 0], axis=2).max(axis=1)
     flat = np.flatnonzero(np.abs(volume) <= FLATTEST * longest**3)
     if len(flat):
-        worst = flat[np.argmin(np.abs(volume[flat]) / longest[flat] ** 3)]
+        worst = flat[np.argmin(np.abs(volume[flat]) / np.maximum(longest[flat] ** 3, 1e-300))]
         raise MeshError(
             f"{len(flat)} tetrahedra are flat, the worst is {worst} with volume "
             f"{volume[worst]:.3g} m3; remesh or remove them"

@@ -45,10 +45,6 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
     ValueError
         If the body is "none", or would have too many unknowns.
     """
-    if body.kind == "none":
-        raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
-    if not np.isfinite(body.depth):
-        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
     size = _checked(body, h or default_size(body))
     if body.kind == "sheet":
         thickness = max(body.depth, SHEET_THICKNESS * min(body.width, body.height))
@@ -78,7 +74,7 @@ def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
     Raises
     ------
     ValueError
-        If they are larger than the body, or more than can be solved for.
+        If there are none, they are larger than the body or more than can be solved for.
     """
     sides, h = (body.width, body.height), _checked(body, h)
     if body.kind == "sheet":
@@ -93,6 +89,10 @@ def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
 
 
 def _checked(body: Body, h: float) -> float:
+    if body.kind == "none":
+        raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    if not isfinite(body.depth):
+        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
     longest = max(body.width, body.height, body.depth)
     if h > longest:
         raise ValueError(

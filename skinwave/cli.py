@@ -115,7 +115,7 @@ def _required(options: argparse.Namespace, scene: "Scene") -> "Plan":
     from skinwave.simulation import check_knobs
 
     model, h = None if options.model == "auto" else options.model, _metre(options.h)
-    check_knobs("auto", h=h, dt=options.dt)
+    check_knobs(getattr(options, "solver", "auto"), h=h, dt=options.dt)
     required = plan(scene, options.tolerance, model=model, h=h, dt=options.dt)
     for warning in required.warnings:
         print(f"skinwave: warning: {warning}", file=sys.stderr)
@@ -131,11 +131,11 @@ def _run(options: argparse.Namespace) -> int:
     from skinwave.study import write_single
 
     scene = read(options.scene)
-    if options.model != "auto" or options.h or options.dt:
-        _required(options, scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
+        if options.model != "auto" or options.h or options.dt:
+            _required(options, scene)
         with _progress(options) as progress:
             response = simulate(
                 scene, options.model, options.tolerance, progress,

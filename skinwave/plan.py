@@ -79,13 +79,16 @@ def plan(
     Raises
     ------
     ValueError
-        If the tolerance is not between 0 and 1, or h or dt cannot be computed with.
+        If the tolerance is not between 0 and 1, there is no body for the model, or h or dt
+        cannot be computed with.
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     if dt is not None:
         step_count(float(sample_times(scene)[-1]), dt)
     if scene.body.kind == "none":
+        if model not in (None, "point-kernel"):
+            raise ValueError(f"a scene without a body has no {model} answer; use --model auto")
         row = Row(what="model", value="point-kernel", reason="there is no body to move")
         return Plan(model="point-kernel", body=scene.body, rows=(row,))
     if model == "point-kernel":

@@ -9,6 +9,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from skinwave import paper15, report
+from skinwave.bodies import cells, default_size
 from skinwave.claims import Run, Verdict, evaluate
 from skinwave.effort import Progress, peak_memory
 from skinwave.figures import label, overview_figure, png, tacton_figure
@@ -63,6 +64,9 @@ def run_study(
     An interrupt ends the answering early; what is finished is still compared and written.
     """
     check_knobs(solver, h=h)
+    for solid in {s.body for group in scenes.values() for s in group.values()}:
+        if solid.kind != "none":
+            cells(solid, h or default_size(solid))  # refuses what cannot be meshed before any run
     started = time.perf_counter()
     runs: list[Run] = []
     prepared: dict[str, Prepared] = {}
