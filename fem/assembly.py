@@ -76,9 +76,9 @@ def assemble(
     MeshError
         If a facet set is unknown or an element is inverted.
     """
-    materials = _by_region(mesh, material)
+    materials, region = _by_region(mesh, material)
     rho, mu, lam, lag = (
-        np.array([value(m) for m in materials])[mesh.region]
+        np.array([value(m) for m in materials])[region]
         for value in (
             lambda m: m.density,
             lambda m: m.shear_modulus,
@@ -92,9 +92,9 @@ def assemble(
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
-    K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[mesh.region], b[mesh.region] + lag)
+    K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[region], b[region] + lag)
     if absorbing is not None:
-        C = C + _dashpots(mesh, facet_set(mesh, absorbing), materials)
+        C = C + _dashpots(mesh, facet_set(mesh, absorbing), materials, region)
     if len(free) < mesh.n_dofs:
         K, C, M = (operator[free][:, free] for operator in (K, C, M))
     return Operators(K=K, C=C, M=M, free=free, n_dofs=mesh.n_dofs)
@@ -259,15 +259,18 @@ def _from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
     return sparse.csr_array((nodal[source], 3 * pattern.indices[source] + component, indptr))
 
 
-def _by_region(mesh: TetMesh, material: Material | Mapping[int, Material]) -> list[Material]:
-    """Materials such that region number r has material[r]."""
+def _by_region(
+    mesh: TetMesh, material: Material | Mapping[int, Material]
+) -> tuple[list[Material], Ints]:
+    """The materials that there are, and which of them each element (e,) is made of."""
     if isinstance(material, Material):
-        return [material] * (int(mesh.region.max()) + 1)
-    missing = sorted(set(np.unique(mesh.region).tolist()) - set(material))
-    if missing:
+        return [material], np.zeros(len(mesh.tets), np.int64)
+    if not isinstance(material, Mapping):
+        raise ValueError(f"material {material!r} is none; give a Material, or one for each region")
+    numbers, index = np.unique(mesh.region, return_inverse=True)
+    if missing := sorted(set(numbers.tolist()) - set(material)):
         raise ValueError(f"regions {missing} have no material; give one for each region")
-    spare = next(iter(material.values()))
-    return [material.get(r, spare) for r in range(int(mesh.region.max()) + 1)]
+    return [material[r] for r in numbers.tolist()], index
 
 
 def _fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
@@ -288,9 +291,11 @@ def _fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> In
     return mask.ravel()
 
 
-def _dashpots(mesh: TetMesh, nodes: Ints, materials: list[Material]) -> sparse.csr_array:
+def _dashpots(
+    mesh: TetMesh, nodes: Ints, materials: list[Material], region: Ints
+) -> sparse.csr_array:
     """Lysmer-Kuhlemeyer damping (3 n, 3 n) of facets (k, a)."""
-    m = [materials[r] for r in mesh.region[_owners(mesh, nodes)]]
+    m = [materials[r] for r in region[_owners(mesh, nodes)]]
     shear = np.array([x.density * x.shear_speed for x in m])
     squared_ratio = np.array(
         [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]

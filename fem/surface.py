@@ -44,10 +44,15 @@ def probe_operator(
     Raises
     ------
     ValueError
-        If a point lies beside the facets.
+        If a point lies beside the facets, or has no finite coordinates.
     """
     nodes = facet_set(mesh, facets)
-    points = np.atleast_2d(np.asarray(points, np.float64))[:, :2]
+    points = np.atleast_2d(np.asarray(points, np.float64))
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
+        raise ValueError(f"points of shape {points.shape}: give (p, 2 or 3) finite coordinates")
+    if not len(nodes):
+        raise ValueError("there are no facets to read; name a facet set that is not empty")
+    points = points[:, :2]
     owner, barycentric = _locate(mesh.points[nodes[:, :3], :2], points)
     normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -6,8 +6,10 @@ makes neighbouring prisms cut their common side along the same diagonal, so that
 conforms without a search, and has the mirror symmetries of its grid.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from math import prod
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +24,8 @@ from meshes.tetmesh import (
     quadratic,
 )
 
+MOST_UNKNOWNS = 3_000_000  # of a mesh: beyond it no factorisation fits in a workstation
+
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
@@ -32,11 +36,24 @@ class Grading:
     radius : float, metre, half width of the square that keeps the fine size.
     growth : float, ratio of one cell to its neighbour outside the square and downwards.
     coarsest : float, metre, largest cell.
+
+    Raises
+    ------
+    MeshError
+        If a value is not a number or out of range.
     """
 
     radius: float
     growth: float = 1.3
     coarsest: float = np.inf
+
+    def __post_init__(self) -> None:
+        if not (self.radius >= 0 and 1 <= self.growth < np.inf and self.coarsest > 0):
+            raise MeshError(
+                f"grading of radius {self.radius} m, growth {self.growth} and coarsest cell "
+                f"{self.coarsest} m: give a radius of 0 or above, a growth of 1 or above, and a "
+                "cell above 0"
+            )
 
 
 def sheet(
@@ -84,17 +101,27 @@ def block(
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
-    """Grid lines from 0 to `length`: cells of `h` up to the radius, then growing."""
+    """Grid lines from 0 to `length`: cells of `h` up to the radius, then growing.
+
+    Raises
+    ------
+    MeshError
+        If a length is not above 0, or there would be too many cells.
+    """
+    _check_lengths(length, h)
     fine = min(grading.radius, length)
-    cells = [fine / n] * n if (n := int(np.ceil(fine / h - 1e-9))) else []
-    rest, size = length - fine, h
+    check_size((fine / h, 1, 1))
+    cells = [fine / n] * n if (n := round_up(fine / h)) else []
+    rest, size, reached = length - fine, h, 0.0
     tail: list[float] = []
-    while rest > 1e-9 * length and sum(tail) < rest:
+    while rest > 1e-9 * length and reached < rest:
         size = min(size * grading.growth if tail or cells else size, grading.coarsest)
         tail.append(size)
+        reached += size
+        check_size((len(cells) + len(tail), 1, 1))
     if tail:
         # Land on the end exactly, by leaving out the last cell or stretching fewer of them.
-        tail = tail[:-1] if len(tail) > 1 and sum(tail) - rest > tail[-1] / 2 else tail
+        tail = tail[:-1] if len(tail) > 1 and reached - rest > tail[-1] / 2 else tail
         cells += list(np.array(tail) * (rest / sum(tail)))
     return np.concatenate([[0.0], np.cumsum(cells)])
 
@@ -109,7 +136,7 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
     Raises
     ------
     MeshError
-        If grid lines do not increase or the order is not 1 or 2.
+        If grid lines do not increase, the order is not 1 or 2, or there are too many cells.
     """
     lines = [np.asarray(line, np.float64) for line in (x, y, z)]
     for name, line in zip("xyz", lines, strict=True):
@@ -117,6 +144,7 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
             raise MeshError(f"grid lines along {name} must be two or more increasing numbers")
     if order not in (1, 2):
         raise MeshError(f"order = {order} is not available; use 1 or 2")
+    check_size((len(line) - 1 for line in lines), order)
     triangles, per_layer = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
     tets = np.vstack(
         [
@@ -181,9 +209,30 @@ def _with_roles(mesh: TetMesh, **roles: str) -> TetMesh:
 
 def _even(length: float, h: float, *, least: int = 2) -> Floats:
     """Equal cells no larger than h about the origin, an even number where symmetry is wanted."""
-    if not (length > 0 and h > 0):
-        raise MeshError(f"length {length} m and h {h} m must be above 0")
+    _check_lengths(length, h)
+    check_size((length / h, 1, 1))
     return np.linspace(-length / 2, length / 2, least * max(1, round_up(length / (least * h))) + 1)
+
+
+def check_size(cells: Iterable[float], order: int = 2) -> None:
+    """Refuse so many cells along three axes before anything is made of them.
+
+    Raises
+    ------
+    MeshError
+        If they have more than `MOST_UNKNOWNS`.
+    """
+    unknowns = 3.0 * prod(order * n + 1 for n in cells)
+    if not unknowns <= MOST_UNKNOWNS:
+        raise MeshError(
+            f"the mesh would have {unknowns:.2g} unknowns or more, the limit is "
+            f"{MOST_UNKNOWNS:,}; take larger elements or a smaller body"
+        )
+
+
+def _check_lengths(length: float, h: float) -> None:
+    if not (0 < length < np.inf and 0 < h < np.inf):
+        raise MeshError(f"length {length} m and h {h} m must be finite and above 0")
 
 
 def round_up(ratio: float) -> int:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -24,6 +24,7 @@ FACES = np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0
 MIRRORED = np.array([0, 1, 3, 2, 4, 8, 7, 6, 5, 9])
 # A tetrahedron flatter than this (volume over longest edge cubed) has no usable shape.
 FLATTEST = 1e-9
+FURTHEST = 1e50  # m: beyond it, products of lengths overflow
 
 
 class MeshError(ValueError):
@@ -45,7 +46,8 @@ class TetMesh:
     Raises
     ------
     MeshError
-        If shapes or node numbers do not fit, a point is not finite, or a tetrahedron is flat.
+        If shapes or node numbers do not fit, a point is not finite or further than
+        `FURTHEST` away, or a tetrahedron is flat.
     """
 
     points: Floats
@@ -54,16 +56,21 @@ class TetMesh:
     facets: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        points = np.array(self.points, np.float64)
-        tets = np.array(self.tets, np.int64)
+        try:
+            points = np.array(self.points, np.float64)
+        except (TypeError, ValueError) as error:
+            raise MeshError(f"points are not numbers ({error}); give (n, 3) coordinates") from None
+        tets = _whole("tets", self.tets)
         _check(points, tets)
         tets = _oriented(points, tets)
-        region = np.array(self.region, np.int64) if len(self.region) else np.zeros(len(tets), int)
-        if region.shape != (len(tets),):
+        region = _whole("region", self.region)
+        region = region if region.size else np.zeros(len(tets), np.int64)
+        if region.shape != (len(tets),) or region.min() < 0:
             raise MeshError(
-                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per element"
+                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per "
+                "element, 0 or above"
             )
-        facets = {name: np.array(nodes, np.int64) for name, nodes in self.facets.items()}
+        facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
             array.setflags(write=False)
         object.__setattr__(self, "points", points)
@@ -107,10 +114,10 @@ def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:
     Raises
     ------
     MeshError
-        If the mesh has no set of that name.
+        If the mesh has no set of that name, or the given ones are no facets of its kind.
     """
     if not isinstance(facets, str):
-        return np.asarray(facets, np.int64)
+        return _facets("given", facets, mesh.points, mesh.tets)
     if facets not in mesh.facets:
         known = ", ".join(sorted(mesh.facets)) or "none"
         raise MeshError(f"the mesh has no facet set '{facets}'; it has: {known}")
@@ -147,14 +154,18 @@ def half(mesh: TetMesh, axis: str) -> TetMesh:
     Raises
     ------
     MeshError
-        If tetrahedra cross the plane.
+        If the axis is unknown, tetrahedra cross the plane, or none lies beyond it.
     """
+    if axis not in ("x", "y", "z"):
+        raise MeshError(f"axis '{axis}' is unknown; use x, y or z")
     coordinate = mesh.points[:, "xyz".index(axis)]
     away = np.where(np.abs(coordinate) < 1e-9 * np.abs(coordinate).max(), 0.0, coordinate)
     side = np.sign(away[mesh.tets[:, :4]])
     if ((side.min(axis=1) < 0) & (side.max(axis=1) > 0)).any():
         raise MeshError(f"tetrahedra cross the plane {axis} = 0; mesh an even number of cells")
     inside = side.max(axis=1) > 0
+    if not inside.any():
+        raise MeshError(f"no tetrahedron has a positive {axis}; there is nothing to keep")
     kept, tets = np.unique(mesh.tets[inside], return_inverse=True)
     number = np.full(len(mesh.points), -1)
     number[kept] = np.arange(len(kept))
@@ -173,6 +184,34 @@ def half(mesh: TetMesh, axis: str) -> TetMesh:
     )
 
 
+def _whole(name: str, values: ArrayLike) -> Ints:
+    """Whole numbers as an array of its own."""
+    try:
+        given = np.array(values)
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"{name} are no array of whole numbers ({error})") from None
+    if given.size and given.dtype.kind not in "biu":
+        raise MeshError(f"{name} must be whole numbers, not {given.dtype}; number nodes from 0")
+    return given.astype(np.int64)
+
+
+def _facets(name: str, nodes: ArrayLike, points: Floats, tets: Ints) -> Ints:
+    facets, width = _whole(f"facets '{name}'", nodes), 3 if tets.shape[1] == 4 else 6
+    if not facets.size:
+        return facets.reshape(0, width)
+    if facets.ndim != 2 or facets.shape[1] != width:
+        raise MeshError(
+            f"facets '{name}' have shape {facets.shape}; give (k, {width}) node numbers for "
+            f"tetrahedra of {tets.shape[1]} nodes"
+        )
+    if facets.min() < 0 or facets.max() >= len(points):
+        raise MeshError(
+            f"facets '{name}' have node numbers from {facets.min()} to {facets.max()}, but there "
+            f"are {len(points)} points"
+        )
+    return facets
+
+
 def _check(points: Floats, tets: Ints) -> None:
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"points have shape {points.shape}; give (n, 3) coordinates in metre")
@@ -181,6 +220,8 @@ def _check(points: Floats, tets: Ints) -> None:
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise MeshError(f"{len(bad)} points are not finite, first {bad[0]}; repair the mesh")
+    if np.abs(points).max() > FURTHEST:
+        raise MeshError(f"a point is further than {FURTHEST:g} m away; give points in metre")
     if tets.min() < 0 or tets.max() >= len(points):
         raise MeshError(
             f"node numbers run from {tets.min()} to {tets.max()}, but there are "
@@ -194,7 +235,7 @@ def _oriented(points: Floats, tets: Ints) -> Ints:
     longest = np.linalg.norm(corners[:, :, 1] - corners[:, :, 0], axis=2).max(axis=1)
     flat = np.flatnonzero(np.abs(volume) <= FLATTEST * longest**3)
     if len(flat):
-        worst = flat[np.argmin(np.abs(volume[flat]) / longest[flat] ** 3)]
+        worst = flat[np.argmin(np.abs(volume[flat]) / np.maximum(longest[flat] ** 3, 1e-300))]
         raise MeshError(
             f"{len(flat)} tetrahedra are flat, the worst is {worst} with volume "
             f"{volume[worst]:.3g} m3; remesh or remove them"

@@ -37,7 +37,9 @@ class LoadLines:
 
 
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
-    """The lines whose pressure, at the path, exceeds a fraction of the strongest line's."""
+    """The lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
+    that is silent, the mean alone.
+    """
     gain_f, gain_c = _gain_lines(pressure)
     f_d = pressure.tacton.trajectory.drawing_frequency
     of_spot = np.abs(along_path(_swept(pressure)))
@@ -47,6 +49,8 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
     order = np.repeat(n, len(gain_f))
     strength = np.abs(c) * of_spot.max(axis=0)[order]
     kept = (f > -1e-9) & (strength > threshold * strength.max())
+    if not kept.any():
+        kept = (order == 0) & (f == 0)
     return LoadLines(frequencies=np.abs(f[kept]), harmonics=order[kept], coefficients=c[kept])
 
 
@@ -101,5 +105,5 @@ def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:
     f = sum(
         o * tone for o, tone in zip(np.meshgrid(*orders, indexing="ij"), tones(tacton), strict=True)
     )
-    kept = np.abs(c) > 1e-12 * np.abs(c).max()
+    kept = np.abs(c) >= 1e-12 * np.abs(c).max()
     return np.asarray(f)[kept], c[kept]

@@ -63,6 +63,11 @@ class Tacton:
                 f"duration = {self.duration} s is outside 0 < duration <= {LONGEST:g} s, "
                 "the longest Tacton; shorten it"
             )
+        if not (drawn := self.trajectory.drawing_frequency) <= CARRIER / 2:
+            raise ValueError(
+                f"the path is drawn {drawn:.3g} times a second, more than {CARRIER / 2:g} Hz, "
+                "half the carrier; make it longer or slower"
+            )
         w1, w2 = self.superposition
         if not (w1 >= 0 and w2 >= 0 and abs(w1 + w2 - 1) <= 1e-9):
             raise ValueError(

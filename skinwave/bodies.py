@@ -7,7 +7,7 @@ import numpy as np
 
 from fem.materials import Material
 from meshes import Grading, TetMesh, block, graded_axis, half, sheet
-from meshes.structured import round_up
+from meshes.structured import check_size, round_up
 from meshes.tetmesh import Ints
 from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
 from skinwave.scene import Body
@@ -42,13 +42,9 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
     Raises
     ------
     ValueError
-        If the body is "none".
+        If the body is "none", or would have too many unknowns.
     """
-    if body.kind == "none":
-        raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
-    if not np.isfinite(body.depth):
-        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
-    size = h or default_size(body)
+    size = _checked(body, h or default_size(body))
     if body.kind == "sheet":
         thickness = max(body.depth, SHEET_THICKNESS * min(body.width, body.height))
         mesh = sheet(body.width, body.height, thickness, size)
@@ -72,16 +68,37 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
 
 
 def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
-    """How many cells of h in metre `build` makes along x, y and downwards."""
-    sides = body.width, body.height
+    """How many cells of h in metre `build` makes along x, y and downwards.
+
+    Raises
+    ------
+    ValueError
+        If there are none, they are larger than the body or more than can be solved for.
+    """
+    sides, h = (body.width, body.height), _checked(body, h)
     if body.kind == "sheet":
         halves = [max(1, round_up(side / (2 * h))) for side in sides]
         layers = 1
     else:
         halves = [len(graded_axis(side / 2, h, _grading(h))) - 1 for side in sides]
         layers = len(graded_axis(body.depth, h, replace(_grading(h), radius=0.0))) - 1
+    check_size((2 * halves[0], 2 * halves[1], layers))
     x, y = (n if axis in symmetry else 2 * n for axis, n in zip("xy", halves, strict=True))
     return x, y, layers
+
+
+def _checked(body: Body, h: float) -> float:
+    if body.kind == "none":
+        raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    if not isfinite(body.depth):
+        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
+    longest = max(body.width, body.height, body.depth)
+    if h > longest:
+        raise ValueError(
+            f"elements of {1e3 * h:g} mm are larger than the body, whose longest side is "
+            f"{1e3 * longest:g} mm; take smaller ones"
+        )
+    return h
 
 
 def _grading(h: float) -> Grading:

@@ -31,7 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, ArithmeticError, MemoryError, OSError) as error:
         if options.debug:
             raise
-        print(f"skinwave: {' '.join(str(error).split())}", file=sys.stderr)
+        said = " ".join(str(error).split()) or "not enough memory; take larger elements"
+        print(f"skinwave: {said}", file=sys.stderr)
         return 2
 
 
@@ -115,7 +116,7 @@ def _required(options: argparse.Namespace, scene: "Scene") -> "Plan":
     from skinwave.simulation import check_knobs
 
     model, h = None if options.model == "auto" else options.model, _metre(options.h)
-    check_knobs("auto", h=h, dt=options.dt)
+    check_knobs(getattr(options, "solver", "auto"), h=h, dt=options.dt)
     required = plan(scene, options.tolerance, model=model, h=h, dt=options.dt)
     for warning in required.warnings:
         print(f"skinwave: warning: {warning}", file=sys.stderr)
@@ -131,11 +132,11 @@ def _run(options: argparse.Namespace) -> int:
     from skinwave.study import write_single
 
     scene = read(options.scene)
-    if options.model != "auto" or options.h or options.dt:
-        _required(options, scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
+        if options.model != "auto" or options.h or options.dt:
+            _required(options, scene)
         with _progress(options) as progress:
             response = simulate(
                 scene, options.model, options.tolerance, progress,
@@ -157,13 +158,13 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from skinwave.files import output_folder
+    from skinwave.files import folder_name, output_folder
     from skinwave.scene_file import read
     from skinwave.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)
-    scenes = paper_scenes() if scene is None else own_scenes(scene, scene.name)
+    scenes = paper_scenes() if scene is None else own_scenes(scene, folder_name(scene.name))
     out = options.out or Path("paper-15" if paper else f"{Path(options.scene).stem}-compared")
     with output_folder(out, overwrite=options.overwrite) as folder, _progress(options) as progress:
         outcome = run_study(

@@ -81,7 +81,8 @@ def waves_returned(
     table = np.arange(0.0, FAR, width / 2)
     g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
-    return min(1.0, reflected * float(np.sqrt(power[1:].sum(axis=0) / power[0]).max()))
+    share = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
+    return min(1.0, reflected * float(np.sqrt(share.max())))
 
 
 def mean_gain(scene: Scene) -> float:

@@ -1,5 +1,6 @@
 """Figures for print and page (matplotlib): waveforms, spectra and spread, models overlaid."""
 
+import warnings
 from io import BytesIO
 from typing import Any
 
@@ -29,7 +30,9 @@ SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
 def png(figure: Figure, dpi: int = 110) -> bytes:
     """The figure as a PNG file in memory."""
     buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi)
+    with warnings.catch_warnings():  # a name in letters that the font lacks is shown as boxes
+        warnings.filterwarnings("ignore", "Glyph")
+        figure.savefig(buffer, format="png", dpi=dpi)
     return buffer.getvalue()
 
 
@@ -42,7 +45,9 @@ def tacton_figure(title: str, runs: list[Run]) -> Figure:
         _waveforms(axes[p, 0], runs, p)
         _spectra(axes[p, 1], runs, p, named=p == 0)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
-    axes[0, 0].set_title(f"{title}: waveform about its mean, in units of the model", fontsize=10)
+    axes[0, 0].set_title(
+        f"{title}: waveform about its mean, in units of the model", fontsize=10, parse_math=False
+    )
     axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize=10)
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
@@ -58,7 +63,7 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     axes = figure.subplots(3, len(columns), sharey="row", squeeze=False)
     for k, (title, runs) in enumerate(columns.items()):
         where = 1e3 * np.hypot(*runs[0].response.probes[probe])
-        axes[0, k].set_title(title)
+        axes[0, k].set_title(title, parse_math=False)
         _waveforms(axes[0, k], runs, probe)
         _spectra(axes[1, k], runs, probe, named=True)
         _spread(axes[2, k], runs)

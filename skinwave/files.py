@@ -1,9 +1,12 @@
 """What a run leaves in its folder, written aside and then renamed."""
 
+import contextlib
 import csv
 import json
 import os
+import re
 import shutil
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, astuple, fields
@@ -20,56 +23,99 @@ LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
     "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
 )  # fmt: skip
+RESERVED = ("figures", "overview")  # what a study names itself
 
 
 @contextmanager
 def output_folder(out: Path, *, overwrite: bool = False) -> Iterator[Path]:
     """A folder to write in, which becomes `out` when all is written.
 
-    If writing ends early the folder stays beside `out` as `<out>.partial`, and what was there
-    before is untouched.
+    Until then it is `<out>.partial`. An error removes it, with the folders above that were made
+    for it, and leaves what was there before untouched; only an interrupt or a killed process
+    leaves it behind, and the next one begins anew.
 
     Raises
     ------
     ValueError
         If `out` exists and may not be overwritten, or cannot be written.
     """
-    out = out.absolute()
-    if out.exists() and not overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
-    if out.exists() and not out.is_dir():
-        raise ValueError(f"{out} is a file; choose a folder with --out")
+    out = Path(os.path.realpath(out))  # a link stays one, and points to what is written
+    _refuse_existing(out, overwrite)
     aside = out.with_name(out.name + ".partial")
+    above = [folder for folder in aside.parents if not os.path.exists(folder)]
     try:
         if aside.exists():
             shutil.rmtree(aside)
         aside.mkdir(parents=True)
-    except OSError as error:
-        raise ValueError(f"{out} cannot be written ({error.strerror}); choose --out") from None
-    try:
         yield aside
-    finally:
+        _put_in_place(aside, out)
+    except Exception as error:
+        _remove(aside, above)
+        if isinstance(error, OSError) and error.strerror:
+            raise ValueError(
+                f"{out} cannot be written ({error.strerror}); make room there or choose --out"
+            ) from error
+        raise
+    except KeyboardInterrupt:
         if not any(aside.iterdir()):
-            aside.rmdir()
-    if out.exists():
-        old = out.with_name(out.name + ".old")
-        shutil.rmtree(old, ignore_errors=True)
-        out.rename(old)
+            _remove(aside, above)
+        raise
+
+
+def _refuse_existing(out: Path, overwrite: bool) -> None:
+    if Path.cwd().is_relative_to(out):
+        raise ValueError(f"{out} holds the current folder; choose another --out")
+    if os.path.lexists(out) and not overwrite:
+        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
+    if os.path.lexists(out) and not out.is_dir():
+        raise ValueError(f"{out} is a file; choose a folder with --out")
+
+
+def _put_in_place(aside: Path, out: Path) -> None:
+    """Rename what is written; what it replaces is put back if that fails."""
+    if not out.exists():
         aside.rename(out)
-        shutil.rmtree(old)
-    else:
+        return
+    kept = Path(tempfile.mkdtemp(prefix=f"{out.name}.replaced-", dir=out.parent), out.name)
+    try:
+        out.rename(kept)
         aside.rename(out)
+    except OSError:
+        if kept.exists():
+            kept.rename(out)
+        kept.parent.rmdir()
+        raise
+    shutil.rmtree(kept.parent, ignore_errors=True)
+
+
+def _remove(aside: Path, above: Iterable[Path]) -> None:
+    """A folder, and those above it that are empty then."""
+    shutil.rmtree(aside, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        for folder in above:
+            folder.rmdir()
+
+
+def folder_name(name: str) -> str:
+    """A scene's name as that of a folder: within the one above it, and none that a study has."""
+    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:80]
+    return plain if plain not in ("", *RESERVED) else f"scene_{plain}"
 
 
 def write_run(folder: Path, run: Run) -> None:
-    """scene.toml, response.npz, lines.csv and effort.json of one run; all or nothing."""
+    """The folder of one run; all or nothing."""
     aside = folder.with_name(folder.name + ".part")
     aside.mkdir(parents=True)
-    (aside / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
-    write_responses(aside / "response.npz", {"displacement": run, run.model: run})
-    write_lines(aside / "lines.csv", [run])
-    write_effort(aside / "effort.json", run.response.effort)
+    fill(aside, run)
     os.replace(aside, folder)
+
+
+def fill(folder: Path, run: Run) -> None:
+    """scene.toml, response.npz, lines.csv and effort.json of one run, into an empty folder."""
+    (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
+    write_responses(folder / "response.npz", {"displacement": run, run.model: run})
+    write_lines(folder / "lines.csv", [run])
+    write_effort(folder / "effort.json", run.response.effort)
 
 
 def write_responses(path: Path, runs: Mapping[str, Run]) -> None:

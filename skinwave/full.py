@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 from itertools import islice
+from math import ceil
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -18,6 +19,7 @@ from skinwave.scene import Body, Scene
 MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
 CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
+MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 
 def meshed(
@@ -64,11 +66,11 @@ def transient_answer(
     solver: str = "auto",
 ) -> Response:
     """The full time stepping in steps of dt, read between steps by a cubic spline."""
+    dt = dt or 1 / TRANSIENT_RATE
+    steps = step_count(float(times[-1]), dt)
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
     operators = assembled(build, clock, report)
-    dt = dt or 1 / TRANSIENT_RATE
-    steps = max(3, int(np.ceil(times[-1] / dt - 1e-9)))
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     S = fem.probe_operator(build.mesh, scene.probe_points)
     stepped = np.empty((steps + 1, len(scene.probes)))
@@ -93,6 +95,26 @@ def transient_answer(
     return _response(
         "fem-transient", scene, times, displacement, clock, operators, steps, used, energy
     )
+
+
+def step_count(duration: float, dt: float) -> int:
+    """How many steps of dt reach a duration in s.
+
+    Raises
+    ------
+    ValueError
+        If one step is longer, or there are more than `MOST_STEPS`.
+    """
+    if dt > duration:
+        raise ValueError(
+            f"dt = {dt:g} s is longer than the answer, {duration:g} s; take a shorter step"
+        )
+    if duration / dt > MOST_STEPS:
+        raise ValueError(
+            f"dt = {dt:g} s makes {duration / dt:.2g} steps, the limit is {MOST_STEPS:,}; take a "
+            "longer step or a shorter duration"
+        )
+    return max(3, ceil(duration / dt - 1e-9))
 
 
 def harmonic_answer(

@@ -7,6 +7,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model.flat_body import AIR_DENSITY
 from simple_model.focus import spot_width
+from skinwave.bodies import cells
 from skinwave.effort import Progress
 from skinwave.estimates import (
     FAR,
@@ -17,8 +18,8 @@ from skinwave.estimates import (
     motion_lines,
     waves_returned,
 )
-from skinwave.full import TRANSIENT_RATE
-from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared
+from skinwave.full import TRANSIENT_RATE, step_count
+from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
 from skinwave.refinement import AIM, ORDER, Refined, refined
 from skinwave.scene import Body, Scene
 from skinwave.sensitivity import sensitivity
@@ -80,13 +81,16 @@ def plan(
     Raises
     ------
     ValueError
-        If the tolerance is not between 0 and 1.
+        If the tolerance is not between 0 and 1, there is no body for the model, or h or dt
+        cannot be computed with.
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    if dt is not None:
+        step_count(float(sample_times(scene)[-1]), dt)
     if scene.body.kind == "none":
         if model not in (None, "point-kernel"):
-            raise ValueError(f"{model} needs a body; choose a sheet or a slab, or point-kernel")
+            raise ValueError(f"a scene without a body has no {model} answer; use --model auto")
         row = Row(what="model", value="point-kernel", reason="there is no body to move")
         return Plan(model="point-kernel", body=scene.body, rows=(row,))
     if model == "point-kernel":
@@ -105,6 +109,8 @@ def plan(
     if model == "flat-body" or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, highest, returned, rows)
     body, extent = _extent(scene, tolerance, highest)
+    if h:
+        cells(body, h)  # refuses what cannot be meshed before anything is computed
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *extent]
     symmetry = _symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver, h=h)
@@ -251,7 +257,7 @@ def _extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[
     cut = half.copy()
     for axis in (0, 1):
         alone = np.where(np.arange(2) == axis, half, FAR)
-        for shorter in np.arange(0.03, 0.8 * half[axis], 0.01):
+        for shorter in np.arange(0.03, min(0.8 * half[axis], FAR), 0.01):
             alone[axis] = shorter
             if waves_returned(scene, alone, highest, REFLECTED) <= tolerance / 10:
                 cut[axis] = shorter

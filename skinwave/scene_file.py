@@ -15,6 +15,8 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
 from skinwave.scene import BODIES, KINDS, Body, Scene
 
+LARGEST = 1_000_000  # bytes of a file
+
 
 def read(path: str | Path) -> Scene:
     """The scene in a TOML file.
@@ -25,7 +27,11 @@ def read(path: str | Path) -> Scene:
         If the file cannot be read, or is not a scene: what, got, limit, cure in one sentence.
     """
     try:
-        return loads(Path(path).read_text(encoding="utf-8"))
+        with open(path, "rb") as file:
+            content = file.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise ValueError(f"larger than {LARGEST / 1e6:g} MB, which no scene is; check the path")
+        return loads(content.decode("utf-8-sig"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror}); check the path") from None
     except ValueError as error:
@@ -36,8 +42,10 @@ def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise ValueError(f"not valid TOML: {error}") from None
+    except RecursionError:
+        raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
     sections = {"name": _text, **dict.fromkeys(SECTIONS, _table)}
     top = _checked("scene", table, sections)
     parts = {
@@ -89,31 +97,42 @@ class Field:
 
 def _number(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{key} = {value!r} must be a number")
-    return float(value)
+        raise ValueError(f"{key} = {_shown(value)} must be a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{key} is too large a number; give one below 1e308") from None
+
+
+def _shown(value: Any) -> str:
+    """A value as a message quotes it."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _text(key: str, value: Any) -> str:
     if not isinstance(value, str):
-        raise ValueError(f"{key} = {value!r} must be a text in quotes")
+        raise ValueError(f"{key} = {_shown(value)} must be a text in quotes")
     return value
 
 
 def _table(key: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"{key} = {value!r} must be a table, [{key}]")
+        raise ValueError(f"{key} = {_shown(value)} must be a table, [{key}]")
     return value
 
 
 def _pair(key: str, value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(f"{key} = {value!r} must be a pair of numbers, such as [1.0, 0.0]")
+        raise ValueError(f"{key} = {_shown(value)} must be a pair of numbers, such as [1.0, 0.0]")
     return _number(key, value[0]), _number(key, value[1])
 
 
 def _points(key: str, value: Any) -> tuple[tuple[float, float], ...]:
     if not isinstance(value, list):
-        raise ValueError(f"{key} = {value!r} must be a list of pairs, such as [[0, 0], [5, 0]]")
+        raise ValueError(
+            f"{key} = {_shown(value)} must be a list of pairs, such as [[0, 0], [5, 0]]"
+        )
     points = [_pair(key, point) for point in value]
     for x, y in points:
         if not (isfinite(x) and isfinite(y)):
@@ -209,7 +228,9 @@ def _checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict
     for key, value in table.items():
         if key not in keys:
             near = difflib.get_close_matches(key, keys, 1, 0.0)
-            raise ValueError(f"{where} has the unknown key '{key}'; did you mean '{near[0]}'?")
+            raise ValueError(
+                f"{where} has the unknown key {_shown(key)}; did you mean '{near[0]}'?"
+            )
         field = keys[key]
         if isinstance(field, Field):
             values[field.name] = field.read(key, value)

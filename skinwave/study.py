@@ -9,10 +9,11 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from skinwave import paper15, report
+from skinwave.bodies import cells, default_size
 from skinwave.claims import Run, Verdict, evaluate
 from skinwave.effort import Progress, peak_memory
 from skinwave.figures import label, overview_figure, png, tacton_figure
-from skinwave.files import write_claims, write_lines, write_responses, write_run
+from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.prepared import Prepared, answer, prepare
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
@@ -63,6 +64,9 @@ def run_study(
     An interrupt ends the answering early; what is finished is still compared and written.
     """
     check_knobs(solver, h=h)
+    for solid in {s.body for group in scenes.values() for s in group.values()}:
+        if solid.kind != "none":
+            cells(solid, h or default_size(solid))  # refuses what cannot be meshed before any run
     started = time.perf_counter()
     runs: list[Run] = []
     prepared: dict[str, Prepared] = {}
@@ -94,8 +98,7 @@ def run_study(
 
 def write_single(folder: Path, run: Run) -> None:
     """The folder of one run, with its page."""
-    folder.rmdir()
-    write_run(folder, run)
+    fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
     parts = [
         report.picture(png(figure), _caption(run.tacton, [run]), "tacton"),

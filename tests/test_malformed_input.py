@@ -1,0 +1,130 @@
+"""What is malformed is refused in one line that says what is wrong, and leaves nothing behind."""
+
+import os
+import subprocess
+import sys
+import time
+
+import corpus
+import pytest
+
+from skinwave.cli import main
+
+LONGEST = 10.0  # s
+SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="paths differ")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with two good scenes, a folder of the user's, and a link to itself."""
+    (tmp_path / "good.toml").write_text(corpus.GOOD)
+    (tmp_path / "none.toml").write_text(corpus.SILENT_GROUND)
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept/note").write_text("mine")
+    (tmp_path / "loop").symlink_to("loop")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder):
+    """Every file below a folder, with what is in it."""
+    return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
+
+
+def said(capsys, folder, arguments, codes=(2,)):
+    """What a refused command printed, in its one line; "" if it was not refused."""
+    before, started = contents(folder), time.perf_counter()
+    code = main(arguments)
+    printed = capsys.readouterr().err
+    assert time.perf_counter() - started < LONGEST
+    assert code in codes, printed
+    if code == 2:
+        assert printed.count("\n") == 1, printed
+        assert printed.startswith("skinwave: "), printed
+        assert len(printed) > len("skinwave: \n")
+        assert contents(folder) == before
+    return printed
+
+
+def test_the_corpus_is_large_and_the_same_every_time():
+    assert len(SCENES) + len(COMMANDS) + len(MESHES) > 500
+    assert corpus.scenes() == SCENES
+    assert corpus.damaged_scenes() == corpus.damaged_scenes()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_scene_is_refused_in_one_line(folder, capsys, name):
+    (folder / "wrong.toml").write_bytes(SCENES[name])
+    command = ("run", "compare", "plan", "tradeoff")[len(name) % 4]
+    assert "wrong.toml: " in said(capsys, folder, [command, "wrong.toml"])
+
+
+@pytest.mark.parametrize("content", corpus.damaged_scenes(), ids=range(90))
+def test_a_damaged_scene_is_planned_or_refused(folder, capsys, content):
+    (folder / "wrong.toml").write_bytes(content)
+    assert "Traceback" not in said(capsys, folder, ["plan", "wrong.toml"], codes=(0, 2))
+
+
+@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda a: " ".join(a)[:60])
+def test_no_command_is_refused_in_one_line(folder, capsys, arguments):
+    said(capsys, folder, arguments)
+
+
+@pytest.mark.parametrize("arguments", corpus.wrong_usage(), ids=" ".join)
+def test_wrong_usage_ends_with_two(folder, capsys, arguments):
+    before = contents(folder)
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    assert "usage: skinwave" in capsys.readouterr().err
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("name", corpus.ABSURD)
+@pytest.mark.parametrize("command", ["plan", "run", "compare"])
+def test_what_no_machine_can_solve_is_refused_with_number_limit_and_cure(
+    folder, capsys, command, name
+):
+    body, size, *knobs = corpus.ABSURD[name]
+    scene = corpus.GOOD.replace("[body]", f"[body]\n{body}")
+    for line in size.splitlines():
+        key = line.split(" =")[0]
+        scene = "\n".join(line if old.startswith(key) else old for old in scene.splitlines())
+    (folder / "huge.toml").write_text(scene)
+    model = [] if command == "compare" else ["--model", "fem"]
+    sentence = said(capsys, folder, [command, "huge.toml", *model, *knobs])
+    assert "unknowns or more, the limit is 3,000,000; take larger elements" in sentence
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_no_mesh_is_refused_in_one_line(name):
+    started = time.perf_counter()
+    with pytest.raises(ValueError) as error:  # noqa: PT011 - any sentence will do, but one
+        MESHES[name]()
+    assert str(error.value)
+    assert "\n" not in str(error.value)
+    assert time.perf_counter() - started < LONGEST
+
+
+REAL = [
+    ["run", "missing.toml"],
+    ["run", "wrong.toml"],
+    ["compare", "good.toml", "--h", "1e-9"],
+    ["run", "good.toml", "--model", "fem", "--h", "nan", "--out", "new/below"],
+    ["run", "good.toml", "--out", "kept"],
+    ["tradeoff", "none.toml"],
+]
+
+
+@pytest.mark.parametrize("arguments", REAL, ids=" ".join)
+def test_a_process_of_its_own_says_the_same(folder, arguments):
+    (folder / "wrong.toml").write_bytes(SCENES["brackets without end"])
+    before = contents(folder)
+    command = [sys.executable, "-m", "skinwave", *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ)
+    assert ended.returncode == 2
+    assert ended.stdout == ""
+    assert ended.stderr.startswith("skinwave: ")
+    assert ended.stderr.count("\n") == 1
+    assert contents(folder) == before
