@@ -56,12 +56,16 @@ def refined(
         return prepared, answer(prepared, scene)
 
     least = FINEST * default_size(scene.body)
-    before = h * RATIO if h else FIRST * default_size(scene.body)
+    longest = max(body.width, body.height)
+    before = min(h * RATIO if h else FIRST * default_size(scene.body), longest)
     size = h or before / RATIO
     coarse = answered(before)[1]
     while True:
         prepared, fine = answered(size)
-        error = _change(coarse, fine) / ((before / size) ** ORDER - 1)
+        if coarse.effort.dofs == fine.effort.dofs:  # two sizes beyond the body's own: one mesh
+            error = 1.0
+        else:
+            error = _change(coarse, fine) / ((before / size) ** ORDER - 1)
         if h or error <= tolerance or size <= least:
             return Refined(h=size, error=error, coarser=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)

@@ -119,6 +119,12 @@ def test_meshes_are_refined_until_they_are_good_enough():
         assert required.error / 5 < misfit < 2 * required.error
 
 
+def test_a_mesh_coarser_than_the_body_is_not_taken_for_converged():
+    required = plan(loads(SHORT), 0.1, model="fem", h=0.05)
+    assert required.error == 1.0
+    assert required.warnings
+
+
 def test_what_breaks_the_tolerance_is_said_with_its_number():
     text = "[tacton]\nam_frequency_hz = 80\nduration_s = 0.1\n[body]\nkind = 'sheet'\n"
     scene = loads(text + "[probes]\npoints_mm = [[0, 0], [5, 0]]")
