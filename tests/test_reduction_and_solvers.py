@@ -142,7 +142,7 @@ def misfit(candidate, reference):
 def test_the_reduced_model_follows_the_transient_from_rest():
     ops, P, points, S, load, model = reduced_for_circling("skin")
     dt = 2.5e-5
-    full = marched(ops, S, lambda t: P @ load(points, t), dt)
+    full = marched(ops, S, lambda t: P @ load(points, t), dt, 0.1)
     frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
     poles = fem.poles(model)
     lines, start = fem.line_response(poles, forces, frequencies)
