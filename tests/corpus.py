@@ -199,7 +199,8 @@ def command_lines() -> list[list[str]]:
         for s in ("nonsense", "", "AUTO", "pardiso ", "splu")
     ]
     outs = ("kept", "kept/note", "kept/note/below", "good.toml", ".", "", "/", "..",
-            "x\0y", "n" * 300, "new/" + "n" * 300, "loop", "/proc/nowhere/out", "/dev/null/out")  # fmt: skip
+            "x\0y", "n" * 300, "new/" + "n" * 300, "loop", "/proc/nowhere/out",
+            "/dev/null/out")  # fmt: skip
     for command in (run, compare, trade, ["verify", "--quick"]):
         found += [[*command, "--out", out] for out in outs]
         over = ("kept/note", ".", "", "/", "..", "loop")
@@ -242,7 +243,8 @@ def broken_meshes() -> dict[str, Callable[[], object]]:
         f"points {k}": tet(points=p)
         for k, p in enumerate(
             (None, "xyz", 3.0, [], [[]], CORNERS[0], [[0, 0]] * 4, CORNERS[:3],
-             [["a", "b", "c"]] * 4, [[0, 0, 0], [1, 0]], {"x": 1}, np.zeros((4, 3, 1)), np.array(CORNERS, object) * 1j,
+             [["a", "b", "c"]] * 4, [[0, 0, 0], [1, 0]], {"x": 1}, np.zeros((4, 3, 1)),
+             np.array(CORNERS, object) * 1j,
              [[None] * 3] * 4, np.zeros((4, 3)), np.array(CORNERS) * 1e-200, CORNERS * 2)
         )
     }  # fmt: skip
@@ -325,7 +327,8 @@ def broken_meshes() -> dict[str, Callable[[], object]]:
         for k, a in enumerate(
             ({"material": "palm"}, {"material": {}}, {"material": {1: skin}}, {"material": None},
              {"fixed": "lid"}, {"fixed": {"top": "w"}}, {"fixed": {"top": ""}},
-             {"fixed": everything}, {"fixed": everything[:5]}, {"fixed": None}, {"absorbing": "lid"},
+             {"fixed": everything}, {"fixed": everything[:5]}, {"fixed": None},
+             {"absorbing": "lid"},
              {"absorbing": top[:, :3]}, {"absorbing": top + 10**6}, {"absorbing": top * 0},
              {"absorbing": top * 0.5})
         )
