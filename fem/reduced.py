@@ -74,18 +74,21 @@ def reduce(
     Raises
     ------
     ValueError
-        If the tolerance is out of reach.
+        If the tolerance is out of reach, or no probe can move.
     """
     K, C, M, free = operators.K, operators.C, operators.M, operators.free
-    factor = factorise(K + SHIFT * C + SHIFT**2 * M, backend=solver)
     seeds = probes[:, free].toarray().T
+    moving = seeds[:, seeds.any(axis=0)]  # a probe on a clamped edge stays where it is
+    if not moving.size:
+        raise ValueError("no probe can move, all lie where the body is held; move one inwards")
+    factor = factorise(K + SHIFT * C + SHIFT**2 * M, backend=solver)
     loads = None if loads is None else loads[free]
-    space = _Space(M, seeds.shape[1] * (MOST_MOMENTS + 1))
+    space = _Space(M, moving.shape[1] * (MOST_MOMENTS + 1))
     small_K, small_C = np.empty((0, 0)), np.empty((0, 0))
     # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift): rows of `pairs`
     # are orthonormal, so that nothing grows however many moments are taken.
     pairs = np.zeros((2, space.size, 0))
-    newest = np.stack([upper := space.extend(factor.solve(seeds)), np.zeros_like(upper)])
+    newest = np.stack([upper := space.extend(factor.solve(moving)), np.zeros_like(upper)])
     errors: list[float] = []
     before = None
     for moment in range(1, MOST_MOMENTS + 1):

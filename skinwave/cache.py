@@ -42,7 +42,8 @@ def load(name: str) -> dict[str, Any] | None:
     try:
         with open(home / f"{name}.npz", "rb") as file, np.load(file) as entry:
             arrays = {field: entry[field] for field in entry.files}
-        return arrays | {"meta": json.loads(str(arrays["meta"]))}
+        record = json.loads(str(arrays["meta"]))
+        return {field: arrays[field] for field in record["arrays"]} | {"meta": record["meta"]}
     except Exception:  # whatever zip files, array headers or JSON make of spoilt bytes
         return None
 
@@ -52,12 +53,13 @@ def store(name: str, meta: Mapping[str, Any], **arrays: np.ndarray) -> None:
     home = folder()
     if home is None:
         return
+    record = json.dumps({"arrays": list(arrays), "meta": meta})  # of which none may be missing
     with contextlib.suppress(OSError):
         home.mkdir(parents=True, exist_ok=True)
         handle, aside = tempfile.mkstemp(dir=home, suffix=".part")
         try:
             with os.fdopen(handle, "wb") as file:
-                np.savez(file, meta=np.array(json.dumps(meta)), **arrays)  # type: ignore[arg-type]
+                np.savez(file, meta=np.array(record), **arrays)  # type: ignore[arg-type]
             os.replace(aside, home / f"{name}.npz")
         except OSError:
             os.unlink(aside)

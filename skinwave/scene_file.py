@@ -4,7 +4,7 @@ import difflib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite, nextafter
 from pathlib import Path
 from typing import Any
 
@@ -161,8 +161,17 @@ def _scaled(name: str, per_unit: float = 1.0) -> Field:
     return Field(
         name,
         lambda key, value: _number(key, value) / per_unit,
-        lambda value: round(value * per_unit, 12) if per_unit != 1 else value,
+        lambda value: _in_units(value, per_unit),
     )
+
+
+def _in_units(value: float, per_unit: float) -> float:
+    """The number for a file, the shortest that is read as the value itself if there is one."""
+    near = value * per_unit
+    beside = [nextafter(near, way) for way in (-inf, inf)]
+    further = [nextafter(x, way) for x, way in zip(beside, (-inf, inf), strict=True)]
+    nearest = [*(round(near, digits) for digits in (9, 12)), near, *beside, *further]
+    return next((x for x in nearest if x / per_unit == value), near)
 
 
 def _word(name: str) -> Field:
@@ -209,7 +218,7 @@ SECTIONS = {
         "points_mm": Field(
             "probes",
             _points,
-            lambda points: [[round(1e3 * x, 9), round(1e3 * y, 9)] for x, y in points],
+            lambda points: [[_in_units(x, 1e3) for x in point] for point in points],
         ),
     },
 }

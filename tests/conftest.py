@@ -3,9 +3,14 @@
 import os
 
 import pytest
+from hypothesis import settings
 
 import meshes
 from skinwave.verify import elements
+
+# The same examples every time, whatever the speed of the machine.
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=25)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session", autouse=True)

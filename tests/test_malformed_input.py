@@ -6,8 +6,10 @@ import sys
 import time
 
 import corpus
+import numpy as np
 import pytest
 
+from skinwave import loads, simulate
 from skinwave.cli import main
 
 LONGEST = 10.0  # s
@@ -128,3 +130,51 @@ def test_a_process_of_its_own_says_the_same(folder, arguments):
     assert ended.stderr.startswith("skinwave: ")
     assert ended.stderr.count("\n") == 1
     assert contents(folder) == before
+
+
+NAMES = ["", "..", "../../beside", "/tmp/absolute", "figures", "overview", "lines.csv",
+         "$\\\\frac{$", "掌", "zero \\u0000 byte", "two\\nlines", "n" * 300]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scene_of_any_name_is_compared_within_its_folder(folder, name):
+    text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")
+    (folder / "named.toml").write_text(text, encoding="utf-8")
+    before = contents(folder)
+    assert main(["compare", "named.toml", "--h", "6", "--out", "out", "--quiet"]) == 0
+    assert {p: c for p, c in contents(folder).items() if "out" not in p.parts} == before
+    assert len(list((folder / "out").glob("*/*/response.npz"))) == 2
+    assert len(list((folder / "out/figures").glob("*.png"))) == 2
+    command = ["run", "out", "--model", "point-kernel", "--out", "single", "--quiet"]
+    (command[1],) = map(str, (folder / "out").glob("*/none/scene.toml"))
+    assert main(command) == 0
+
+
+def test_overwriting_keeps_the_neighbours_and_a_link(folder):
+    for name in ("out.old", "out", "elsewhere"):
+        (folder / name).mkdir()
+        (folder / name / "note").write_text("mine")
+    (folder / "link").symlink_to("elsewhere")
+    for out in ("out", "link"):
+        assert main(["run", "none.toml", "--out", out, "--overwrite", "--quiet"]) == 0
+    assert (folder / "out.old/note").read_text() == "mine"
+    assert (folder / "link").is_symlink()
+    assert (folder / "elsewhere/index.html").exists()
+    expected = {"good.toml", "none.toml", "kept", "loop", "out.old", "out", "elsewhere", "link"}
+    assert {path.name for path in folder.iterdir()} == expected
+
+
+def test_a_probe_on_a_clamped_edge_stays_and_spoils_no_other():
+    rim = corpus.GOOD.replace("[5, 0]", "[15, 0]")
+    scene, alone = loads(rim), loads(rim.replace("[0, 0], ", ""))
+    motion = simulate(scene, "fem", 0.3, h=0.006).displacement
+    assert np.abs(motion[:, 0]).max() > 0
+    assert not motion[:, 1].any()
+    with pytest.raises(ValueError, match="no probe can move"):
+        simulate(alone, "fem", 0.3, h=0.006)
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem", "fem-harmonic"])
+def test_a_silent_tacton_moves_nothing(model):
+    silent = loads(corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0"))
+    assert not simulate(silent, model, 0.3, h=0.006).displacement.any()
