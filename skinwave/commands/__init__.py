@@ -1,0 +1,14 @@
+"""What can be typed after `skinwave`: a module each, with `options(parser)` and `run(options)`.
+
+The one line of a module is its help. Whatever is slow to import is imported in `run`.
+"""
+
+from skinwave.commands import compare, plan, run, tradeoff, verify
+
+COMMANDS = {
+    "run": run,
+    "compare": compare,
+    "tradeoff": tradeoff,
+    "plan": plan,
+    "verify": verify,
+}

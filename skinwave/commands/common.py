@@ -1,0 +1,114 @@
+"""What commands share: options, progress, the closing line."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from skinwave.effort import Progress
+    from skinwave.plan import Plan
+    from skinwave.scene import Scene
+
+MODELS = ("point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
+TOLERANCE = "relative error of waveforms"
+
+
+def add_output(parser: argparse.ArgumentParser) -> None:
+    """Where and how results are written."""
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing folder")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    add_reporting(parser)
+
+
+def add_reporting(parser: argparse.ArgumentParser) -> None:
+    """How to say what came out."""
+    parser.add_argument("--json", action="store_true", help="summary as JSON")
+    parser.add_argument("--debug", action="store_true", help="traceback of an error")
+
+
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """The scene file."""
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+
+
+def add_mesh(parser: argparse.ArgumentParser) -> None:
+    """Element size and solver."""
+    parser.add_argument("--h", type=float, metavar="MM", help="element size, mm (default: planned)")
+    parser.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """Which model answers, and how well."""
+    parser.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
+    parser.add_argument("--dt", type=float, metavar="S", help="time step of fem-transient, s")
+
+
+def required_plan(options: argparse.Namespace, scene: "Scene") -> "Plan":
+    """The plan, with what the user has decided; what breaks the tolerance is warned of."""
+    from skinwave.plan import plan
+    from skinwave.simulation import check_knobs
+
+    model, h = None if options.model == "auto" else options.model, metre(options.h)
+    check_knobs(options.solver, h=h, dt=options.dt)
+    required = plan(
+        scene, options.tolerance, model=model, h=h, dt=options.dt, solver=options.solver
+    )
+    for warning in required.warnings:
+        print(f"skinwave: warning: {warning}", file=sys.stderr)
+    return required
+
+
+def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:
+    """The closing line, or all that it sums up as JSON."""
+    if options.json:
+        print(json.dumps(summary))
+    elif not options.quiet:
+        print(sentence)
+
+
+def metre(millimetre: float | None) -> float | None:
+    """Metre of what is given in millimetre, if it is."""
+    return None if millimetre is None else millimetre / 1e3
+
+
+@contextmanager
+def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
+    """A bar with the phase named; on a pipe a line per phase; nothing if not wanted."""
+    if options.quiet or options.json:
+        yield lambda phase, fraction: None
+        return
+    if not sys.stderr.isatty():
+        phases: list[str] = []
+
+        def log(phase: str, fraction: float) -> None:
+            if phase not in phases[-1:]:
+                phases.append(phase)
+                print(phase, file=sys.stderr, flush=True)
+
+        yield log
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (TextColumn("{task.description:<36}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def show(phase: str, fraction: float) -> None:
+            if bar.tasks[task].description != phase:
+                bar.reset(task, description=phase, total=1.0)
+            bar.update(task, completed=min(max(fraction, 0.0), 1.0))
+
+        yield show

@@ -1,0 +1,31 @@
+"""What a scene requires, and why."""
+
+import argparse
+import json
+
+from skinwave.commands.common import add_mesh, add_model, add_reporting, add_scene, required_plan
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    add_scene(parser)
+    add_model(parser)
+    add_mesh(parser)
+    add_reporting(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from dataclasses import asdict, replace
+
+    from skinwave.scene_file import read
+
+    required = required_plan(options, read(options.scene))
+    if options.json:
+        table = asdict(replace(required, prepared=None))
+        print(json.dumps({key: value for key, value in table.items() if key != "prepared"}))
+        return 0
+    width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
+    for row in required.rows:
+        print(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
+    return 0

@@ -1,0 +1,58 @@
+"""One scene, one model."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import (
+    add_mesh,
+    add_model,
+    add_output,
+    add_scene,
+    metre,
+    progress_of,
+    required_plan,
+    summarise,
+)
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    add_scene(parser)
+    add_model(parser)
+    add_mesh(parser)
+    add_output(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.claims import Run
+    from skinwave.files import output_folder
+    from skinwave.scene import BODIES
+    from skinwave.scene_file import read
+    from skinwave.simulation import simulate
+    from skinwave.study import write_single
+
+    scene = read(options.scene)
+    known = (label for label, body in BODIES.items() if body == scene.body)
+    out = options.out or Path(f"{options.scene.stem}-out")
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        if options.model != "auto" or options.h or options.dt:
+            required_plan(options, scene)
+        with progress_of(options) as progress:
+            response = simulate(
+                scene, options.model, options.tolerance, progress,
+                h=metre(options.h), dt=options.dt, solver=options.solver,
+            )  # fmt: skip
+        run = Run(
+            tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
+        )
+        write_single(folder, run)
+    summary = {
+        "out": str(out),
+        "model": response.model,
+        "dofs": response.effort.dofs,
+        "solver": response.effort.solver,
+        "seconds": round(sum(response.effort.seconds.values()), 2),
+    }
+    summarise(options, summary, f"{response.model}: wrote {out}/index.html")
+    return 0

@@ -1,0 +1,29 @@
+"""What accuracy costs on a scene, measured."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import add_output, add_scene, progress_of, summarise
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    add_scene(parser)
+    add_output(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.files import output_folder
+    from skinwave.scene_file import read
+    from skinwave.tradeoff import sentences, study, write
+
+    scene = read(options.scene)
+    out = options.out or Path(f"{options.scene.stem}-tradeoff")
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        with progress_of(options) as progress:
+            found = study(scene, progress)
+        write(folder, scene, found)
+    summary = {"out": str(out), "accepted": found.accepted, "sentences": sentences(found)}
+    summarise(options, summary, "\n".join([*sentences(found), f"open {out}/index.html"]))
+    return 0
