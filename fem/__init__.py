@@ -8,7 +8,7 @@ n node, p probe, t time, f frequency, l derivative along an element edge.
 """
 
 from fem.assembly import Operators, assemble
-from fem.energy import Spent, audited, imbalance, power_imbalance
+from fem.energy import Spent, audited, imbalance, mean_power, stored
 from fem.harmonic import harmonic
 from fem.linear_solver import Factor, available, factorise
 from fem.materials import PRESETS, Material, from_young
@@ -41,13 +41,14 @@ __all__ = [
     "line_response",
     "load_operator",
     "load_subspace",
+    "mean_power",
     "modes",
     "poles",
-    "power_imbalance",
     "probe_operator",
     "reduce",
     "respond",
     "static",
+    "stored",
     "transfer",
     "transient",
 ]

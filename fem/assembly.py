@@ -3,8 +3,10 @@
     K_ab,ij = int lam N_a,i N_b,j + mu (N_a,j N_b,i + delta_ij N_a,k N_b,k) dV
     M_ab,ij = delta_ij int rho N_a N_b dV
     C       = (viscosity/mu) K + Rayleigh damping for the loss factor
-              + int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
+              + R, what takes waves out of the body:
+    R       = int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
                 (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
+              + int drag rho N_a N_b dV in a layer before them
 
 Near incompressibility the part of lam beyond nu = 0.45 acts on the element mean of the
 dilatation (Nagtegaal, Parks and Rice 1974; Hughes 1980), without which displacements some
@@ -12,7 +14,7 @@ wavelengths away come out several per cent too small.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,13 +37,15 @@ LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 class Operators:
     """M u'' + C u' + K u = f on the free degrees of freedom.
 
-    `K`, `C`, `M` are sparse (n_free, n_free); `free` (n_free,) numbers their rows among the
-    3 n displacement components of the mesh, component fastest.
+    `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C that takes waves out
+    of the body; `free` (n_free,) numbers their rows among the 3 n displacement components of the
+    mesh, component fastest.
     """
 
     K: sparse.csr_array
     C: sparse.csr_array
     M: sparse.csr_array
+    R: sparse.csr_array
     free: Ints
     n_dofs: int
 
@@ -58,6 +62,7 @@ def assemble(
     *,
     fixed: str | Mapping[str, str] | ArrayLike = "clamped",
     absorbing: str | Ints | None = None,
+    drag: Floats | None = None,
 ) -> Operators:
     """Operators of a body.
 
@@ -68,6 +73,7 @@ def assemble(
     fixed : the name of a facet set that does not move; or facet set -> the components that do
         not, such as {"bottom": "xyz", "left": "x"}; or an (n, 3) bool array, True where fixed.
     absorbing : facets that let waves out, by the name of their set or as nodes, or None.
+    drag : (m,) float, 1/s, force per momentum in each element that damps waves on their way out
 
     Raises
     ------
@@ -93,11 +99,15 @@ def assemble(
         raise ValueError("every node is fixed; leave some of the body free to move")
 
     K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[region], b[region] + lag)
+    R = sparse.csr_array(K.shape)
     if absorbing is not None:
-        C = C + _dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+        R = R + _dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+    if drag is not None:
+        R = R + _drag(mesh, pattern, rho * drag)
+    C = C + R
     if len(free) < mesh.n_dofs:
-        K, C, M = (operator[free][:, free] for operator in (K, C, M))
-    return Operators(K=K, C=C, M=M, free=free, n_dofs=mesh.n_dofs)
+        K, C, M, R = (operator[free][:, free] for operator in (K, C, M, R))
+    return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,6 +201,18 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
         weights = rho[slab, None] * _jacobians(corners, 5, start)[2]
         masses[slab] = (weights @ NN).reshape(e, n_nodes, n_nodes)
     return blocks, masses
+
+
+def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
+    """int rate N_a N_b dV (3 n, 3 n), of a rate (m,) in kg/m3/s that is 0 in most elements."""
+    masses = np.zeros((len(mesh.tets), *2 * mesh.tets.shape[1:]))
+    layer = np.flatnonzero(rate)
+    none = np.zeros(len(layer))
+    part = replace(mesh, tets=mesh.tets[layer], region=mesh.region[layer], facets={})
+    masses[layer] = element_matrices(part, rate[layer], none, none)[1]
+    R = _from_masses(pattern, masses)
+    R.eliminate_zeros()
+    return R
 
 
 def _is_straight(mesh: TetMesh) -> bool:

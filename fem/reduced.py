@@ -35,13 +35,14 @@ DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 class ReducedModel:
     """u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
 
-    `basis` (3 n, r) in kg^-1/2, `K` and `C` (r, r), `outputs` (p, r); `estimate` is the relative
-    change of the probes' adjoint fields by the last moments, `moments` how many there are.
+    `basis` (3 n, r) in kg^-1/2, `K`, `C` and `R` (r, r), `outputs` (p, r); `estimate` is the
+    relative change of the probes' adjoint fields by the last moments, `moments` how many there are.
     """
 
     basis: Floats
     K: Floats
     C: Floats
+    R: Floats
     outputs: Floats
     moments: int
     estimate: float
@@ -119,6 +120,7 @@ def reduce(
         basis=operators.expand(space.basis),
         K=small_K,
         C=small_C,
+        R=space.basis.T @ (operators.R @ space.basis),
         outputs=seeds.T @ space.basis,
         moments=moment,
         estimate=_tail(errors),

@@ -20,7 +20,8 @@ class Effort:
 
     `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
     process in bytes; `solver` used; `estimate` of the relative error of the reduction;
-    `energy_imbalance`, relative, between the work of the load and what has become of it;
+    `energy_imbalance`, relative, between the work of the load and what has become of it, and the
+    share that was `radiated` through absorbing ends of all that was lost;
     `versions` of what computed it.
     """
 
@@ -32,6 +33,7 @@ class Effort:
     solver: str = "none"
     estimate: float = 0.0
     energy_imbalance: float = 0.0
+    radiated: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
 
 

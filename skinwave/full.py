@@ -40,20 +40,22 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
         )
 
 
-def checked_energy(imbalance: float, when: str = "") -> float:
-    """The imbalance, if it is small enough to trust an answer.
+def energy_balance(spent: fem.Spent, stored: float = 0.0, when: str = "") -> tuple[float, float]:
+    """The imbalance, if it is small enough to trust an answer, and the share that was radiated.
 
     Raises
     ------
     Diverged
         If it is not.
     """
+    imbalance = fem.imbalance(spent, stored)
     if not imbalance <= MOST_IMBALANCE:
         raise fem.Diverged(
             f"the energy balance is off by {100 * imbalance:.2g} %{when}, above the limit of "
             f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
         )
-    return imbalance
+    radiated = spent.radiated / spent.lost if spent.lost > 0 else 0.0
+    return imbalance, radiated
 
 
 def transient_answer(
@@ -87,9 +89,8 @@ def transient_answer(
             stepped[k] = S @ state.displacement
             report("march", k / steps)
             if k % CHECKED_EACH == 0 or k == steps:
-                energy = checked_energy(
-                    fem.imbalance(operators, state, spent), f" at t = {state.time:g} s, step {k}"
-                )
+                left = fem.stored(operators, state)
+                energy = energy_balance(spent, left, f" at t = {state.time:g} s, step {k}")
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
     return _response(
@@ -138,15 +139,18 @@ def harmonic_answer(
         patterns = lines.coefficients[:, None] * spots.T[lines.harmonics]
         frequencies, pressures = summed(lines.frequencies, patterns)
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
-        energy = 0.0
+        total = fem.Spent()
         for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):
             report("lines", k / len(frequencies))
             force = P @ pressure
             u = fem.harmonic(operators, force, f, solver=solver)
             amplitudes[k] = S @ u[0]
             free = operators.free
-            one = fem.power_imbalance(operators.C, force[None, free], u[:, free], np.array([f]))
-            energy = max(energy, checked_energy(one))
+            line = force[None, free], u[:, free], np.array([f])
+            power = fem.mean_power(operators.C, operators.R, *line)
+            energy_balance(power, when=f" at {f:g} Hz")
+            total += power
+    energy = energy_balance(total)
     waves = np.exp(2j * np.pi * times[:, None] * frequencies)
     displacement = (waves @ amplitudes).real
     count = len(frequencies)
@@ -165,7 +169,7 @@ def _response(
     operators: fem.Operators,
     steps: int,
     solver: str,
-    energy: float,
+    energy: tuple[float, float],
 ) -> Response:
     effort = Effort(
         seconds=clock.seconds,
@@ -173,7 +177,8 @@ def _response(
         steps=steps,
         peak_memory=peak_memory(),
         solver=solver,
-        energy_imbalance=energy,
+        energy_imbalance=energy[0],
+        radiated=energy[1],
         versions=versions(),
     )
     return Response(

@@ -11,7 +11,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort
 from simple_model.steady import path_knots
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.full import assembled, checked_energy, meshed
+from skinwave.full import assembled, energy_balance, meshed
 from skinwave.prepared import BAND, reduced_lines
 from skinwave.scene import Scene
 from skinwave.simulation import check_knobs
@@ -63,7 +63,8 @@ def field(
         poles = fem.poles(model, outputs=np.eye(len(model.K)))
         frequencies, forces = reduced_lines(scene.pressure, points, P.T @ model.basis)
         lines, start = fem.line_response(poles, forces, frequencies)
-        energy = checked_energy(fem.power_imbalance(model.C, forces, lines, frequencies))
+        power = fem.mean_power(model.C, model.R, forces, lines, frequencies)
+        imbalance, radiated = energy_balance(power)
         rates = np.concatenate([2j * np.pi * frequencies, poles.values])
         coordinates = fem.exponential_sum(rates, np.vstack([lines, start]), times)
         displacement = coordinates @ model.basis.T
@@ -75,7 +76,8 @@ def field(
         peak_memory=peak_memory(),
         solver=model.solver,
         estimate=model.estimate,
-        energy_imbalance=energy,
+        energy_imbalance=imbalance,
+        radiated=radiated,
         versions=versions(),
     )
     displacement = displacement.reshape(len(times), -1, 3)

@@ -12,13 +12,14 @@ from simple_model.steady import along_path, load_lines, path_knots, summed
 from skinwave import cache
 from skinwave.bodies import Build
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.full import assembled, checked_energy, meshed
+from skinwave.full import assembled, energy_balance, meshed
 from skinwave.scene import Body, Scene
 
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
 BAND = 1000.0  # Hz up to which the reduced model must be right
 REDUCTION_TOLERANCE = 1e-3
-POLES, ARRAYS = ("values", "inputs", "outputs"), ("damping", "read", "load", "points")
+POLES = ("values", "inputs", "outputs")
+ARRAYS = ("damping", "radiation", "read", "load", "points")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
 
 
@@ -31,7 +32,8 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 class Prepared:
     """A body ready to answer any Tacton at its probes.
 
-    `poles` of the reduced model, which give its coordinates (r,), and `damping` (r, r);
+    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r) and the
+    `radiation` (r, r) in it;
     `read` (p, r): displacement of the probes; `load` (k, r): reduced forces of unit pressure at
     the surface points (k, 2).
     """
@@ -39,6 +41,7 @@ class Prepared:
     probes: Floats
     poles: fem.Poles
     damping: Floats
+    radiation: Floats
     read: Floats
     load: Floats
     points: Floats
@@ -106,7 +109,8 @@ def _prepared_anew(
     with clock("diagonalise"):
         poles = fem.poles(model, outputs=np.eye(len(model.K)))
         arrays = {
-            "damping": model.C, "read": model.outputs, "load": P.T @ model.basis, "points": points
+            "damping": model.C, "radiation": model.R, "read": model.outputs,
+            "load": P.T @ model.basis, "points": points,
         }  # fmt: skip
     effort = Effort(
         seconds=clock.seconds,
@@ -139,7 +143,9 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
     with clock("lines"):
         frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
         motion, start = fem.line_response(prepared.poles, forces, frequencies)
-        energy = checked_energy(fem.power_imbalance(prepared.damping, forces, motion, frequencies))
+        damping = prepared.damping, prepared.radiation
+        power = fem.mean_power(*damping, forces, motion, frequencies)
+        imbalance, radiated = energy_balance(power)
         lines, start = motion @ prepared.read.T, start @ prepared.read.T
         strength = np.abs(lines).max(axis=1)
         heard = strength > NEGLIGIBLE_LINE * strength.max()
@@ -149,7 +155,8 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         prepared.effort,
         seconds={**prepared.effort.seconds, **clock.seconds},
         steps=int(heard.sum()),
-        energy_imbalance=energy,
+        energy_imbalance=imbalance,
+        radiated=radiated,
         peak_memory=peak_memory(),
     )
     return Response(

@@ -101,11 +101,11 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
         phases = ", ".join(f"{phase} {seconds:.1f} s" for phase, seconds in effort.seconds.items())
         rows.append(
             [label(name), f"{effort.dofs:,}", f"{effort.reduced_dofs}", f"{effort.estimate:.1e}"]
-            + [f"{effort.energy_imbalance:.0e}"]
+            + [f"{effort.energy_imbalance:.0e}", f"{100 * effort.radiated:.0f} %"]
             + [effort.solver, phases, f"{effort.peak_memory / 2**30:.2f}"]
         )
     header = ["body", "unknowns", "reduced to", "estimated reduction error"]
-    header += ["energy balance off by", "solver"]
+    header += ["energy balance off by", "of the lost, radiated", "solver"]
     header += ["preparation", "peak memory so far, GiB"]
     versions = next(iter(efforts.values())).versions if efforts else {}
     named = ", ".join(f"{name} {version}" for name, version in versions.items())

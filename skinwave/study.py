@@ -155,9 +155,10 @@ def _write_page(
     efforts = {
         body: replace(
             p.effort,
-            energy_imbalance=max(
-                r.response.effort.energy_imbalance for r in runs if r.body == body
-            ),
+            **{
+                name: max(getattr(r.response.effort, name) for r in runs if r.body == body)
+                for name in ("energy_imbalance", "radiated")
+            },
         )
         for body, p in prepared.items()
     }

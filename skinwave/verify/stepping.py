@@ -20,8 +20,8 @@ SKIN = {"density": 1000.0, "shear_modulus": 25e3, "poisson": 0.4999}
 
 def oscillator(damping: float = 0.0) -> fem.Operators:
     """One unknown of unit mass and stiffness."""
-    K, C, M = (sparse.csr_array([[value]]) for value in (1.0, damping, 1.0))
-    return fem.Operators(K=K, C=C, M=M, free=np.array([0]), n_dofs=1)
+    K, C, M, R = (sparse.csr_array([[value]]) for value in (1.0, damping, 1.0, 0.0))
+    return fem.Operators(K=K, C=C, M=M, R=R, free=np.array([0]), n_dofs=1)
 
 
 def order_in_time() -> Case:
