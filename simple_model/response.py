@@ -22,7 +22,7 @@ class Effort:
     process in bytes; `solver` used; `estimate` of the relative error of the reduction;
     `energy_imbalance`, relative, between the work of the load and what has become of it, and the
     share that was `radiated` through absorbing ends of all that was lost;
-    `versions` of what computed it.
+    `versions` of what computed it; `warnings`, sentences on what is less than was asked for.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -35,6 +35,7 @@ class Effort:
     energy_imbalance: float = 0.0
     radiated: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -54,8 +54,12 @@ def simulate(
         asked = None if model == "auto" else model
         required = plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
         if required.model == "fem" and required.prepared:
-            return answer(required.prepared, scene, progress)
-        model, h, scene = required.model, required.h, replace(scene, body=required.body)
+            return _warned(answer(required.prepared, scene, progress), required.warnings)
+        scene = replace(scene, body=required.body)
+        found = simulate(
+            scene, required.model, tolerance, progress, h=required.h or h, dt=dt, solver=solver
+        )
+        return _warned(found, required.warnings)
     times = sample_times(scene)
     if model == "point-kernel":
         return point_kernel(scene.pressure, scene.probe_points, times)
@@ -71,6 +75,10 @@ def simulate(
         scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction
     )
     return answer(prepared, scene, report)
+
+
+def _warned(response: Response, warnings: tuple[str, ...]) -> Response:
+    return replace(response, effort=replace(response.effort, warnings=warnings))
 
 
 def check_knobs(solver: str, **lengths: float | None) -> None:

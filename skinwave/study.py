@@ -102,6 +102,7 @@ def write_single(folder: Path, run: Run) -> None:
     figure = tacton_figure(run.tacton, [run])
     parts = [
         report.picture(png(figure), _caption(run.tacton, [run]), "tacton"),
+        *(report.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
         report.section("Effort", report.effort_table({run.body: run.response.effort}, 1)),
         report.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
     ]

@@ -170,3 +170,19 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
     assert "Interrupted: 15 of 45 runs" in page
     assert len(list((tmp_path / "cut").glob("*/none/response.npz"))) == 15
     assert not os.path.exists(tmp_path / "cut.partial")
+
+
+def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
+    """A run that was left to plan itself, with a ladder of meshes that ends too early."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("skinwave.refinement.FINEST", 2.0)
+    (tmp_path / "scene.toml").write_text(
+        '[tacton]\nam_frequency_hz = 140\nshape = "point"\nduration_s = 0.05\n'
+        '[body]\nkind = "sheet"\nmaterial = "paper"\nwidth_mm = 40\nheight_mm = 40\n'
+        'depth_mm = 0.1\nbase = "free"\nsides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n'
+    )
+    assert main(["run", "scene.toml", "--tolerance", "0.001", "--quiet"]) == 0
+    said = capsys.readouterr().err
+    assert "warning: elements of" in said
+    assert "more than the tolerance of 0.1 %" in said
+    assert "Take care: elements of" in (tmp_path / "scene-out/index.html").read_text()

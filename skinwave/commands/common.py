@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,9 +59,14 @@ def required_plan(options: argparse.Namespace, scene: "Scene") -> "Plan":
     required = plan(
         scene, options.tolerance, model=model, h=h, dt=options.dt, solver=options.solver
     )
-    for warning in required.warnings:
-        print(f"skinwave: warning: {warning}", file=sys.stderr)
+    warn(required.warnings)
     return required
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Say what is less than was asked for."""
+    for sentence in sentences:
+        print(f"skinwave: warning: {sentence}", file=sys.stderr)
 
 
 def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:

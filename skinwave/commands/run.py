@@ -12,6 +12,7 @@ from skinwave.commands.common import (
     progress_of,
     required_plan,
     summarise,
+    warn,
 )
 
 
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
-        if options.model != "auto" or options.h or options.dt:
+        if options.h or options.model in ("point-kernel", "flat-body"):  # runs without a plan
             required_plan(options, scene)
         with progress_of(options) as progress:
             response = simulate(
@@ -47,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
             tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
         )
         write_single(folder, run)
+    warn(response.effort.warnings)
     summary = {
         "out": str(out),
         "model": response.model,
