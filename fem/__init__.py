@@ -15,7 +15,7 @@ from fem.materials import PRESETS, Material, from_young
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.static import modes, static
-from fem.surface import facet_points, load_operator, probe_operator
+from fem.surface import facet_normals, facet_points, load_operator, probe_operator
 from fem.transient import Diverged, State, transient
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "audited",
     "available",
     "exponential_sum",
+    "facet_normals",
     "facet_points",
     "factorise",
     "from_young",

@@ -86,6 +86,12 @@ def from_young(*, young: float, poisson: float, **rest: float) -> Material:
     return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
 
 
+def _tissue(young: float) -> Material:
+    """Soft tissue that loses as much of a wave as the palm does."""
+    shear = young / (2 * (1 + 0.4999))
+    return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=2e-4 * shear)
+
+
 def rayleigh_damping(loss_factor: float, band: tuple[float, float]) -> tuple[float, float]:
     """Coefficients (a, b) of the damping a M + b K that stand in for a constant loss factor.
 
@@ -105,6 +111,13 @@ PRESETS = {
     "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
     "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
     "palm-stiff": Material(density=1000, shear_modulus=50e3, poisson=0.4999, viscosity=10.0),
+    # Layers of a hand. Moduli are those of fingertip models (Maeno, Kobayashi and Yamazaki 1998:
+    # Young's modulus 136, 80 and 34 kPa) and, for muscle, the middle of 5 to 30 kPa; published
+    # values spread over a factor of ten and more with method and strain. Losses as in the palm.
+    "epidermis": _tissue(young=136e3),
+    "dermis": _tissue(young=80e3),
+    "fat": _tissue(young=34e3),
+    "muscle": _tissue(young=15e3),
     # 80 g/m2 office paper of 0.1 mm, geometric mean of the two in-plane directions.
     "paper": from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03),
 }

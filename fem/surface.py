@@ -34,6 +34,12 @@ def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
     return np.einsum("qa,eai->eqi", N, mesh.points[nodes]).reshape(-1, 3)
 
 
+def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
+    """Unit normals (k q, 3) out of the body at the points of `facet_points`."""
+    normals = facet_geometry(mesh, facet_set(mesh, facets))[1].reshape(-1, 3)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
 def probe_operator(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top"
 ) -> sparse.csr_array:

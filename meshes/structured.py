@@ -24,6 +24,7 @@ from meshes.tetmesh import (
     quadratic,
 )
 
+CLOSEST = 0.4  # of a cell: a grid line nearer to a plane gives way to it
 MOST_UNKNOWNS = 3_000_000  # of a mesh: beyond it no factorisation fits in a workstation
 
 
@@ -126,6 +127,16 @@ def graded_axis(length: float, h: float, grading: Grading) -> Floats:
     return np.concatenate([[0.0], np.cumsum(cells)])
 
 
+def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
+    """Grid lines with further ones at given places, instead of those that are too close to them."""
+    wanted = np.array(sorted(planes))
+    inner = line[1:-1]
+    if len(wanted) and len(inner):
+        cell = np.minimum(np.diff(line)[:-1], np.diff(line)[1:])
+        inner = inner[np.abs(inner[:, None] - wanted).min(axis=1) > CLOSEST * cell]
+    return np.unique(np.concatenate([line[:1], inner, wanted, line[-1:]]))
+
+
 def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
     """Tetrahedra on the grid lines x, y, z (increasing, metre).
 
@@ -170,7 +181,9 @@ def _rectangle_triangles(nx: int, ny: int) -> tuple[Ints, int]:
     second = np.where(even, np.column_stack([a, c, d]), np.column_stack([b, c, d]))
     triangles = np.vstack([first, second])
     row, column = np.divmod(triangles, nx + 1)
-    rank = np.argsort(2 * (column % 2) + row % 2, axis=1)  # the corners of a cell all differ
+    # By parity about the middle, whose neighbours then look the same in every mesh; the corners of
+    # a cell all differ.
+    rank = np.argsort(2 * ((column - nx // 2) % 2) + (row - ny // 2) % 2, axis=1)
     return np.take_along_axis(triangles, rank, axis=1), (nx + 1) * (ny + 1)
 
 

@@ -22,6 +22,7 @@ PITCH, PISTON_RADIUS, PER_SIDE = 10.3e-3, 4.5e-3, 16  # m, m
 PRESSURE_AT_1M = 3.4  # Pa, amplitude per element on its axis
 ABSORPTION = 1.32 / (20 * np.log10(np.e))  # 1/m: 1.32 dB/m at 20 C and 50 % humidity, ISO 9613-1
 GAUSSIAN_WIDTH = 4.35e-3  # m at 200 mm: the half width of sinc^2, and the force out to 20 mm
+HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intensity
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
 
@@ -118,6 +119,16 @@ def _round_spot(squared: Floats, focus: str) -> Floats:
 def spot_width(height: float) -> float:
     """Standard deviation in metre of the Gaussian spot at a height in metre."""
     return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
+
+
+def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
+    """Relative intensity (...) on the axis at an offset (...) in metre above or below the focus.
+
+    A Gaussian whose half width goes with the square of the spot's, as diffraction has it: that of
+    `array_field` to 4 % from 100 to 300 mm, whose maximum lies up to 8 % of the height lower.
+    """
+    half_width = HALF_DEPTH * (lobe_width(height) / lobe_width(NOMINAL_HEIGHT)) ** 2
+    return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 
 def spot_reach(height: float, focus: str) -> float:

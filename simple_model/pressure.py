@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from simple_model.choices import choose
 from simple_model.drive import DRIVES
-from simple_model.focus import FOCI, NOMINAL_HEIGHT, moved_spot, relative_intensity
+from simple_model.focus import FOCI, NOMINAL_HEIGHT, along_axis, moved_spot, relative_intensity
 from simple_model.tacton import Tacton, modulation
 from simple_model.trajectory import Floats
 
@@ -20,7 +20,10 @@ IN_CACHE = 2**15  # samples worked on at a time
 
 @dataclass(frozen=True, kw_only=True)
 class MovingPressure:
-    """Pressure of a Tacton on a flat surface.
+    """Pressure of a Tacton on a surface near the plane z = 0 that its focus moves in.
+
+    Points may have a height: above or below the plane the focus is weaker. What a slope makes of
+    the pressure is the surface's own (`cos^2` of the incidence), and not part of it.
 
     Parameters
     ----------
@@ -57,14 +60,14 @@ class MovingPressure:
         relative_intensity(self.height)
 
     def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
-        """Pressure (..., n) in Pa at points (n, 2) in metre and times (...) in s."""
-        t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)[:, :2]
+        """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s."""
+        t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)
         gain, centres = self.gain(t).ravel(), self.tacton.trajectory.position(t).reshape(-1, 2)
         pressure = np.empty((t.size, len(points)))
         block = max(1, IN_CACHE // max(1, len(points)))
         for start in range(0, t.size, block):
             part = slice(start, start + block)
-            spot = moved_spot(points, centres[part], self.height, self.focus)
+            spot = self.spot(points, centres[part])
             np.multiply(gain[part, None], spot, out=pressure[part])
         return pressure.reshape(*t.shape, len(points))
 
@@ -78,6 +81,9 @@ class MovingPressure:
         return self.peak_pressure * relative_intensity(self.height) * driven
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
-        """Relative pressure (..., n) at points (n, 2) with the focus at centres (..., 2)."""
-        points = np.asarray(points, np.float64)[:, :2]
-        return moved_spot(points, np.asarray(centre, np.float64), self.height, self.focus)
+        """Relative pressure (..., n) at points (n, 2 or 3) with the focus at centres (..., 2)."""
+        points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
+        spot = moved_spot(points[:, :2], centre, self.height, self.focus)
+        if points.shape[1] == 3 and points[:, 2].any():
+            spot *= along_axis(points[:, 2], self.height)
+        return spot

@@ -1,19 +1,31 @@
 """From a body to its mesh: element sizes, the material that the mesh is made of, its ends."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
+from scipy import sparse
 
+from fem.assembly import Operators, assemble
 from fem.materials import Material
-from meshes import Grading, TetMesh, block, graded_axis, half, sheet
-from meshes.structured import check_size, round_up
-from meshes.tetmesh import Ints
+from fem.surface import facet_normals, facet_points, load_operator
+from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
+from meshes.structured import check_size, round_up, with_planes
+from meshes.tetmesh import Floats, Ints
 from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
 from skinwave.scene import Body
 
 SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m: the palm-sized paths; cells; of h
+# A layer around absorbing sides, in which a drag that rises with the square of the depth lets waves
+# die out: dashpots alone send back a quarter of a shear wave at 30 degrees. Near the cut-on of a
+# slab on a rigid base, c_s/(4 depth), waves are long, and only a wide layer takes them. Its cells
+# may grow fast: coarser than this they begin to reflect (one and a half per cent at a quarter of
+# the width, a tenth of it with dashpots alone; measured line by line in a plane slab).
+LAYER_WIDTH, LAYER_DRAG = 10.0, 0.3  # of the depth; of the angular frequency of cut-on
+LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
+LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and the fatter elements are far more accurate: thin ones lock.
@@ -22,12 +34,13 @@ SHEET_THICKNESS = 0.01
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Build:
-    """How a body is meshed: arguments of `fem.assemble`."""
+    """How a body is meshed: arguments of `fem.assemble`; `drag` (m,) in 1/s or None."""
 
     mesh: TetMesh
-    material: Material
+    material: dict[int, Material]
     fixed: dict[str, str]
     absorbing: Ints | None
+    drag: Floats | None = None
     symmetry: str = ""
 
 
@@ -44,27 +57,49 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
     ValueError
         If the body is "none", or would have too many unknowns.
     """
-    size = _checked(body, h or default_size(body))
+    size, drag = _checked(body, h or default_size(body)), None
     if body.kind == "sheet":
         thickness = max(body.depth, SHEET_THICKNESS * min(body.width, body.height))
         mesh = sheet(body.width, body.height, thickness, size)
-        material = bending_equivalent(body.solid, body.depth / thickness)
+        materials: Sequence[Material] = [bending_equivalent(body.solid, body.depth / thickness)]
     else:
-        mesh = block((body.width, body.height, body.depth), size, grading=_grading(size))
-        material = body.solid
+        starts, materials = zip(*body.strata, strict=True)
+        mesh = in_strata(extrude(*_slab_lines(body, size)), starts)
     ends = {"bottom": body.base, "sides": body.sides}
     fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
     for axis in symmetry:
         mesh = half(mesh, axis)
         fixed[f"mirror_{axis}"] = axis
+    if has_layer(body):
+        drag = _layer_drag(body, mesh)
+    mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
     return Build(
         mesh=mesh,
-        material=material,
+        material=dict(enumerate(materials)),
         fixed=fixed,
         absorbing=np.vstack(leaky) if leaky else None,
+        drag=drag,
         symmetry=symmetry,
     )
+
+
+def operators(build: Build) -> Operators:
+    """Stiffness, damping and mass of a meshed body."""
+    return assemble(
+        build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing, drag=build.drag
+    )
+
+
+def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
+    """P (3 n, k): nodal forces in N of the pressure in Pa that a surface across the beam would
+    feel, and the points (k, 3) in metre where it is taken.
+
+    Radiation pressure goes with the square of the cosine of incidence: once for the beam that a
+    sloping surface spreads over, and once for the momentum that it turns back along its normal.
+    """
+    cosine = np.maximum(facet_normals(build.mesh)[:, 2], 0.0)
+    return load_operator(build.mesh) * cosine**2, facet_points(build.mesh)
 
 
 def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
@@ -80,11 +115,55 @@ def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
         halves = [max(1, round_up(side / (2 * h))) for side in sides]
         layers = 1
     else:
-        halves = [len(graded_axis(side / 2, h, _grading(h))) - 1 for side in sides]
-        layers = len(graded_axis(body.depth, h, replace(_grading(h), radius=0.0))) - 1
+        x_line, y_line, z_line = _slab_lines(body, h)
+        halves = [len(line) // 2 for line in (x_line, y_line)]
+        layers = len(z_line) - 1
     check_size((2 * halves[0], 2 * halves[1], layers))
     x, y = (n if axis in symmetry else 2 * n for axis, n in zip("xy", halves, strict=True))
     return x, y, layers
+
+
+def _slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
+    """Grid lines along x, y and z: fine where the focus travels, with a layer that absorbs."""
+    grading = _grading(h)
+    halves = [graded_axis(side / 2, h, grading) for side in (body.width, body.height)]
+    if has_layer(body):
+        halves = [np.concatenate([half, half[-1] + _layer_line(body, half)]) for half in halves]
+    x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
+    z = graded_axis(body.depth, h, replace(grading, radius=0.0))
+    return x, y, -with_planes(z, [start for start, _ in body.strata[1:]])[::-1]
+
+
+def in_strata(mesh: TetMesh, starts: Sequence[float]) -> TetMesh:
+    """The mesh with each tetrahedron in the region of the stratum that its middle lies in."""
+    depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+    return replace(mesh, region=np.searchsorted(starts[1:], depth, side="right"))
+
+
+def has_layer(body: Body) -> bool:
+    """Whether more is meshed around a body than itself, to take waves away."""
+    return body.kind == "slab" and body.sides == "absorbing"
+
+
+def layer_scale(body: Body) -> float:
+    """The length in metre that an absorbing layer is a multiple of: the depth, if that counts."""
+    return min(body.depth, body.solid.shear_speed / (4 * LOWEST_CUT_ON))
+
+
+def _layer_line(body: Body, half: Floats) -> Floats:
+    """Grid lines of the layer, from where the body ends."""
+    scale = layer_scale(body)
+    grading = Grading(radius=0.0, growth=LAYER_GROWTH, coarsest=LAYER_COARSEST * scale)
+    first = min(LAYER_GROWTH * (half[-1] - half[-2]), grading.coarsest)
+    return graded_axis(LAYER_WIDTH * scale, first, grading)[1:]
+
+
+def _layer_drag(body: Body, mesh: TetMesh) -> Floats:
+    """Drag (m,) in 1/s of each element: 0 in the body, rising with the square of the distance."""
+    scale, ends = layer_scale(body), np.array([body.width, body.height]) / 2
+    middles = np.abs(mesh.points[mesh.tets[:, :4], :2].mean(axis=1))
+    beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / (LAYER_WIDTH * scale)
+    return LAYER_DRAG * 2 * np.pi * body.solid.shear_speed / (4 * scale) * beyond**2
 
 
 def _checked(body: Body, h: float) -> float:

@@ -12,7 +12,7 @@ from simple_model.steady import load_lines, summed
 from skinwave.bodies import compliance
 from skinwave.scene import Scene
 
-REFLECTED = 0.3  # of a wave that meets an absorbing side
+REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
 FAR = 0.25  # m, beyond which waves are not followed
 
 
@@ -45,7 +45,7 @@ def is_flat(scene: Scene) -> bool:
     """Whether there are exact waves for the scene, but for what its sides send back."""
     body = scene.body
     layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
-    return layer and scene.pressure.focus == "gaussian"
+    return layer and body.is_plain and scene.pressure.focus == "gaussian"
 
 
 def waves_returned(

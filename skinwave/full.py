@@ -11,7 +11,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.steady import along_path, load_lines, path_knots, summed
-from skinwave.bodies import Build
+from skinwave.bodies import Build, operators, surface_load
 from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.scene import Body, Scene
@@ -35,9 +35,7 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
     """A meshed body's operators."""
     with clock("assemble"):
         report("assemble", 0.0)
-        return fem.assemble(
-            build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing
-        )
+        return operators(build)
 
 
 def energy_balance(spent: fem.Spent, stored: float = 0.0, when: str = "") -> tuple[float, float]:
@@ -72,8 +70,8 @@ def transient_answer(
     steps = step_count(float(times[-1]), dt)
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
-    operators = assembled(build, clock, report)
-    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    ops = assembled(build, clock, report)
+    P, points = surface_load(build)
     S = fem.probe_operator(build.mesh, scene.probe_points)
     stepped = np.empty((steps + 1, len(scene.probes)))
     report("factorise", 0.0)
@@ -83,19 +81,17 @@ def transient_answer(
         return P @ scene.pressure(points, t)
 
     with clock("march"):
-        states = fem.transient(operators, force, dt, solver=solver)
-        audited = fem.audited(operators, islice(states, steps + 1), force)
+        states = fem.transient(ops, force, dt, solver=solver)
+        audited = fem.audited(ops, islice(states, steps + 1), force)
         for k, (state, spent) in enumerate(audited):
             stepped[k] = S @ state.displacement
             report("march", k / steps)
             if k % CHECKED_EACH == 0 or k == steps:
-                left = fem.stored(operators, state)
+                left = fem.stored(ops, state)
                 energy = energy_balance(spent, left, f" at t = {state.time:g} s, step {k}")
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
-    return _response(
-        "fem-transient", scene, times, displacement, clock, operators, steps, used, energy
-    )
+    return _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
 
 
 def step_count(duration: float, dt: float) -> int:
@@ -130,8 +126,8 @@ def harmonic_answer(
     """The steady state: one factorisation for each line of the load above the threshold."""
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
-    operators = assembled(build, clock, report)
-    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    ops = assembled(build, clock, report)
+    P, points = surface_load(build)
     S = fem.probe_operator(build.mesh, scene.probe_points)
     with clock("lines"):
         lines = load_lines(scene.pressure, threshold)
@@ -143,11 +139,11 @@ def harmonic_answer(
         for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):
             report("lines", k / len(frequencies))
             force = P @ pressure
-            u = fem.harmonic(operators, force, f, solver=solver)
+            u = fem.harmonic(ops, force, f, solver=solver)
             amplitudes[k] = S @ u[0]
-            free = operators.free
+            free = ops.free
             line = force[None, free], u[:, free], np.array([f])
-            power = fem.mean_power(operators.C, operators.R, *line)
+            power = fem.mean_power(ops.C, ops.R, *line)
             energy_balance(power, when=f" at {f:g} Hz")
             total += power
     energy = energy_balance(total)
@@ -155,9 +151,7 @@ def harmonic_answer(
     displacement = (waves @ amplitudes).real
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
-    return _response(
-        "fem-harmonic", scene, times, displacement, clock, operators, count, used, energy
-    )
+    return _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
 
 
 def _response(

@@ -10,6 +10,7 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort
 from simple_model.steady import path_knots
+from skinwave.bodies import surface_load
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.full import assembled, energy_balance, meshed
 from skinwave.prepared import BAND, reduced_lines
@@ -50,7 +51,7 @@ def field(
     clock, report = Clock(), progress or silent
     build = meshed(scene.body, h, clock, report)
     operators = assembled(build, clock, report)
-    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    P, points = surface_load(build)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         spots = scene.pressure.spot(points, path_knots(scene.pressure))

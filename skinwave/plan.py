@@ -21,7 +21,7 @@ from skinwave.estimates import (
 from skinwave.full import TRANSIENT_RATE, step_count
 from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
 from skinwave.refinement import AIM, ORDER, Refined, refined
-from skinwave.scene import Body, Scene
+from skinwave.scene import FLAT, Body, Scene
 from skinwave.sensitivity import sensitivity
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
@@ -112,7 +112,7 @@ def plan(
     if h:
         cells(body, h)  # refuses what cannot be meshed before anything is computed
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *extent]
-    symmetry = _symmetry(scene) if model in (None, "fem") else ""
+    symmetry = _symmetry(scene) if model in (None, "fem") and body.placement == FLAT else ""
     found = refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver, h=h)
     scene = replace(scene, body=body)
     step_error, start_error = _march_errors(scene, model, dt)
@@ -223,6 +223,10 @@ def _why_elements(scene: Scene) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
         return f"exact waves need a Gaussian focus, not '{scene.pressure.focus}'"
+    if len(body.strata) > 1:
+        return f"{len(body.strata)} layers; exact waves are for one material"
+    if body.placement != FLAT:
+        return "the body is tilted or moved; exact waves are for a flat one across the beam"
     return f"the {body.sides} sides of this {body.kind} reflect; exact waves are endless"
 
 
@@ -252,7 +256,7 @@ def _half_widths(body: Body) -> Floats:
 def _extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
     """The body as far as waves come back from, and the reason if that is not all of it."""
     body = scene.body
-    if body.kind != "slab" or body.base != "clamped":
+    if body.kind != "slab" or body.base != "clamped" or not body.is_plain:
         return body, []
     half = _half_widths(body)
     cut = half.copy()

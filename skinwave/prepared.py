@@ -10,7 +10,7 @@ from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
 from simple_model.steady import along_path, load_lines, path_knots, summed
 from skinwave import cache
-from skinwave.bodies import Build
+from skinwave.bodies import Build, surface_load
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.full import assembled, energy_balance, meshed
 from skinwave.scene import Body, Scene
@@ -35,7 +35,7 @@ class Prepared:
     `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r) and the
     `radiation` (r, r) in it;
     `read` (p, r): displacement of the probes; `load` (k, r): reduced forces of unit pressure at
-    the surface points (k, 2).
+    the surface points (k, 3).
     """
 
     probes: Floats
@@ -64,9 +64,17 @@ def prepare(
     """
     clock = Clock()
     build = meshed(body, h, clock, silent, symmetry)
-    mesh, ends = build.mesh, (build.fixed, build.absorbing)
+    mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
     name = cache.key(
-        mesh.points, mesh.tets, build.material, *ends, probes, BAND, tolerance, versions()
+        mesh.points,
+        mesh.tets,
+        mesh.region,
+        build.material,
+        *ends,
+        probes,
+        BAND,
+        tolerance,
+        versions(),
     )
     with clock("read from cache"):
         entry = cache.load(name) or {}
@@ -96,7 +104,7 @@ def _prepared_anew(
     mesh, operators = build.mesh, assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+        P, points = surface_load(build)
         model = fem.reduce(
             operators,
             fem.probe_operator(mesh, _mirrored(probes, build.symmetry)),
@@ -177,7 +185,7 @@ def reduced_lines(
     forces = []
     for part in np.array_split(knots, len(knots) // 64 + 1):
         low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
-        near = ((points > low) & (points < high)).all(axis=1)
+        near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
         forces.append(pressure.spot(points[near], part) @ load[near])
     of_path = along_path(np.vstack(forces).T).T
     return summed(lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics])
@@ -187,5 +195,5 @@ def typical_spots(body: Body, points: Floats) -> Floats:
     """Unit Gaussian spots (n, 12) where palm-sized paths run, to judge a reduction by."""
     reach = min(20e-3, body.width / 3, body.height / 3)
     centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
-    squared = ((points[:, None] - centres) ** 2).sum(axis=2)
+    squared = ((points[:, None, :2] - centres) ** 2).sum(axis=2)
     return np.exp(-squared / (2 * spot_width(0.2) ** 2))

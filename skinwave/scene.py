@@ -16,6 +16,86 @@ BASES = ("clamped", "absorbing", "free")
 
 
 @dataclass(frozen=True, kw_only=True)
+class Layer:
+    """A layer below the surface, or below the layer above it.
+
+    Parameters
+    ----------
+    thickness : float, metre
+    material : the name of a preset, or a Material
+
+    Raises
+    ------
+    ValueError
+        If the material is unknown, or the thickness not finite and above 0.
+    """
+
+    thickness: float
+    material: str | Material
+
+    def __post_init__(self) -> None:
+        _check_material(self.material)
+        if not (isfinite(self.thickness) and self.thickness > 0):
+            raise ValueError(
+                f"layer thickness = {1e3 * self.thickness} mm must be finite and above 0"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """Where a body lies under the device: turned about the x axis, then about the y axis of the
+    plane that the focus moves in, then moved.
+
+    Parameters
+    ----------
+    tilt_x, tilt_y : float, rad, at most 60 degrees
+    offset : (x, y) in metre
+    lift : float, metre, upwards, towards the device
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or out of range.
+    """
+
+    tilt_x: float = 0.0
+    tilt_y: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+    lift: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("tilt_x", "tilt_y"):
+            if not abs(getattr(self, name)) <= STEEPEST:
+                raise ValueError(
+                    f"{name} = {np.degrees(getattr(self, name)):g} degrees is beyond "
+                    f"{np.degrees(STEEPEST):.0f}, where next to no pressure is left; turn it less"
+                )
+        if not (np.isfinite(self.offset).all() and abs(self.lift) <= FURTHEST_LIFT):
+            raise ValueError(
+                f"offset {self.offset} m and lift {self.lift} m: the body must lie within "
+                f"{1e3 * FURTHEST_LIFT:g} mm of the focus; move the height of the focus with it"
+            )
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """The matrix (3, 3) that turns the body."""
+        (cx, cy), (sx, sy) = np.cos([self.tilt_x, self.tilt_y]), np.sin([self.tilt_x, self.tilt_y])
+        about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+        about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        return about_y @ about_x
+
+    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) of the body where they lie under the device."""
+        if self == FLAT:
+            return points
+        return points @ self.rotation.T + [*self.offset, self.lift]
+
+
+STEEPEST, FURTHEST_LIFT = np.pi / 3, 0.05
+FLAT = Placement()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Body:
     """A flat body below the plane that the focus moves in, centred under the origin.
 
@@ -26,6 +106,8 @@ class Body:
     width, height, depth : float, metre, along x, y and downwards; a slab's depth may be inf,
         a half-space, which only flat-body answers
     base, sides : "clamped", "absorbing" or "free"
+    layers : from the surface of a slab downwards; what is below them is of `material`
+    placement : how the body lies under the device
 
     Raises
     ------
@@ -40,11 +122,12 @@ class Body:
     depth: float = 0.015
     base: str = "clamped"
     sides: str = "absorbing"
+    layers: tuple[Layer, ...] = ()
+    placement: Placement = FLAT
 
     def __post_init__(self) -> None:
         choose("body kind", self.kind, KINDS)
-        if isinstance(self.material, str):
-            choose("material", self.material, PRESETS)
+        _check_material(self.material)
         for name in ("base", "sides"):
             choose(name, getattr(self, name), BASES)
         for name in ("width", "height", "depth"):
@@ -54,10 +137,52 @@ class Body:
         if self.kind != "none" and self.base == self.sides == "free":
             raise ValueError("a body with free base and free sides flies away; clamp one of them")
 
+        self._check_layers()
+
+    def _check_layers(self) -> None:
+        if not self.layers:
+            return
+        if self.kind in ("none", "sheet"):
+            raise ValueError(f"a body of kind '{self.kind}' has no layers; leave them out")
+        if (below := sum(layer.thickness for layer in self.layers)) >= self.depth:
+            raise ValueError(
+                f"the layers are {1e3 * below:g} mm thick in all, but the body is "
+                f"{1e3 * self.depth:g} mm deep; leave some of it for what is below them"
+            )
+
     @property
     def solid(self) -> Material:
-        """The material itself."""
-        return PRESETS[self.material] if isinstance(self.material, str) else self.material
+        """The material itself, below all layers."""
+        return solid_of(self.material)
+
+    @property
+    def strata(self) -> tuple[tuple[float, Material], ...]:
+        """Depth in metre where each material begins; neighbours of one material are one."""
+        found: list[tuple[float, Material]] = []
+        top = 0.0
+        for thickness, material in [
+            *((layer.thickness, solid_of(layer.material)) for layer in self.layers),
+            (inf, self.solid),
+        ]:
+            if not found or found[-1][1] != material:
+                found.append((top, material))
+            top += thickness
+        return tuple(found)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is of one material and lies flat under the device."""
+        return len(self.strata) == 1 and self.placement == FLAT
+
+
+def solid_of(material: str | Material) -> Material:
+    """The material that a name stands for."""
+    return PRESETS[material] if isinstance(material, str) else material
+
+
+def _check_material(material: str | Material) -> None:
+    if isinstance(material, str):
+        choose("material", material, PRESETS)
 
 
 BODIES = {

@@ -4,7 +4,7 @@ import difflib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import inf, isfinite, nextafter
+from math import inf, isfinite, nextafter, pi
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import tomli_w
 from fem.materials import Material
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
-from skinwave.scene import BODIES, KINDS, Body, Scene
+from skinwave.scene import BODIES, KINDS, Body, Layer, Placement, Scene
 
 LARGEST = 1_000_000  # bytes of a file
 
@@ -52,7 +52,7 @@ def loads(text: str) -> Scene:
         section: _checked(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()
     }
-    body = _body(parts["body"])
+    body = _body(parts["body"] | parts["placement"])
     tacton, path = _split(parts["tacton"], ("shape", "size", "speed", "sweep"))
     presets = {"drive": "linear", "focus": "main_lobe"} if body.kind == "none" else {}
     pressure = MovingPressure(
@@ -73,6 +73,7 @@ def dumps(scene: Scene) -> str:
         "tacton": (tacton, path),
         "focus": (pressure,),
         "body": (body,),
+        "placement": (body.placement,),
         "probes": (scene,),
     }
     table: dict[str, Any] = {"name": scene.name}
@@ -83,6 +84,7 @@ def dumps(scene: Scene) -> str:
             table[section][key] = field.write(getattr(source, field.name))
     if body.kind == "none":
         table["body"] = {"kind": "none"}
+        del table["placement"]
     return tomli_w.dumps(table)
 
 
@@ -156,6 +158,30 @@ def _write_material(material: str | Material) -> Any:
     return {key: field.write(getattr(material, field.name)) for key, field in MATERIAL.items()}
 
 
+def _layers(key: str, value: Any) -> tuple[Layer, ...]:
+    if not isinstance(value, list):
+        raise ValueError(f"{key} = {_shown(value)} must be tables, each under [[body.{key}]]")
+    found = []
+    for table in value:
+        values = _checked(f"[[body.{key}]]", _table(f"body.{key}", table), LAYER)
+        if missing := [k for k, field in LAYER.items() if field.name not in values]:
+            raise ValueError(f"[[body.{key}]] lacks {' and '.join(missing)}; give it")
+        found.append(Layer(**values))
+    return tuple(found)
+
+
+def _write_layers(layers: tuple[Layer, ...]) -> Any:
+    return [
+        {key: field.write(getattr(layer, field.name)) for key, field in LAYER.items()}
+        for layer in layers
+    ]
+
+
+def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
+    x, y = _pair(key, value)
+    return x / 1e3, y / 1e3
+
+
 def _scaled(name: str, per_unit: float = 1.0) -> Field:
     """A number whose unit in the file is `per_unit` times smaller than inside."""
     return Field(
@@ -185,6 +211,10 @@ MATERIAL = {
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
 }
+LAYER = {
+    "thickness_mm": _scaled("thickness", 1e3),
+    "material": Field("material", _material, _write_material),
+}
 SECTIONS = {
     "tacton": {
         "amplitude_percent": _scaled("amplitude", 100),
@@ -213,6 +243,15 @@ SECTIONS = {
         "depth_mm": _scaled("depth", 1e3),
         "base": _word("base"),
         "sides": _word("sides"),
+        "layers": Field("layers", _layers, _write_layers),
+    },
+    "placement": {
+        "tilt_x_deg": _scaled("tilt_x", 180 / pi),
+        "tilt_y_deg": _scaled("tilt_y", 180 / pi),
+        "offset_mm": Field(
+            "offset", _pair_in_mm, lambda offset: [_in_units(x, 1e3) for x in offset]
+        ),
+        "lift_mm": _scaled("lift", 1e3),
     },
     "probes": {
         "points_mm": Field(
@@ -228,7 +267,8 @@ def _body(values: dict[str, Any]) -> Body:
     presets = {"none": "none", "sheet": "paper-sheet", "slab": "skin-slab"}
     kind = values.get("kind", "slab")
     choose("body kind", kind, KINDS)
-    return replace(BODIES[presets[kind]], **values)
+    shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
+    return replace(BODIES[presets[kind]], **shape, placement=Placement(**placement))
 
 
 def _checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:

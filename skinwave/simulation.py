@@ -64,6 +64,11 @@ def simulate(
     if model == "point-kernel":
         return point_kernel(scene.pressure, scene.probe_points, times)
     if model == "flat-body":
+        if not scene.body.is_plain:
+            raise ValueError(
+                "flat-body takes one material that lies flat across the beam, not layers or a "
+                "placement; use fem"
+            )
         return flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
     report = progress or silent
     if model == "fem-transient":

@@ -14,6 +14,7 @@ import skinwave
 from fem import linear_solver
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import build as build_body
+from skinwave.bodies import operators
 from skinwave.full import energy_balance
 from skinwave.motion import field
 from skinwave.paper15 import scenes
@@ -250,7 +251,7 @@ def test_a_field_is_the_transients_everywhere():
     scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0),))
     found = field(scene, np.arange(6) * 4e-3, tolerance=5e-3, h=0.005)
     build = build_body(body, 0.005)
-    ops = fem.assemble(build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing)
+    ops = operators(build)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 2.5e-5), 0, 801, 160)
     full = np.array([state.displacement for state in states]).reshape(found.displacement.shape)

@@ -9,7 +9,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.focus import spot_width
-from skinwave.bodies import build
+from skinwave.bodies import build, operators
 from skinwave.prepared import Prepared, answer, prepare
 from skinwave.scene import Body, Scene
 from skinwave.verify.case import Case, below, relative
@@ -29,7 +29,7 @@ def _prepared() -> Prepared:
 def _static(pressure: MovingPressure, ring: int) -> tuple[float, ...]:
     """Displacement of the probes at rest under the mean of so many spots along the path."""
     made = build(BODY, H)
-    ops = fem.assemble(made.mesh, made.material, fixed=made.fixed, absorbing=made.absorbing)
+    ops = operators(made)
     points = fem.facet_points(made.mesh)[:, :2]
     centres = pressure.tacton.trajectory.at_phase(np.arange(ring) / ring)
     spot = pressure.spot(points, centres).mean(axis=0) * float(pressure.gain(np.zeros(1))[0])
@@ -93,7 +93,7 @@ def modulation_frequencies() -> Case:
     ]
     fast = float(lines(_answered(0.5, am=1000.0), [1000.0])[0, 0])
     made = build(BODY, H)
-    ops = fem.assemble(made.mesh, made.material, fixed=made.fixed, absorbing=made.absorbing)
+    ops = operators(made)
     load = MovingPressure(tacton=Tacton(), drive="linear")
     points = fem.facet_points(made.mesh)[:, :2]
     force = fem.load_operator(made.mesh) @ load(points, 0.0)
