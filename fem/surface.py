@@ -60,6 +60,8 @@ def probe_operator(
         raise ValueError("there are no facets to read; name a facet set that is not empty")
     points = points[:, :2]
     owner, barycentric = _locate(mesh.points[nodes[:, :3], :2], points)
+    if mesh.order == 2:
+        barycentric = _on_curved(mesh.points[nodes[owner], :2], barycentric, points)
     normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     N = shape_functions(barycentric, nodes.shape[1])
@@ -84,6 +86,22 @@ def facet_geometry(mesh: TetMesh, nodes: Ints) -> tuple[Floats, Floats]:
     tangents = np.einsum("qal,eai->eqli", derivatives, mesh.points[nodes], optimize=True)
     normals = np.cross(tangents[:, :, 0], tangents[:, :, 1]) / 2
     return shape_functions(barycentric, nodes.shape[1]), normals * weights[:, None]
+
+
+def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:
+    """Where (p, 3) curved facets (p, a, 2), seen along z, pass over points (p, 2): Newton's method.
+
+    A point next to the edge of a bowed facet may lie a little beyond it, which is as good.
+    """
+    for _ in range(4):
+        N = shape_functions(barycentric, facets.shape[1])
+        miss = points - np.einsum("pa,pai->pi", N, facets)
+        tangents = np.einsum(
+            "pal,pai->pil", shape_derivatives(barycentric, facets.shape[1]), facets
+        )
+        step = np.linalg.solve(tangents, miss[:, :, None])[:, :, 0]
+        barycentric = barycentric + np.column_stack([-step.sum(axis=1), step])
+    return barycentric
 
 
 def _locate(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:

@@ -17,13 +17,15 @@ from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
 from skinwave.scene import Body
 
 SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
-FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m: the palm-sized paths; cells; of h
+FINE_RADIUS = 30e-3  # m: the palm-sized paths
+# From cell to cell along the surface and downwards, and the coarsest cell over the finest.
+GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 # A layer around absorbing sides, in which a drag that rises with the square of the depth lets waves
 # die out: dashpots alone send back a quarter of a shear wave at 30 degrees. Near the cut-on of a
 # slab on a rigid base, c_s/(4 depth), waves are long, and only a wide layer takes them. Its cells
-# may grow fast: coarser than this they begin to reflect (one and a half per cent at a quarter of
-# the width, a tenth of it with dashpots alone; measured line by line in a plane slab).
-LAYER_WIDTH, LAYER_DRAG = 10.0, 0.3  # of the depth; of the angular frequency of cut-on
+# may grow fast. What a plane slab of 50 mm sends back is at most 1.4 % of the motion at the focus
+# at any line, where dashpots alone send back 17 % (`skinwave.verify.sides`).
+LAYER_WIDTH, LAYER_DRAG = 7.0, 0.35  # of the depth; of the angular frequency of cut-on
 LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
 LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
@@ -64,14 +66,14 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
         materials: Sequence[Material] = [bending_equivalent(body.solid, body.depth / thickness)]
     else:
         starts, materials = zip(*body.strata, strict=True)
-        mesh = in_strata(extrude(*_slab_lines(body, size)), starts)
+        mesh = in_strata(extrude(*slab_lines(body, size)), starts)
     ends = {"bottom": body.base, "sides": body.sides}
     fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
     for axis in symmetry:
         mesh = half(mesh, axis)
         fixed[f"mirror_{axis}"] = axis
     if has_layer(body):
-        drag = _layer_drag(body, mesh)
+        drag = layer_drag(body, mesh)
     mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
     return Build(
@@ -115,7 +117,7 @@ def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
         halves = [max(1, round_up(side / (2 * h))) for side in sides]
         layers = 1
     else:
-        x_line, y_line, z_line = _slab_lines(body, h)
+        x_line, y_line, z_line = slab_lines(body, h)
         halves = [len(line) // 2 for line in (x_line, y_line)]
         layers = len(z_line) - 1
     check_size((2 * halves[0], 2 * halves[1], layers))
@@ -123,14 +125,17 @@ def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
     return x, y, layers
 
 
-def _slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
+def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
     """Grid lines along x, y and z: fine where the focus travels, with a layer that absorbs."""
-    grading = _grading(h)
-    halves = [graded_axis(side / 2, h, grading) for side in (body.width, body.height)]
+    along, down = (
+        Grading(radius=radius, growth=growth, coarsest=coarsest * h)
+        for radius, growth, coarsest in zip((FINE_RADIUS, 0.0), GROWTH, COARSEST, strict=True)
+    )
+    halves = [graded_axis(side / 2, h, along) for side in (body.width, body.height)]
     if has_layer(body):
         halves = [np.concatenate([half, half[-1] + _layer_line(body, half)]) for half in halves]
     x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
-    z = graded_axis(body.depth, h, replace(grading, radius=0.0))
+    z = graded_axis(body.depth, h, down)
     return x, y, -with_planes(z, [start for start, _ in body.strata[1:]])[::-1]
 
 
@@ -158,7 +163,7 @@ def _layer_line(body: Body, half: Floats) -> Floats:
     return graded_axis(LAYER_WIDTH * scale, first, grading)[1:]
 
 
-def _layer_drag(body: Body, mesh: TetMesh) -> Floats:
+def layer_drag(body: Body, mesh: TetMesh) -> Floats:
     """Drag (m,) in 1/s of each element: 0 in the body, rising with the square of the distance."""
     scale, ends = layer_scale(body), np.array([body.width, body.height]) / 2
     middles = np.abs(mesh.points[mesh.tets[:, :4], :2].mean(axis=1))
@@ -178,10 +183,6 @@ def _checked(body: Body, h: float) -> float:
             f"{1e3 * longest:g} mm; take smaller ones"
         )
     return h
-
-
-def _grading(h: float) -> Grading:
-    return Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
 
 
 def default_size(body: Body) -> float:

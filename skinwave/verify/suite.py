@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from skinwave.effort import Progress, versions
-from skinwave.verify import elements, exact, extremes, plates, statics, stepping, waves
+from skinwave.verify import elements, exact, extremes, plates, sides, statics, stepping, waves
 from skinwave.verify import manufactured as fields
 from skinwave.verify.case import Case, Check, Entry, Result
 from skinwave.verify.page import page
@@ -89,6 +89,7 @@ def _waves() -> Iterable[Entry]:
     yield Entry(name="absorbed-pulse", topic=topic, run=waves.absorbed_pulse)
     yield Entry(name="oblique-sh", topic=topic, run=waves.oblique_shear)
     yield Entry(name="oblique-p-sv", topic=topic, run=waves.oblique_in_plane)
+    yield Entry(name="absorbing-layer", topic=topic, run=sides.layer_around_a_slab)
 
 
 def _exact() -> Iterable[Entry]:

@@ -1,0 +1,56 @@
+"""What the sides of a body that stands for an endless one send back."""
+
+from dataclasses import replace
+
+import numpy as np
+
+import fem
+import meshes
+from meshes.tetmesh import Floats
+from skinwave.bodies import layer_drag, slab_lines
+from skinwave.scene import Body
+from skinwave.verify.case import Case, Plot, below
+
+HERTZ = np.array([20.0, 51.0, 70.0, 80.0, 90.0, 100.0, 111.0, 140.0, 191.0, 271.0])
+PROBES = np.arange(5) * 0.005  # m
+H, SLAB = 2.5e-3, Body(width=0.05, height=0.05)
+
+
+def layer_around_a_slab() -> Case:
+    """A plane slab on a rigid base, whose waves are longest at its cut-on of 83 Hz."""
+    endless = _motion(replace(SLAB, width=1.6), layer=True)
+    found = {name: _motion(SLAB, layer=name == "layer") for name in ("layer", "dashpots alone")}
+    errors = {
+        name: np.abs(u - endless).max(axis=1) / np.abs(endless).max(axis=1)
+        for name, u in found.items()
+    }
+    return Case(
+        title="A layer around a slab takes its waves away",
+        source="a body so wide that nothing comes back; dashpots: Lysmer and Kuhlemeyer (1969)",
+        mesh="plane slab 50 mm wide and 15 mm deep, cells of 2.5 mm, the layer 105 mm wide",
+        checks=(
+            below("largest error at any line, over the motion at the focus",
+                  errors["layer"].max(), 0.02),
+            below("at 20 and 51 Hz", errors["layer"][:2].max(), 0.001),
+        ),
+        plot=Plot(x="frequency, Hz", y="error over the motion at the focus", log=True,
+                  lines={name: (HERTZ, error) for name, error in errors.items()}),
+        note=f"With dashpots alone up to {100 * errors['dashpots alone'].max():.0f} % come back.",
+    )  # fmt: skip
+
+
+def _motion(body: Body, *, layer: bool) -> fem.Complex:
+    """Displacement (f, p) in metre under a line focus, in the half x > 0 of a plane slab."""
+    x, _, z = slab_lines(body if layer else replace(body, sides="clamped"), H)
+    mesh = meshes.half(meshes.extrude(x, [0, H], z), "x")
+    ops = fem.assemble(
+        mesh, body.solid, fixed={"bottom": "xyz", "mirror_x": "x", "front": "y", "back": "y"},
+        absorbing="right", drag=layer_drag(body, mesh) if layer else None,
+    )  # fmt: skip
+    force = fem.load_operator(mesh) @ _line_focus(fem.facet_points(mesh))
+    S = fem.probe_operator(mesh, np.column_stack([PROBES, np.full(len(PROBES), H / 2)]))
+    return np.array([S @ fem.harmonic(ops, force, f)[0] for f in HERTZ])
+
+
+def _line_focus(points: Floats) -> Floats:
+    return np.exp(-(points[:, 0] ** 2) / (2 * 4.35e-3**2))

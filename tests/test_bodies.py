@@ -1,0 +1,188 @@
+"""Layers, placement and sides of bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+import skinwave
+from meshes import graded_axis
+from meshes.structured import Grading, with_planes
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.focus import along_axis, array_field, spot_width
+from skinwave import compare, simulate
+from skinwave.bodies import build, has_layer, operators, surface_load
+from skinwave.scene import Body, Layer, Placement
+from skinwave.scene_file import dumps, loads
+
+PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25, trajectory=PATH))
+SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
+
+
+def answered(body, **knobs):
+    return simulate(replace(SKIN, body=body), "fem", h=0.006, **knobs).displacement
+
+
+def test_two_layers_of_one_material_are_one():
+    layers = (Layer(thickness=0.004, material="palm"), Layer(thickness=0.002, material="palm"))
+    one, three = SKIN.body, replace(SKIN.body, layers=layers)
+    assert len(three.strata) == 1
+    np.testing.assert_allclose(answered(three), answered(one), rtol=0, atol=1e-20)
+    # and on a mesh that has the planes, with a material given to each region
+    mesh = build(replace(one, layers=(Layer(thickness=0.004, material="fat"),)), 0.006).mesh
+    assert set(mesh.region) == {0, 1}
+    palm = fem.PRESETS["palm"]
+    apart, alike = (fem.assemble(mesh, m, fixed="bottom") for m in ({0: palm, 1: palm}, palm))
+    for name in ("K", "C", "M"):
+        a, b = getattr(apart, name), getattr(alike, name)
+        assert abs(a - b).max() <= 1e-12 * abs(b).max()
+
+
+def test_a_layer_ends_on_a_plane_of_the_mesh_and_changes_the_answer():
+    body = replace(SKIN.body, layers=(Layer(thickness=0.0012, material="fat"),))
+    made = build(body, 0.006)
+    depth = -made.mesh.points[made.mesh.tets[:, :4], 2]
+    assert depth[made.mesh.region == 0].max() == pytest.approx(0.0012)
+    assert depth[made.mesh.region == 1].min() == pytest.approx(0.0012)
+    assert made.material == {0: fem.PRESETS["fat"], 1: fem.PRESETS["palm"]}
+    soft, plain = answered(body), answered(SKIN.body)
+    assert 1.03 < np.ptp(soft[:, 2]) / np.ptp(plain[:, 2]) < 1.3
+
+
+def test_planes_take_the_place_of_grid_lines_that_are_close():
+    line = graded_axis(0.015, 0.003, Grading(radius=0.0, growth=1.25))
+    with_one = with_planes(line, [0.0031, 0.0001])
+    assert {0.0, 0.0001, 0.0031, 0.015} <= set(with_one)
+    assert 0.003 not in with_one
+    assert np.diff(with_one).min() == pytest.approx(0.0001)
+
+
+def test_layers_that_do_not_fit_are_refused():
+    for layers, message in (((0.0, "fat"),), "above 0"), (((0.02, "fat"),), "20 mm thick in all"):
+        with pytest.raises(ValueError, match=message):
+            Body(layers=tuple(Layer(thickness=t, material=m) for t, m in layers))
+    with pytest.raises(ValueError, match="no layers"):
+        Body(kind="sheet", layers=(Layer(thickness=1e-5, material="paper"),))
+    with pytest.raises(ValueError, match="'fat'"):
+        Layer(thickness=1e-3, material="fatt")
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 40.0])
+def test_a_tilted_body_feels_the_cosine_of_what_a_flat_one_does(degrees):
+    """cos^2 of the incidence on a spot that is longer by 1/cos."""
+    made = build(replace(SKIN.body, placement=Placement(tilt_y=np.radians(degrees))), 0.006)
+    P, points = surface_load(made)
+    # above or below the plane the focus is weaker; that is not asked here
+    flat = LOAD.spot(points[:, :2], np.zeros(2))
+    normal = made.mesh.points[made.mesh.facets["top"][0, :3]]
+    normal = np.cross(normal[1] - normal[0], normal[2] - normal[0])
+    normal /= np.linalg.norm(normal)
+    force = -(P @ flat).reshape(-1, 3).sum(axis=0) @ normal
+    whole = 2 * np.pi * spot_width(0.2) ** 2
+    assert force == pytest.approx(whole * np.cos(np.radians(degrees)), rel=0.01)
+    assert normal[0] == pytest.approx(np.sin(np.radians(degrees)))
+
+
+def test_an_offset_moves_the_path_the_other_way():
+    still = skinwave.Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05)),
+        body=replace(SKIN.body, placement=Placement(offset=(0.01, 0.0))),
+        probes=((0.0, 0.0), (0.01, 0.0)),
+    )
+    moved = simulate(still, "fem", h=0.006).displacement
+    # a mesh moved by 10 mm has its nodes elsewhere under the focus
+    centred = simulate(replace(still, body=SKIN.body), "fem", h=0.006).displacement
+    assert compare_columns(moved, centred) < 0.1
+
+
+def compare_columns(u, v):
+    return np.linalg.norm(u - v) / np.linalg.norm(v)
+
+
+def test_a_lifted_body_feels_what_the_focus_has_left_there():
+    raised = replace(SKIN.body, placement=Placement(lift=0.02))
+    ratio = np.abs(answered(raised)).max() / np.abs(answered(SKIN.body)).max()
+    assert ratio == pytest.approx(float(along_axis(0.02)), rel=0.02)
+
+
+@pytest.mark.parametrize("height", [0.1, 0.15, 0.2, 0.25, 0.3])
+def test_the_focus_is_as_long_as_the_array_makes_it(height):
+    offsets = np.linspace(-0.07, 0.07, 29) * (height / 0.3) ** 2
+    points = np.column_stack([0 * offsets, 0 * offsets, height + offsets])
+    intensity = np.abs(array_field(points, (0, 0, height))) ** 2
+    intensity /= intensity[14]
+    # upper and lower half together: the maximum lies below the focus
+    both = (intensity + intensity[::-1]) / 2
+    np.testing.assert_allclose(along_axis(offsets, height), both, atol=0.05)
+
+
+def test_placement_and_layers_come_back_from_a_file():
+    placed = Placement(tilt_x=np.radians(5), offset=(1e-3, -2e-3), lift=3e-3)
+    layers = (Layer(thickness=1e-3, material="dermis"), Layer(thickness=2e-3, material="fat"))
+    scene = replace(SKIN, body=replace(SKIN.body, layers=layers, placement=placed))
+    again = loads(dumps(scene))
+    assert again.body.layers == layers
+    assert again.body.placement.offset == placed.offset
+    assert again.body.placement.tilt_x == pytest.approx(placed.tilt_x, rel=1e-15)
+    for text, message in (
+        ("[[body.layers]]\nthickness_mm = 1", "lacks material"),
+        ("[body]\nlayers = 3", "must be tables"),
+        ("[placement]\ntilt_x_deg = 80", "beyond 60"),
+        ("[placement]\noffset_mm = [1]", "pair of numbers"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            loads(text)
+
+
+def test_exact_waves_refuse_layers_and_tilts():
+    for changed in (
+        {"layers": (Layer(thickness=1e-3, material="fat"),)}, {"placement": Placement(lift=0.01)},
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match="use fem"):
+            simulate(replace(SKIN, body=replace(SKIN.body, **changed)), "flat-body")
+
+
+def test_the_layer_around_a_body_damps_nothing_in_it():
+    made = build(SKIN.body, 0.006)
+    inside = np.abs(made.mesh.points[made.mesh.tets[:, :4], :2].mean(axis=1)).max(axis=1) < 0.03
+    assert has_layer(SKIN.body)
+    assert (made.drag[inside] == 0).all()
+    assert (made.drag[~inside] > 0).all()
+    assert not has_layer(replace(SKIN.body, sides="clamped"))
+    ops = operators(made)
+    lost = ops.C - ops.R
+    assert abs(lost - 5.0 / 25e3 * ops.K).max() < 1e-12 * abs(ops.C).max()
+
+
+@pytest.mark.slow
+def test_a_body_of_half_the_size_answers_alike():
+    """What its sides send back is all that is different."""
+    scene = replace(SKIN, probes=((0.0, 0.0), (0.01, 0.0), (0.015, 0.0)))
+    whole, half = (
+        simulate(replace(scene, body=Body(width=side, height=side)), "fem", h=0.004)
+        for side in (0.1, 0.05)
+    )
+    assert compare(whole, half).relative_l2.max() < 0.05
+    early = whole.times < 0.03  # before a wave of 5 m/s is back from 50 mm further out
+    first = half.displacement[early] - whole.displacement[early]
+    assert np.linalg.norm(first) < 0.02 * np.linalg.norm(whole.displacement[early])
+    exact = simulate(replace(scene, body=Body()), "flat-body")
+    assert compare(exact, whole).relative_l2.max() < 0.05
+
+
+def test_a_probe_lands_on_a_curved_surface_where_it_was_asked_for():
+    flat = meshes.block((0.04, 0.04, 0.01), 0.008)
+    x, y, z = flat.points.T
+    share = 1 + z / 0.01  # of the bow: all of it at the top
+    bowed = np.column_stack([x + 1e-3 * np.sin(200 * y), y, z + 4e-3 * share * np.sin(60 * x)])
+    mesh = replace(flat, points=bowed)
+    places = np.random.default_rng(0).uniform(-0.015, 0.015, (50, 2))
+    S = fem.probe_operator(mesh, places)
+    upwards = S @ np.tile([0.0, 0.0, 1.0], len(bowed))
+    for axis in (0, 1):
+        field = np.zeros_like(bowed)
+        field[:, 2] = bowed[:, axis]  # which the elements carry exactly
+        np.testing.assert_allclose(S @ field.ravel() / upwards, places[:, axis], atol=1e-12)
