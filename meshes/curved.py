@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.quality import jacobian_ratios
+from meshes.quality import edge_lengths, jacobian_ratios
 from meshes.tetmesh import (
     EDGES,
     Floats,
@@ -20,7 +20,7 @@ from meshes.tetmesh import (
 log = logging.getLogger(__name__)
 
 LEAST_RATIO = 0.3  # of det J to that of the straight element, below which edges stay straight
-FURTHEST = 0.5  # of an element's size: what lies further from the level set is no part of it
+FURTHEST = 0.5  # of the edges around: what lies further from the level set is no part of it
 
 Function = Callable[[Floats], Floats]
 
@@ -49,7 +49,7 @@ def curved(
         raise MeshError("elements of 4 nodes have no curved edges; make them `meshes.quadratic`")
     chosen = boundary_facets(mesh.tets) if facets is None else facets
     corners, middles = np.unique(chosen[:, :3]), np.unique(chosen[:, 3:])
-    reach = FURTHEST * _shortest_edge(mesh)
+    reach = FURTHEST * _mean_edge(mesh)
 
     def target(points: Floats, nodes: Ints) -> Floats:
         """Where nodes are on the level set; where they are if it is too far or not found."""
@@ -70,15 +70,12 @@ def curved(
     return replace(mesh, points=points)
 
 
-def _shortest_edge(mesh: TetMesh) -> Floats:
-    """Length (n,) of the shortest edge at each node, metre."""
-    ends = mesh.points[mesh.tets[:, EDGES]]
-    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    shortest = np.full(len(mesh.points), np.inf)
-    for j, edge in enumerate(EDGES):
-        for column in (*edge, 4 + j):
-            np.minimum.at(shortest, mesh.tets[:, column], length[:, j])
-    return shortest
+def _mean_edge(mesh: TetMesh) -> Floats:
+    """Mean length (n,) of the edges of the elements at each node, metre."""
+    nodes, own = mesh.tets.ravel(), edge_lengths(mesh).mean(axis=1)
+    count = np.bincount(nodes, minlength=len(mesh.points))
+    total = np.bincount(nodes, np.repeat(own, mesh.tets.shape[1]), len(mesh.points))
+    return total / np.maximum(count, 1)
 
 
 def _keep_volumes(mesh: TetMesh, points: Floats, corners: Ints) -> Floats:

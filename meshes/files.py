@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from meshes.by_vtk import read_by_vtk
 from meshes.tetmesh import EDGES, FACES, Floats, Ints, MeshError, TetMesh
 
 VOLUME_FORMATS = (".vtu", ".msh", ".inp", ".vtk")
@@ -155,7 +156,12 @@ def _meshio_read(path: Path) -> Any:
     """What meshio makes of a file; it prints, warns, and ends the process on what it cannot."""
     import meshio
 
-    kind = {".vtu": "vtu", ".msh": "gmsh", ".inp": "abaqus", ".vtk": "vtk"}[path.suffix.lower()]
+    if path.suffix.lower() == ".vtk":  # of whose newer versions meshio knows nothing
+        import pyvista
+
+        grid = pyvista.wrap(read_by_vtk(path))
+        return pyvista.to_meshio(grid.cast_to_unstructured_grid())
+    kind = {".vtu": "vtu", ".msh": "gmsh", ".inp": "abaqus"}[path.suffix.lower()]
     said = io.StringIO()
     try:
         with (
@@ -166,10 +172,9 @@ def _meshio_read(path: Path) -> Any:
             warnings.simplefilter("ignore")
             return meshio.read(path, file_format=kind)
     except (Exception, SystemExit) as error:
-        cure = {
-            ".msh": "save it as version 2.2 (gmsh -format msh22)",
-            ".vtk": "save it as .vtu",
-        }.get(path.suffix.lower(), "save it again from the program that it comes from")
+        cure = {".msh": "save it as version 2.2 (gmsh -format msh22)"}.get(
+            path.suffix.lower(), "save it again from the program that it comes from"
+        )
         reason = " ".join((str(error) if str(error) not in ("", "1") else said.getvalue()).split())
         raise MeshError(
             f"{path} cannot be read ({reason[:200] or type(error).__name__}); {cure}"

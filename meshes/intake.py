@@ -13,12 +13,13 @@ from meshes.quality import dihedral_angles, edge_lengths
 from meshes.structured import Grading
 from meshes.surface import Surface, check, repaired, volume
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
-from meshes.tetrahedralise import EPSILON, graded, tetrahedralise
+from meshes.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
 
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; cells; of h
 SMALLEST, LARGEST = 5e-3, 2.0  # m: diagonal of what can be a hand, or part of one
 
 Say = Callable[[str], None]
+Progress = Callable[[str, float], None]
 
 
 def body_from_file(
@@ -30,6 +31,7 @@ def body_from_file(
     clip: Sequence[float] | None = None,
     timeout: float = 120.0,
     say: Say = lambda sentence: None,
+    progress: Progress = lambda phase, fraction: None,
 ) -> TetMesh:
     """Tetrahedra of the body in a file, placed under the device, with its boundary named.
 
@@ -49,6 +51,7 @@ def body_from_file(
     clip : least and greatest x, least and greatest y, metre from the middle of the palm.
     timeout : float, second, of the mesher.
     say : gets a sentence on each thing that was found or done.
+    progress : gets the phase, and 0.
 
     Raises
     ------
@@ -57,6 +60,7 @@ def body_from_file(
     TimeoutError
         If the mesher takes longer.
     """
+    progress(f"reading {Path(path).name}", 0.0)
     if Path(path).suffix.lower() in files.VOLUME_FORMATS:
         if clip is not None or up != "+z":
             raise MeshError(f"{path} is a mesh already; only surfaces can be clipped and turned")
@@ -75,7 +79,8 @@ def body_from_file(
             say(sentence)
         check(surface)
         planes = list(clip)
-    say("meshing")
+    progress("filling it with tetrahedra", 0.0)
+    check_size(surface, "h", h)
     grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
     mesh = tetrahedralise(surface, h, sizing=graded(h, grading), timeout=timeout)
     return _described(_with_sides(mesh, planes, 2 * EPSILON * h), say)

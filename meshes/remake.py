@@ -41,12 +41,12 @@ def make(folder: Path) -> None:
 
 def _flattened(mesh: TetMesh) -> TetMesh:
     """The slab with the nodes near its sides exactly on them; the mesher leaves them wavy."""
-    points = np.array(mesh.points)
+    points, outer = np.array(mesh.points), np.unique(mesh.facets["surface"])
     x, y, depth = SLAB
     for axis, low, high in ((0, -x / 2, x / 2), (1, -y / 2, y / 2), (2, -depth, 0.0)):
         for side in (low, high):
-            near = np.abs(points[:, axis] - side) < 0.1 * SLAB_SIZE
-            points[near, axis] = side
+            near = np.abs(points[outer, axis] - side) < 0.1 * SLAB_SIZE
+            points[outer[near], axis] = side
     return TetMesh(points=points, tets=mesh.tets)
 
 

@@ -1,13 +1,12 @@
 """Surfaces in files, read with VTK."""
 
 import os
-import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from meshes.by_vtk import read_by_vtk
 from meshes.files import existing, scale_of
 from meshes.placing import turned
 from meshes.surface import Surface
@@ -31,7 +30,7 @@ def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z
     """
     path = existing(path, SURFACE_FORMATS)
     scale = scale_of(unit)
-    parts = list(_leaves(_pyvista_read(path)))
+    parts = list(_leaves(read_by_vtk(path)))
     points = [np.asarray(part.points, np.float64) for part in parts]
     first = np.cumsum([0, *(len(p) for p in points)])
     triangles = [
@@ -46,26 +45,6 @@ def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z
     return turned(surface, up)
 
 
-def _pyvista_read(path: Path) -> Any:
-    """What VTK makes of a file, without what it prints."""
-    import pyvista
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return pyvista.read(path)
-    except Exception as error:
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise MeshError(
-            f"{path} cannot be read ({reason}); save it again from the program that it comes from"
-        ) from None
-    finally:
-        vtkLogger.SetStderrVerbosity(verbosity)
-
-
 def _leaves(data: Any) -> Iterator[Any]:
     """The triangulated parts of what VTK read, which may be nested."""
     import pyvista
@@ -75,7 +54,7 @@ def _leaves(data: Any) -> Iterator[Any]:
             yield from _leaves(part)
     elif data is not None and data.n_cells:
         faces = data if isinstance(data, pyvista.PolyData) else data.extract_geometry()
-        if faces.n_faces_strict:
+        if len(faces.faces):
             flat = pyvista.PolyData(faces.points, faces=faces.faces).triangulate()
             if flat.n_cells:
                 yield flat

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 Sizing = Callable[[Floats], Floats]
 
 EPSILON = 0.05  # of h: how far the mesh may lie from the surface
-SMALLEST_EPSILON = 5e-5  # of the diagonal: below, the mesher takes minutes to hours
+SMALLEST_EPSILON = 1e-4  # of the diagonal: below, the mesher takes minutes to hours
 MOST_OF_THICKNESS = 0.1  # what the envelope may be of the body's thickness, or it swallows it
 MOST_TETRAHEDRA = 1_000_000
 SHARPEST = 5.0  # degrees: least dihedral angle of a mesh that is accepted
@@ -65,7 +65,7 @@ def tetrahedralise(
         If the mesher takes longer than `timeout`.
     """
     check(surface)
-    _check_length("h", h, surface)
+    check_size(surface, "h", h)
     epsilon = _checked_epsilon(surface, h, epsilon)
     if not 0 < timeout < np.inf:
         raise MeshError(f"timeout = {timeout} s must be finite and above 0")
@@ -119,7 +119,14 @@ def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float
     return epsilon
 
 
-def _check_length(name: str, length: float, surface: Surface) -> None:
+def check_size(surface: Surface, name: str, length: float) -> None:
+    """That an edge length in metre is one that the body can be meshed with.
+
+    Raises
+    ------
+    MeshError
+        If it is longer than the body, or shorter than a thousandth of it.
+    """
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
         raise MeshError(
@@ -144,8 +151,8 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
                 f"sizing gave an array of shape {sizes.shape} for {len(grid.points)} points; "
                 "return one finite edge length in metre for each"
             )
-        _check_length("least size", float(sizes.min()), surface)
-        _check_length("greatest size", float(sizes.max()), surface)
+        check_size(surface, "least size", float(sizes.min()))
+        check_size(surface, "greatest size", float(sizes.max()))
     expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
     expected *= 8.5 * volume(surface) / np.prod(high - low + 2 * pad)
     if expected > MOST_TETRAHEDRA:

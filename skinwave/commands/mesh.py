@@ -40,14 +40,10 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"{out.parent} is no folder; make it or choose another --out")
     said: list[str] = []
     with progress_of(options) as progress:
-
-        def say(sentence: str) -> None:
-            said.append(sentence)
-            progress(sentence, 0.0)
-
         mesh = body_from_file(
             options.file, options.h / 1e3,
-            unit=options.unit, up=options.up, timeout=options.timeout, say=say,
+            unit=options.unit, up=options.up, timeout=options.timeout, say=said.append,
+            progress=progress,
             clip=None if options.clip is None else [side / 1e3 for side in options.clip],
         )  # fmt: skip
         progress("writing", 0.9)
@@ -61,6 +57,5 @@ def run(options: argparse.Namespace) -> int:
         "said": said,
     }
     sets = ", ".join(f"{name} {len(facets):,}" for name, facets in sorted(mesh.facets.items()))
-    done = [sentence for sentence in said if sentence != "meshing"]
-    summarise(options, summary, "\n".join([*done, f"facets: {sets}", f"wrote {out}"]))
+    summarise(options, summary, "\n".join([*said, f"facets: {sets}", f"wrote {out}"]))
     return 0
