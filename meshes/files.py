@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.by_vtk import read_by_vtk
+from meshes import child
 from meshes.tetmesh import EDGES, FACES, Floats, Ints, MeshError, TetMesh
 
 VOLUME_FORMATS = (".vtu", ".msh", ".inp", ".vtk")
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused by gmsh itself
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 FACETS, REGION = "facets:", "region "
+LONGEST_READ = 300.0  # s that VTK may take for a file
 OFF_MIDDLE = 0.25  # of an edge: how far a mid-side node may lie from its middle
 
 
@@ -43,7 +44,17 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
     """
     path = existing(path, VOLUME_FORMATS)
     scale = scale_of(unit)
-    raw = _meshio_read(path)
+    raw = _by_vtk(path) if path.suffix.lower() == ".vtk" else _meshio_read(path)
+    try:
+        return _mesh(path, raw, scale)
+    except MeshError:
+        raise
+    except (ValueError, IndexError, KeyError, TypeError) as error:  # arrays that do not fit
+        raise _unreadable(path, error) from None
+
+
+def _mesh(path: Path, raw: Any, scale: float) -> TetMesh:
+    """The mesh in what meshio has read."""
     blocks = {"tetra": 4, "tetra10": 10}
     kinds = [block.type for block in raw.cells]
     found = sorted({kind for kind in kinds if kind in blocks})
@@ -55,6 +66,8 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
     points = np.zeros((len(raw.points), 3))
     points[:, : raw.points.shape[1]] = raw.points
     tets = _joined(raw.cells, found[0])
+    if tets.min() < 0 or tets.max() >= len(points):
+        raise MeshError(f"{path} has cells of points that it does not have; save it again")
     tets = tets[:, _node_order(path, points, tets)] if blocks[found[0]] == 10 else tets
     sets = _facet_sets(raw, "triangle" if blocks[found[0]] == 4 else "triangle6")
     used, numbers = np.unique(tets, return_inverse=True)
@@ -156,11 +169,6 @@ def _meshio_read(path: Path) -> Any:
     """What meshio makes of a file; it prints, warns, and ends the process on what it cannot."""
     import meshio
 
-    if path.suffix.lower() == ".vtk":  # of whose newer versions meshio knows nothing
-        import pyvista
-
-        grid = pyvista.wrap(read_by_vtk(path))
-        return pyvista.to_meshio(grid.cast_to_unstructured_grid())
     kind = {".vtu": "vtu", ".msh": "gmsh", ".inp": "abaqus"}[path.suffix.lower()]
     said = io.StringIO()
     try:
@@ -172,13 +180,26 @@ def _meshio_read(path: Path) -> Any:
             warnings.simplefilter("ignore")
             return meshio.read(path, file_format=kind)
     except (Exception, SystemExit) as error:
-        cure = {".msh": "save it as version 2.2 (gmsh -format msh22)"}.get(
-            path.suffix.lower(), "save it again from the program that it comes from"
-        )
-        reason = " ".join((str(error) if str(error) not in ("", "1") else said.getvalue()).split())
-        raise MeshError(
-            f"{path} cannot be read ({reason[:200] or type(error).__name__}); {cure}"
-        ) from None
+        raise _unreadable(path, error, said.getvalue()) from None
+
+
+def _by_vtk(path: Path) -> Any:
+    """A legacy VTK file, of whose newer versions meshio knows nothing, by way of a `.vtu`."""
+    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
+        target = Path(folder, "mesh.vtu")
+        try:
+            child.run("vtk_child.py", path.resolve(), target, folder=folder, timeout=LONGEST_READ)
+        except MeshError as error:
+            raise _unreadable(path, error) from None
+        return _meshio_read(target)
+
+
+def _unreadable(path: Path, error: BaseException, said: str = "") -> MeshError:
+    cure = {".msh": "save it as version 2.2 (gmsh -format msh22)", ".vtk": "save it as .vtu"}.get(
+        path.suffix.lower(), "save it again from the program that it comes from"
+    )
+    reason = " ".join((str(error) if str(error) not in ("", "1") else said).split())
+    return MeshError(f"{path} cannot be read ({reason[:200] or type(error).__name__}); {cure}")
 
 
 def _joined(cells: Any, kind: str) -> Ints:

@@ -1,13 +1,13 @@
-"""Surfaces in files, read with VTK."""
+"""Surfaces in files, read with VTK in a process of its own."""
 
 import os
-from collections.abc import Iterator
-from typing import Any
+import tempfile
+from pathlib import Path
 
 import numpy as np
 
-from meshes.by_vtk import read_by_vtk
-from meshes.files import existing, scale_of
+from meshes import child
+from meshes.files import LONGEST_READ, existing, scale_of
 from meshes.placing import turned
 from meshes.surface import Surface
 from meshes.tetmesh import MeshError
@@ -30,31 +30,18 @@ def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z
     """
     path = existing(path, SURFACE_FORMATS)
     scale = scale_of(unit)
-    parts = list(_leaves(read_by_vtk(path)))
-    points = [np.asarray(part.points, np.float64) for part in parts]
-    first = np.cumsum([0, *(len(p) for p in points)])
-    triangles = [
-        np.asarray(part.faces).reshape(-1, 4)[:, 1:] + n
-        for part, n in zip(parts, first, strict=False)
-    ]
-    if not sum(map(len, triangles)):
+    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
+        target = Path(folder, "surface.npz")
+        try:
+            child.run("vtk_child.py", path.resolve(), target, folder=folder, timeout=LONGEST_READ)
+        except MeshError as error:
+            raise MeshError(
+                f"{path} cannot be read ({error}); save it again from the program that it is from"
+            ) from None
+        with np.load(target) as found:
+            points, triangles = found["points"], found["triangles"]
+    if not len(triangles):
         raise MeshError(
             f"{path} holds no triangles; give a surface of {', '.join(SURFACE_FORMATS)}"
         )
-    surface = Surface(points=np.vstack(points) * scale, triangles=np.vstack(triangles))
-    return turned(surface, up)
-
-
-def _leaves(data: Any) -> Iterator[Any]:
-    """The triangulated parts of what VTK read, which may be nested."""
-    import pyvista
-
-    if isinstance(data, pyvista.MultiBlock):
-        for part in data:
-            yield from _leaves(part)
-    elif data is not None and data.n_cells:
-        faces = data if isinstance(data, pyvista.PolyData) else data.extract_geometry()
-        if len(faces.faces):
-            flat = pyvista.PolyData(faces.points, faces=faces.faces).triangulate()
-            if flat.n_cells:
-                yield flat
+    return turned(Surface(points=points * scale, triangles=triangles), up)

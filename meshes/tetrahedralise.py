@@ -7,8 +7,6 @@ meshed once per machine.
 """
 
 import logging
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -16,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes import cache
+from meshes import cache, child
 from meshes.facets import named
 from meshes.quality import dihedral_angles
 from meshes.structured import Grading, extrude
@@ -152,7 +150,7 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
                 "return one finite edge length in metre for each"
             )
         check_size(surface, "least size", float(sizes.min()))
-        check_size(surface, "greatest size", float(sizes.max()))
+        sizes = np.minimum(sizes, (high - low).max())
     expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
     expected *= 8.5 * volume(surface) / np.prod(high - low + 2 * pad)
     if expected > MOST_TETRAHEDRA:
@@ -173,24 +171,15 @@ def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndar
     with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
         source, target = Path(folder, "input.npz"), Path(folder, "output.npz")
         np.savez(source, **inputs)  # type: ignore[arg-type]
-        child = Path(__file__).with_name("tetwild_child.py")
-        command = [sys.executable, "-P", str(child), str(source), str(target), str(timeout)]
         try:
-            # Killed, too, if this process is interrupted.
-            ended = subprocess.run(
-                command, cwd=folder, timeout=timeout, capture_output=True, text=True, check=False
-            )
-        except subprocess.TimeoutExpired:
+            child.run("tetwild_child.py", source, target, timeout, folder=folder, timeout=timeout)
+        except TimeoutError:
             raise TimeoutError(
                 f"the mesher was stopped after {timeout:g} s; take larger elements or a longer "
                 "timeout"
             ) from None
-        if ended.returncode != 0 or not target.exists():
-            said = ended.stderr.strip().splitlines()[-1:] or ["it said nothing"]
-            raise MeshError(
-                f"the mesher ended with code {ended.returncode} ({said[0]}); simplify or smooth "
-                "the surface"
-            )
+        except MeshError as error:
+            raise MeshError(f"the mesher failed: {error}; simplify or smooth the surface") from None
         with np.load(target) as result:
             return result["points"], result["tets"].astype(np.int64)
 

@@ -80,15 +80,19 @@ def test_fields_are_beside_the_mesh_for_other_programs(tmp_path):
     same(mesh, meshes.read(tmp_path / "a.vtu"))
 
 
-def test_what_pyvista_writes_is_read(tmp_path):
+def write_grid(path, mesh):
     import pyvista
 
-    mesh = layered(2)
     cells = np.column_stack([np.full(len(mesh.tets), 10), mesh.tets]).ravel()
     grid = pyvista.UnstructuredGrid(cells, np.full(len(mesh.tets), 24), np.array(mesh.points))
     grid.cell_data["material"] = mesh.region.astype(np.int32)
+    grid.save(path)
+
+
+def test_what_pyvista_writes_is_read(tmp_path):
+    mesh = layered(2)
     for name in ("a.vtu", "b.vtk"):
-        grid.save(tmp_path / name)
+        write_grid(tmp_path / name, mesh)
         read = meshes.read(tmp_path / name)
         np.testing.assert_array_equal(read.tets, mesh.tets)
         np.testing.assert_array_equal(read.points, mesh.points)
@@ -300,7 +304,7 @@ def hand():
     import pyvista
 
     grid = pyvista.ImageData(
-        dimensions=(40, 66, 20), spacing=(3.3e-3,) * 3, origin=(-0.061, -0.06, -0.041)
+        dimensions=(28, 45, 14), spacing=(5e-3,) * 3, origin=(-0.0623, -0.0633, -0.0433)
     )
     points = np.asarray(grid.points, np.float64)
     inside = level_set(Palm(), points)
@@ -420,6 +424,41 @@ def test_no_surface_file_is_refused_in_one_sentence(tmp_path, capfd, name, conte
         meshes.read_surface(tmp_path / name)
     assert "\n" not in str(error.value)
     assert capfd.readouterr() == ("", "")
+
+
+def damaged(content, seed):
+    """A file cut short, or with a few bytes changed at its beginning or anywhere."""
+    rng = np.random.default_rng(seed)
+    if seed % 3 == 0:
+        return content[: rng.integers(len(content))]
+    changed = bytearray(content)
+    for place in rng.integers(len(content) if seed % 3 == 1 else min(len(content), 1500), size=4):
+        changed[place] = rng.integers(256)
+    return bytes(changed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", [*WRITERS, ".vtu", ".msh", ".inp", ".vtk"])
+def test_a_damaged_file_takes_nobody_with_it(tmp_path, capfd, suffix):
+    path = tmp_path / f"body{suffix}"
+    if suffix in WRITERS:
+        points, triangles = hand()
+        WRITERS[suffix](path, points, triangles[:400])
+    elif suffix == ".inp":
+        path.write_text(ABAQUS)
+    elif suffix == ".vtk":
+        write_grid(path, layered(2))
+    else:
+        meshes.write(path, layered(2))
+    content, read = path.read_bytes(), meshes.read_surface if suffix in WRITERS else meshes.read
+    for seed in range(4 if suffix in (*WRITERS, ".vtk") else 40):
+        path.write_bytes(damaged(content, seed))
+        try:
+            read(path)
+        except MeshError as error:
+            assert "\n" not in str(error)  # noqa: PT017 - a damaged coordinate is still a number
+    assert capfd.readouterr() == ("", "")
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
 # skinwave mesh
