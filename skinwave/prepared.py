@@ -5,11 +5,11 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 import fem
+from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
 from simple_model.steady import along_path, load_lines, path_knots, summed
-from skinwave import cache
 from skinwave.bodies import Build, surface_load
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.full import assembled, energy_balance, meshed

@@ -15,7 +15,8 @@ import corpus
 import numpy as np
 import pytest
 
-from skinwave import cache, read
+from meshes import cache
+from skinwave import read
 from skinwave.cli import main
 
 pytestmark = [

@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from skinwave import cache, loads, simulate
+from meshes import cache
+from skinwave import loads, simulate
 from skinwave.comparison import compare
 from skinwave.paper15 import scenes, tactons
 from skinwave.plan import plan

@@ -1,4 +1,4 @@
-"""Prepared bodies on disk, so that a body is reduced once per machine.
+"""Meshes and prepared bodies on disk, so that each is made once per machine.
 
 One file an entry, named by a hash of everything that it depends on. Entries are written aside
 and renamed, so that two processes cannot spoil each other's; one that cannot be read is rebuilt.

@@ -1,0 +1,105 @@
+"""Ten-node elements whose boundary follows a level set instead of its facets."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from meshes.quality import edge_lengths, jacobian_ratios
+from meshes.tetmesh import (
+    EDGES,
+    Floats,
+    Ints,
+    MeshError,
+    TetMesh,
+    boundary_facets,
+    corner_volumes,
+)
+
+log = logging.getLogger(__name__)
+
+LEAST_RATIO = 0.3  # of det J to that of the straight element, below which edges stay straight
+FURTHEST = 0.5  # of the edges around: what lies further from the level set is no part of it
+
+Function = Callable[[Floats], Floats]
+
+
+def curved(
+    mesh: TetMesh, level_set: Function, gradient: Function, facets: Ints | None = None
+) -> TetMesh:
+    """The mesh with the nodes of boundary facets moved onto a level set.
+
+    Corners move first, with the middles of the edges between them, then mid-side nodes. Where
+    an element would lose more than 70 % of its Jacobian somewhere, or its volume, its nodes stay.
+
+    Parameters
+    ----------
+    level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3).
+    facets : (k, 6) int, the boundary facets that lie on it; all of the boundary if not given.
+
+    Raises
+    ------
+    MeshError
+        If the elements have four nodes.
+    """
+    from meshes.palm import onto
+
+    if mesh.order != 2:
+        raise MeshError("elements of 4 nodes have no curved edges; make them `meshes.quadratic`")
+    chosen = boundary_facets(mesh.tets) if facets is None else facets
+    corners, middles = np.unique(chosen[:, :3]), np.unique(chosen[:, 3:])
+    reach = FURTHEST * _mean_edge(mesh)
+
+    def target(points: Floats, nodes: Ints) -> Floats:
+        """Where nodes are on the level set; where they are if it is too far or not found."""
+        moved = onto(points[nodes], level_set, gradient)
+        way = np.linalg.norm(moved - points[nodes], axis=1)
+        found = (way < reach[nodes]) & (np.abs(level_set(moved)) < 1e-3 * reach[nodes])
+        return np.where(found[:, None], moved, points[nodes])
+
+    points = np.array(mesh.points)
+    points[corners] = target(points, corners)
+    points = _keep_volumes(mesh, points, corners)
+    ends = points[mesh.tets[:, EDGES]]
+    points[mesh.tets[:, 4:]] = ends.mean(axis=2)
+    straight = points.copy()
+    points[middles] = target(points, middles)
+    points, kept = _keep_jacobians(mesh.tets, straight, points)
+    log.info("curved %d edges, %d stay straight", len(middles) - kept, kept)
+    return replace(mesh, points=points)
+
+
+def _mean_edge(mesh: TetMesh) -> Floats:
+    """Mean length (n,) of the edges of the elements at each node, metre."""
+    nodes, own = mesh.tets.ravel(), edge_lengths(mesh).mean(axis=1)
+    count = np.bincount(nodes, minlength=len(mesh.points))
+    total = np.bincount(nodes, np.repeat(own, mesh.tets.shape[1]), len(mesh.points))
+    return total / np.maximum(count, 1)
+
+
+def _keep_volumes(mesh: TetMesh, points: Floats, corners: Ints) -> Floats:
+    """Moved corners go back where an element would lose much of its volume."""
+    before = corner_volumes(mesh.points, mesh.tets)
+    moved = np.zeros(len(points), bool)
+    moved[corners] = True
+    while True:
+        lost = corner_volumes(points, mesh.tets) < LEAST_RATIO * before
+        back = np.unique(mesh.tets[lost, :4])
+        back = back[moved[back]]
+        if not len(back):
+            return points
+        points[back], moved[back] = mesh.points[back], False
+
+
+def _keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
+    """Curved edges go back where an element would be distorted; how many did."""
+    went_back = 0
+    while True:
+        bad = jacobian_ratios(points, tets) < LEAST_RATIO
+        nodes = np.unique(tets[bad, 4:])
+        nodes = nodes[(points[nodes] != straight[nodes]).any(axis=1)]
+        if not len(nodes):
+            return points, went_back
+        points[nodes] = straight[nodes]
+        went_back += len(nodes)

@@ -1,0 +1,75 @@
+"""Names for parts of a boundary: by where facets are and how they look."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets
+
+Predicate = Callable[[Floats, Floats], np.ndarray]
+
+
+def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
+    """Centroids (k, 3) in metre and outward unit normals (k, 3) of straight facets."""
+    a, b, c = (mesh.points[facets[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    return (a + b + c) / 3, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def named(mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.ndarray) -> TetMesh:
+    """The mesh with its boundary as the facet set `surface`, and parts of it by name.
+
+    Parameters
+    ----------
+    rest : name of the facets that are in no part, if wanted.
+    parts : name -> a function of centroids (k, 3) and outward normals (k, 3) that tells which of
+        the boundary facets belong to it, or an array (k,) that does. Parts may overlap.
+    """
+    facets = boundary_facets(mesh.tets)
+    centroids, normals = geometry(mesh, facets)
+    which = {
+        name: np.asarray(part(centroids, normals) if callable(part) else part, bool)
+        for name, part in parts.items()
+    }
+    if rest is not None:
+        which[rest] = ~np.logical_or.reduce(list(which.values()))
+    sets = {name: facets[chosen] for name, chosen in which.items()}
+    return replace(mesh, facets={**mesh.facets, "surface": facets, **sets})
+
+
+def seen_from_above(mesh: TetMesh) -> np.ndarray:
+    """Which boundary facets (k,) look upwards, and have nothing of the body above them.
+
+    In the order of `boundary_facets`; of each facet the centroid is asked.
+    """
+    from scipy.spatial import cKDTree
+
+    facets = boundary_facets(mesh.tets)
+    centroids, normals = geometry(mesh, facets)
+    seen, above = normals[:, 2] > 0, np.flatnonzero(normals[:, 2] < 0)
+    corners = mesh.points[facets[above, :3]]
+    # What lies over a point of the body has an underside there.
+    reach = np.linalg.norm(corners[..., :2] - centroids[above, None, :2], axis=2).max()
+    asked = np.flatnonzero(seen)
+    near = cKDTree(centroids[above, :2]).query_ball_point(centroids[asked, :2], reach)
+    count = [len(found) for found in near]
+    who = np.repeat(asked, count)
+    over = np.concatenate([np.asarray(found, np.int64) for found in near])
+    hides = _covers(corners[over], centroids[who])
+    seen[who[hides]] = False
+    return seen
+
+
+def _covers(triangles: Floats, points: Floats) -> np.ndarray:
+    """Whether each triangle (m, 3, 3) lies vertically above its point (m, 3)."""
+    flat = triangles[..., :2] - points[:, None, :2]
+    x, y = flat[..., 0], flat[..., 1]
+    share = np.stack(
+        [x[:, b] * y[:, c] - x[:, c] * y[:, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1
+    )
+    total = share.sum(axis=1)
+    inside = (share * np.sign(total)[:, None] >= 0).all(axis=1) & (total != 0)
+    weights = share / np.where(total == 0, 1, total)[:, None]
+    height = np.einsum("ea,ea->e", weights, triangles[..., 2])
+    return inside & (height > points[:, 2])

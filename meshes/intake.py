@@ -1,0 +1,139 @@
+"""From any file to a body under the device."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from meshes import files, surface_files
+from meshes.facets import geometry, named, seen_from_above
+from meshes.placing import clipped, on_planes, placed
+from meshes.quality import dihedral_angles, edge_lengths
+from meshes.structured import Grading
+from meshes.surface import Surface, check, repaired, volume
+from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
+
+FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; cells; of h
+SMALLEST, LARGEST = 5e-3, 2.0  # m: diagonal of what can be a hand, or part of one
+
+Say = Callable[[str], None]
+Progress = Callable[[str, float], None]
+
+
+def body_from_file(
+    path: str | os.PathLike[str],
+    h: float,
+    *,
+    unit: str = "m",
+    up: str = "+z",
+    clip: Sequence[float] | None = None,
+    timeout: float = 120.0,
+    say: Say = lambda sentence: None,
+    progress: Progress = lambda phase, fraction: None,
+) -> TetMesh:
+    """Tetrahedra of the body in a file, placed under the device, with its boundary named.
+
+    A surface (`.stl .ply .obj .glb .vtp`) is repaired where that takes no guess, turned so that
+    `up` is +z, moved so that the middle of its palm is the origin and its top there is z = 0,
+    cut to `clip` and filled with tetrahedra of h that grow beyond 30 mm from the middle. A mesh
+    (`.vtu .msh .inp .vtk`) is taken as it is.
+
+    The facet sets are `surface`, `top` (seen from above), `cut` (the planes of the clip) and
+    `bottom`, the rest. A mesh that has one of these names keeps its own.
+
+    Parameters
+    ----------
+    h : float, metre, edge length aimed at in the middle of the palm.
+    unit : of the coordinates in the file: m, cm, mm, um or in.
+    up : axis of the file that points to the device: +x, -x, ... -z.
+    clip : least and greatest x, least and greatest y, metre from the middle of the palm.
+    timeout : float, second, of the mesher.
+    say : gets a sentence on each thing that was found or done.
+    progress : gets the phase, and 0.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read, or what is wrong with its surface cannot be repaired.
+    TimeoutError
+        If the mesher takes longer.
+    """
+    progress(f"reading {Path(path).name}", 0.0)
+    if Path(path).suffix.lower() in files.VOLUME_FORMATS:
+        if clip is not None or up != "+z":
+            raise MeshError(f"{path} is a mesh already; only surfaces can be clipped and turned")
+        mesh = files.read(path, unit=unit)
+        say(f"read {len(mesh.tets):,} tetrahedra of {(4, 10)[mesh.order - 1]} nodes")
+        return _described(_with_sides(mesh), say)
+    surface = sound_surface(path, unit=unit, up=up, say=say)
+    surface, shift = placed(surface)
+    say(
+        "moved by ({:.1f}, {:.1f}, {:.1f}) mm, the palm's middle to the origin".format(*1e3 * shift)
+    )
+    planes = []
+    if clip is not None:
+        surface, said = clipped(surface, clip)
+        for sentence in said:
+            say(sentence)
+        check(surface)
+        planes = list(clip)
+    progress("filling it with tetrahedra", 0.0)
+    check_size(surface, "h", h)
+    grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
+    mesh = tetrahedralise(surface, h, sizing=graded(h, grading), timeout=timeout)
+    return _described(_with_sides(mesh, planes, 2 * EPSILON * h), say)
+
+
+def sound_surface(
+    path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z", say: Say
+) -> Surface:
+    """The surface in a file, repaired and checked.
+
+    Raises
+    ------
+    MeshError
+        If it cannot be read or repaired, or is of a size that no hand has.
+    """
+    raw = surface_files.read_surface(path, unit=unit, up=up)
+    if not SMALLEST < raw.diagonal < LARGEST:
+        raise MeshError(
+            f"{path} is {1e3 * raw.diagonal:.3g} mm from corner to corner with its unit taken as "
+            f"{unit}, and must be from {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm; pass another "
+            "unit"
+        )
+    say(f"read {len(raw.triangles):,} triangles and {len(raw.points):,} points")
+    surface, said = repaired(raw.points, raw.triangles)
+    for sentence in said:
+        say(sentence)
+    check(surface)
+    size = " x ".join(f"{1e3 * side:.0f}" for side in np.ptp(surface.points, axis=0))
+    say(f"closed surface of {size} mm, {1e6 * volume(surface):.1f} cm3")
+    return surface
+
+
+def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 0.0) -> TetMesh:
+    """The mesh with `surface`, `top`, `cut` and `bottom`, of which it keeps what it has."""
+    seen = seen_from_above(mesh)
+    sides = {"top": seen}
+    if planes:
+        is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))
+        sides = {"cut": is_cut, "top": seen & ~is_cut}
+    made = named(mesh, rest="bottom", **sides)
+    return TetMesh(
+        points=mesh.points,
+        tets=mesh.tets,
+        region=mesh.region,
+        facets={**made.facets, **mesh.facets},
+    )
+
+
+def _described(mesh: TetMesh, say: Say) -> TetMesh:
+    enclosed = corner_volumes(mesh.points, mesh.tets).sum()
+    say(
+        f"{len(mesh.tets):,} tetrahedra, {1e6 * enclosed:.1f} cm3, edges of "
+        f"{1e3 * np.median(edge_lengths(mesh)):.1f} mm, dihedral angles from "
+        f"{dihedral_angles(mesh).min():.1f} degrees"
+    )
+    return mesh

@@ -1,0 +1,252 @@
+"""A palm: a rounded slab with mounds, joined smoothly, bent to a cup.
+
+A right hand with its palm facing +z, the fingers towards +y, the thumb towards +x. The middle of
+the palm is the origin, and lies on the surface. The body is where the level set is negative:
+
+    F(x, y, z) = join(box, mounds)(x, y, z - rise),  rise = cup_depth ((2x/b)^2 + (2y/l)^2)
+
+`box` is the exact distance from a slab with rounded corners and edges, a mound the first-order
+distance of an ellipsoid, and `join` a smooth minimum with continuous second derivatives, which
+differs from the lesser of the two only where they differ by less than a mound's height. Near the
+surface F is the distance from it, within a few percent. Without cup and mounds the body is a slab
+whose top is the plane z = 0 up to `edge_radius` from its sides.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from meshes.surface import Surface, repaired
+from meshes.tetmesh import Floats, MeshError, TetMesh
+
+Field = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
+PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: where the fingers begin
+
+
+@dataclass(frozen=True, kw_only=True)
+class Palm:
+    """Size and relief of a palm, in metre; the defaults are an adult's.
+
+    Parameters
+    ----------
+    breadth, length : across the four fingers (x) and from wrist to finger roots (y).
+    thickness : at its middle, from the palm to the back of the hand.
+    cup_depth : how far the middles of the sides, bent up, lie above the middle of the palm.
+    thenar_height, hypothenar_height : of the mounds at the thumb and opposite, above the palm.
+    pad_height : of the four pads below the fingers.
+    corner_radius, edge_radius : of the outline seen from above, and of its cross-section.
+
+    Raises
+    ------
+    MeshError
+        If a length is not finite, a size is not above 0, or a radius does not fit.
+    """
+
+    breadth: float = 0.085
+    length: float = 0.100
+    thickness: float = 0.022
+    cup_depth: float = 0.003
+    thenar_height: float = 0.005
+    hypothenar_height: float = 0.003
+    pad_height: float = 0.0012
+    corner_radius: float = 0.028
+    edge_radius: float = 0.010
+
+    def __post_init__(self) -> None:
+        relief = ("cup_depth", "thenar_height", "hypothenar_height", "pad_height")
+        for field in fields(self):
+            value, flat = getattr(self, field.name), field.name in relief
+            if not (0 <= value < 1 if flat else 0 < value < 1):
+                least = "0 or above" if flat else "above 0"
+                raise MeshError(
+                    f"{field.name} = {value} m of the palm must be {least} and below 1 m"
+                )
+            if flat and value > self.thickness:
+                raise MeshError(
+                    f"{field.name} = {value} m exceeds the thickness {self.thickness} m of the "
+                    "palm; give a lower one"
+                )
+        widest = min(self.breadth, self.length) / 2
+        if not self.edge_radius <= min(self.thickness / 2, self.corner_radius) <= widest:
+            raise MeshError(
+                f"edge_radius = {self.edge_radius} m and corner_radius = {self.corner_radius} m do "
+                f"not fit a palm of {self.breadth} x {self.length} x {self.thickness} m; keep the "
+                "edge within half the thickness and the corner, and the corner within half the side"
+            )
+
+
+def level_set(palm: Palm, points: ArrayLike) -> Floats:
+    """F (n,) in metre at points (n, 3) in metre: below 0 inside, near the surface the distance."""
+    return _field(palm, np.asarray(points, np.float64))[0]
+
+
+def gradient(palm: Palm, points: ArrayLike) -> Floats:
+    """Derivatives (n, 3) of `level_set`; about a unit vector outwards near the surface."""
+    return _field(palm, np.asarray(points, np.float64))[1]
+
+
+def surface(palm: Palm, h: float) -> Surface:
+    """The closed surface of a palm by contouring its level set on a grid of h in metre.
+
+    Raises
+    ------
+    MeshError
+        If h is not above 0, larger than half the thickness, or so small that the grid is too large.
+    """
+    import pyvista
+
+    low, high = _box(palm)
+    if not 0 < h <= palm.thickness / 2:
+        raise MeshError(
+            f"h = {h} m must be above 0 and at most half the thickness {palm.thickness} m"
+        )
+    cells = np.ceil((high - low) / h).astype(int) + 4
+    if cells.prod() > 2e7:
+        raise MeshError(f"h = {h} m takes a grid of {cells.prod():.2g} points; the limit is 2e7")
+    # Off the symmetric position no grid point lies on a flat top, where contours degenerate.
+    grid = pyvista.ImageData(
+        dimensions=tuple(cells), spacing=(h, h, h), origin=tuple(low - 1.63 * h)
+    )
+    values = level_set(palm, np.asarray(grid.points, np.float64))
+    contour = grid.contour([0.0], scalars=values, method="flying_edges")
+    triangles = np.asarray(contour.faces).reshape(-1, 4)[:, 1:]
+    points = onto(np.asarray(contour.points, np.float64), *_functions(palm))
+    return repaired(points, triangles)[0]
+
+
+def palm_mesh(
+    palm: Palm,
+    h: float,
+    *,
+    sizing: Callable[[Floats], Floats] | None = None,
+    timeout: float = 120.0,
+) -> TetMesh:
+    """Ten-node tetrahedra of a palm whose boundary nodes lie on its true surface.
+
+    The facet sets are `surface` (all of it), `top` (what the device sees), `wrist` and `fingers`
+    (the ends, which look along the hand) and `back`, the rest.
+
+    Parameters
+    ----------
+    h, sizing, timeout : as for `tetrahedralise`.
+    """
+    from meshes.tetrahedralise import tetrahedralise
+
+    # Facets of the contour must be finer than elements, or the mesher keeps its corners.
+    body = surface(palm, min(h / 1.5, palm.thickness / 8))
+    # Coarser than the surface of a file may be, because boundary nodes are moved onto it.
+    epsilon = min(h, palm.thickness / 4) / 10
+    mesh = tetrahedralise(body, h, sizing=sizing, timeout=timeout, epsilon=epsilon)
+    return shaped(palm, mesh)
+
+
+def shaped(palm: Palm, mesh: TetMesh) -> TetMesh:
+    """The same palm of straight tetrahedra with curved ones, and the facet sets named."""
+    from meshes.curved import curved
+    from meshes.facets import named, seen_from_above
+    from meshes.tetmesh import quadratic
+
+    mesh = curved(quadratic(mesh), *_functions(palm))
+    ends = {
+        "wrist": lambda centroids, normals: normals[:, 1] < -(0.5**0.5),
+        "fingers": lambda centroids, normals: normals[:, 1] > 0.5**0.5,
+    }
+    return named(mesh, rest="back", top=seen_from_above(mesh), **ends)
+
+
+def onto(
+    points: Floats,
+    level_set: Callable[[Floats], Floats],
+    gradient: Callable[[Floats], Floats],
+    steps: int = 4,
+) -> Floats:
+    """Points (n, 3) near a level set, moved onto it by Newton steps along its gradient."""
+    for _ in range(steps):
+        slope = gradient(points)
+        steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
+        points = points - (level_set(points) / steepness)[:, None] * slope
+    return points
+
+
+def _functions(palm: Palm) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
+    return lambda points: level_set(palm, points), lambda points: gradient(palm, points)
+
+
+def _field(palm: Palm, points: Floats) -> Field:
+    bend = palm.cup_depth * np.array([2 / palm.breadth, 2 / palm.length]) ** 2
+    flat = points.copy()
+    flat[:, 2] -= points[:, :2] ** 2 @ bend
+    value, slope = _box_distance(palm, flat)
+    for height, centre, half_axes in _mounds(palm):
+        value, slope = _join((value, slope), _ellipsoid(flat - centre, half_axes), height)
+    slope[:, :2] -= 2 * bend * points[:, :2] * slope[:, 2:]
+    return value, slope
+
+
+def _mounds(palm: Palm) -> Iterator[tuple[float, Floats, Floats]]:
+    """Height, centre and half axes of each mound that there is."""
+    b, length, half = palm.breadth, palm.length, palm.thickness / 2
+    places = [
+        (palm.thenar_height, 0.25 * b, -0.21 * length, 0.22 * b, 0.29 * length),
+        (palm.hypothenar_height, -0.27 * b, -0.16 * length, 0.19 * b, 0.31 * length),
+        *((palm.pad_height, x * b, 0.37 * length, 0.12 * b, 0.12 * length) for x in PADS),
+    ]
+    for height, x, y, across, along in places:
+        if height > 0:
+            # As deep as the slab and raised, so that the back of the hand stays as it is.
+            yield height, np.array([x, y, height - half]), np.array([across, along, half])
+
+
+def _box_distance(palm: Palm, points: Floats) -> Field:
+    """Distance from a box with rounded corners in its plan and rounded edges."""
+    half = np.array([palm.breadth, palm.length]) / 2
+    middle = points + [0, 0, palm.thickness / 2]
+    sign = np.where(middle < 0, -1.0, 1.0)
+    outline, across = _rounded(np.abs(middle[:, :2]) - half, palm.corner_radius)
+    upward = np.abs(middle[:, 2]) - palm.thickness / 2
+    value, share = _rounded(np.column_stack([outline, upward]), palm.edge_radius)
+    return value, sign * np.column_stack([share[:, :1] * across, share[:, 1]])
+
+
+def _rounded(beyond: Floats, radius: float) -> Field:
+    """Distance (n,) from a corner of that radius, of points so far beyond its two sides (n, 2)."""
+    inner = beyond + radius
+    outside = np.maximum(inner, 0)
+    length = np.linalg.norm(outside, axis=1)
+    value = length + np.minimum(inner.max(axis=1), 0) - radius
+    nearest = np.eye(2)[inner.argmax(axis=1)]
+    round_part = outside / np.maximum(length, 1e-300)[:, None]
+    return value, np.where((length > 0)[:, None], round_part, nearest)
+
+
+def _ellipsoid(points: Floats, half_axes: Floats) -> Field:
+    """First-order distance k (k - 1) / |grad k^2 / 2|, with k = |p / half_axes|."""
+    scaled, twice = points / half_axes, points / half_axes**2
+    k = np.maximum(np.linalg.norm(scaled, axis=1), 1e-9)
+    m = np.maximum(np.linalg.norm(twice, axis=1), 1e-9 / half_axes.max())
+    value = k * (k - 1) / m
+    by_k, by_m = (2 * k - 1) / m, -value / m
+    slope = (by_k / k)[:, None] * twice + (by_m / m)[:, None] * (twice / half_axes**2)
+    return value, slope
+
+
+def _join(one: Field, other: Field, width: float) -> Field:
+    """Smooth minimum: cubic, so that second derivatives are continuous."""
+    (a, slope_a), (b, slope_b) = one, other
+    gap = np.maximum(width - np.abs(a - b), 0) / width
+    lesser = a <= b
+    share = gap**2 / 2  # of the greater one
+    slope_low = np.where(lesser[:, None], slope_a, slope_b)
+    slope_high = np.where(lesser[:, None], slope_b, slope_a)
+    slope = slope_low + share[:, None] * (slope_high - slope_low)
+    return np.minimum(a, b) - width * gap**3 / 6, slope
+
+
+def _box(palm: Palm) -> tuple[Floats, Floats]:
+    """Corners of a box around the palm."""
+    mound = max(palm.thenar_height, palm.hypothenar_height, palm.pad_height)
+    half = np.array([0.56 * palm.breadth, 0.53 * palm.length])  # mounds may bulge sideways
+    top = mound + 2.5 * palm.cup_depth
+    return np.array([*-half, -palm.thickness]), np.array([*half, top])

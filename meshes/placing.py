@@ -1,0 +1,152 @@
+"""From a surface anywhere in space to one under the device: turned, centred, cut."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from meshes.facets import Predicate
+from meshes.surface import Surface, compact, n_pieces, pieces, repaired
+from meshes.tetmesh import Floats, MeshError
+
+# The rows are the new x, y and z. Each is a turn about one axis.
+TURNS = {
+    "+z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "-z": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    "+y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+    "-y": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    "+x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+    "-x": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
+}
+OUTLINE_CELLS = 200  # along the longer side of the raster in which the outline is drawn
+
+
+def turned(surface: Surface, up: str) -> Surface:
+    """The surface with its axis `up` (+x, -x, ... -z) turned to +z."""
+    if up not in TURNS:
+        raise MeshError(f"up = '{up}' is no axis; use one of {', '.join(TURNS)}")
+    return Surface(points=surface.points @ np.array(TURNS[up]).T, triangles=surface.triangles)
+
+
+def placed(surface: Surface) -> tuple[Surface, Floats]:
+    """The surface moved so that its palm's middle is the origin, and by how much (3,), metre.
+
+    The middle is that of the widest circle within the outline seen from above: in a hand, the
+    palm. The highest point of the surface there comes to z = 0.
+    """
+    x, y = widest_place(surface)
+    shift = -np.array([x, y, height_at(surface, x, y)])
+    return Surface(points=surface.points + shift, triangles=surface.triangles), shift
+
+
+def widest_place(surface: Surface) -> tuple[float, float]:
+    """The middle of the widest circle within the outline seen from above, metre."""
+    from scipy.ndimage import distance_transform_edt
+
+    flat = surface.points[:, :2]
+    low, cell = flat.min(axis=0), np.ptp(flat, axis=0).max() / OUTLINE_CELLS
+    shape = np.ceil(np.ptp(flat, axis=0) / cell).astype(int) + 3
+    inside = np.zeros(shape, bool)
+    corners = flat[surface.triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    count = np.maximum(1, np.ceil(2 * sides / cell)).astype(int)
+    for n in np.unique(count):
+        i, j = np.indices((n + 1, n + 1)).reshape(2, -1)
+        shares = np.column_stack([i, j, n - i - j])[i + j <= n] / n
+        drawn = np.einsum("qa,eai->eqi", shares, corners[count == n]).reshape(-1, 2)
+        inside[tuple(((drawn - low) / cell + 1).astype(int).T)] = True
+    distance = distance_transform_edt(inside)
+    # Of many equal circles, as in a long bar, the one in the middle.
+    best = np.argwhere(distance >= distance.max() - 0.5)
+    best = best[np.argmin(((best - best.mean(axis=0)) ** 2).sum(axis=1))]
+    x, y = low + (best - 0.5) * cell
+    return float(x), float(y)
+
+
+def height_at(surface: Surface, x: float, y: float) -> float:
+    """The greatest z of the surface above a point of the plane, metre.
+
+    Raises
+    ------
+    MeshError
+        If there is no surface there.
+    """
+    corners = surface.points[surface.triangles]
+    u, v = (corners[..., :2] - [x, y]).transpose(2, 0, 1)
+    share = np.stack(
+        [u[:, b] * v[:, c] - u[:, c] * v[:, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1
+    )
+    total = share.sum(axis=1)
+    over = (share * np.sign(total)[:, None] >= 0).all(axis=1) & (total != 0)
+    if not over.any():
+        raise MeshError(
+            f"the surface is not above ({1e3 * x:.4g}, {1e3 * y:.4g}) mm; choose another place"
+        )
+    weights = share[over] / total[over, None]
+    return float(np.einsum("ea,ea->e", weights, corners[over, :, 2]).max())
+
+
+def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
+    """The closed part of a closed surface within a box, and sentences on what was cut.
+
+    Of several pieces the one with the origin below its top is kept.
+
+    Parameters
+    ----------
+    box : least and greatest x, least and greatest y, metre.
+
+    Raises
+    ------
+    MeshError
+        If the box is empty or does not contain the origin, or the cut cannot be closed.
+    """
+    import pyvista
+
+    left, right, front, back = box
+    if not (left < 0 < right and front < 0 < back):
+        raise MeshError(
+            "the patch from ({:g}, {:g}) to ({:g}, {:g}) mm must have the middle of the palm, "
+            "(0, 0), inside it".format(*(1e3 * v for v in (left, front, right, back)))
+        )
+    faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles])
+    body, cuts = pyvista.PolyData(np.array(surface.points), faces=faces.ravel()), 0
+    for axis, sign, place in ((0, 1, left), (0, -1, right), (1, 1, front), (1, -1, back)):
+        along = sign * (np.asarray(body.points)[:, axis] - place)
+        if along.min() < 0 < along.max():
+            normal, origin = np.zeros(3), np.zeros(3)
+            normal[axis], origin[axis] = sign, place
+            body = body.clip_closed_surface(normal=normal, origin=origin).triangulate()
+            cuts += 1
+    if not cuts:
+        return surface, []
+    triangles = np.asarray(body.faces).reshape(-1, 4)[:, 1:]
+    cut, _ = repaired(np.asarray(body.points, np.float64), triangles)
+    said = [f"cut at {cuts} planes"]
+    if (n := n_pieces(cut)) > 1:
+        cut = _under_origin(cut)
+        said.append(f"dropped {n - 1} pieces that are not joined to the palm within the patch")
+    return cut, said
+
+
+def on_planes(box: Sequence[float], tolerance: float) -> Predicate:
+    """A predicate of facets that lie on the sides of a box (metre), for `named`."""
+
+    def cut(centroids: Floats, normals: Floats) -> np.ndarray:
+        found = np.zeros(len(centroids), bool)
+        for axis, sign, place in zip((0, 0, 1, 1), (-1, 1, -1, 1), box, strict=True):
+            near = np.abs(centroids[:, axis] - place) <= tolerance
+            found |= near & (sign * normals[:, axis] > 0.9)
+        return found
+
+    return cut
+
+
+def _under_origin(surface: Surface) -> Surface:
+    piece = pieces(surface)
+    parts = [compact(surface.points, surface.triangles[piece == i]) for i in range(piece.max() + 1)]
+    heights = []
+    for part in parts:
+        try:
+            heights.append(height_at(part, 0.0, 0.0))
+        except MeshError:
+            heights.append(-np.inf)
+    return parts[int(np.argmax(heights))]

@@ -1,0 +1,54 @@
+"""Ready-made meshes, so that nothing ordinary needs the mesher, which differs from run to run.
+
+`python -m meshes.remake FOLDER` makes them anew, with their checksums.
+"""
+
+import hashlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+
+from meshes.facets import named, seen_from_above
+from meshes.palm import Palm, shaped
+from meshes.tetmesh import MeshError, TetMesh, quadratic
+
+HOME = Path(__file__).parent / "data"
+CHECKSUMS = "SHA256SUMS"
+
+
+def ready(name: str) -> TetMesh:
+    """A mesh of 10-node tetrahedra that comes with the package.
+
+    `palm` and `flat-palm` (elements of 5 mm) have the facet sets of `palm_mesh`; `slab` (60 x 60 x
+    15 mm, elements of 4 mm) has `top`, `bottom`, `sides` and `surface`.
+
+    Raises
+    ------
+    MeshError
+        If there is none of that name, or its file is not what it was.
+    """
+    lines = (HOME / CHECKSUMS).read_text("ascii").splitlines()
+    sums = {file: checksum for checksum, file in map(str.split, lines)}
+    if f"{name}.npz" not in sums:
+        known = ", ".join(sorted(Path(file).stem for file in sums))
+        raise MeshError(f"there is no ready mesh '{name}'; there are: {known}")
+    content = (HOME / f"{name}.npz").read_bytes()
+    if hashlib.sha256(content).hexdigest() != sums[f"{name}.npz"]:
+        raise MeshError(
+            f"the ready mesh '{name}' is not what its checksum says; install the package again"
+        )
+    with np.load(io.BytesIO(content)) as stored:
+        mesh = TetMesh(points=stored["points"], tets=stored["tets"])
+        palm = json.loads(str(stored["palm"]))
+    return shaped(Palm(**palm), mesh) if palm else _with_box_sides(quadratic(mesh))
+
+
+def _with_box_sides(mesh: TetMesh) -> TetMesh:
+    return named(
+        mesh,
+        top=seen_from_above(mesh),
+        bottom=lambda centroids, normals: normals[:, 2] < -0.5,
+        sides=lambda centroids, normals: np.abs(normals[:, 2]) < 0.5,
+    )

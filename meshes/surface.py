@@ -1,0 +1,284 @@
+"""Closed triangulated surfaces: what is checked before one is filled, and what can be repaired.
+
+Triangles are seen anticlockwise from outside. Every refusal counts what is wrong and says where
+the first of it is, in millimetre.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from meshes.tetmesh import FURTHEST, Floats, Ints, MeshError
+
+SAME_POINT = 1e-6  # of the diagonal: points nearer than this are one
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Triangles in space.
+
+    Parameters
+    ----------
+    points : (n, 3) float, metre
+    triangles : (k, 3) int, point numbers from 0
+
+    Raises
+    ------
+    MeshError
+        If shapes or point numbers do not fit, there is no triangle, or a point is not finite.
+    """
+
+    points: Floats
+    triangles: Ints
+
+    def __post_init__(self) -> None:
+        points = _array("points", self.points, "coordinates in metre").astype(np.float64)
+        triangles = _array("triangles", self.triangles, "point numbers")
+        if triangles.dtype.kind not in "iu":
+            raise MeshError(
+                f"triangles must be whole numbers, not {triangles.dtype}; number points from 0"
+            )
+        bad = np.flatnonzero(~(np.abs(points) < FURTHEST).all(axis=1))
+        if len(bad):
+            raise MeshError(
+                f"{len(bad)} of {len(points)} points are not finite, first point {bad[0]}; "
+                "repair the file it comes from"
+            )
+        if triangles.min() < 0 or triangles.max() >= len(points):
+            raise MeshError(
+                f"point numbers of triangles run from {triangles.min()} to {triangles.max()}, "
+                f"but there are {len(points)} points; number them from 0"
+            )
+        for name, array in (("points", points), ("triangles", triangles.astype(np.int64))):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def diagonal(self) -> float:
+        """Of the bounding box, metre."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+
+def volume(surface: Surface) -> float:
+    """Enclosed volume in cubic metre; negative if the triangles are seen from inside."""
+    a, b, c = _corners(surface)
+    return float(np.einsum("ei,ei->", np.cross(a, b), c)) / 6
+
+
+def area(surface: Surface) -> float:
+    """Area in square metre."""
+    a, b, c = _corners(surface)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+
+
+def thinnest(surface: Surface) -> float:
+    """Twice volume over area, metre: the thickness of a plate, a third of a cube's side."""
+    return 2 * abs(volume(surface)) / area(surface)
+
+
+def check(surface: Surface) -> None:
+    """That a surface is one closed manifold, seen from outside, that does not cross itself.
+
+    Raises
+    ------
+    MeshError
+        If it is not: how many edges, points or triangles are wrong, and where.
+    """
+    from meshes.crossings import self_crossings
+
+    pairs = _paired_edges(surface)
+    against = pairs[_starts(surface)[pairs[:, 0]] == _starts(surface)[pairs[:, 1]]]
+    if len(against):
+        raise MeshError(
+            f"the triangles at {len(against)} edges of the surface look opposite ways, first near "
+            f"{_at(surface, against[0, 0])}; orient them, as `repaired` does"
+        )
+    _check_fans(surface, pairs)
+    if (n := n_pieces(surface)) > 1:
+        raise MeshError(
+            f"the surface is {n} separate pieces; keep one of them, or join them in the program "
+            "that it comes from"
+        )
+    if not (enclosed := volume(surface)) > 1e-9 * surface.diagonal**3:
+        raise MeshError(
+            f"the surface encloses {enclosed:.3g} m3; give a closed one whose triangles are seen "
+            "anticlockwise from outside"
+        )
+    crossing = self_crossings(surface)
+    if len(crossing):
+        raise MeshError(
+            f"the surface crosses itself at {len(crossing)} pairs of triangles, first near "
+            f"{_place(surface.points[surface.triangles[crossing[0, 0]]].mean(axis=0))}; "
+            "separate or join the parts in the program that it comes from"
+        )
+
+
+def repaired(points: ArrayLike, triangles: ArrayLike) -> tuple[Surface, list[str]]:
+    """A surface without seams, doubles and wrong orientation, and sentences on what was done.
+
+    Only what needs no guess is repaired: points that coincide become one, triangles without area
+    for want of three corners and second copies of triangles go, neighbours are made to look the
+    same way and outwards.
+
+    Raises
+    ------
+    MeshError
+        If it is open, has edges of more than two triangles, or has only one side.
+    """
+    raw, said = Surface(points=points, triangles=triangles), []  # type: ignore[arg-type]
+    number = _same_points(raw)
+    kept = number[raw.triangles]
+    if (merged := len(number) - len(np.unique(number))) > 0:
+        said.append(f"merged {merged:,} points that coincide with others, as along seams")
+    a, b, c = kept.T
+    real = (a != b) & (b != c) & (c != a)
+    if not real.all():
+        said.append(f"dropped {(~real).sum():,} triangles that are only a line or a point")
+    kept = kept[real]
+    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
+    if len(first) < len(kept):
+        said.append(f"dropped {len(kept) - len(first):,} second copies of triangles")
+    surface = compact(raw.points, kept[np.sort(first)])
+    if (unused := len(number) - merged - len(surface.points)) > 0:
+        said.append(f"dropped {unused:,} points that no triangle uses")
+    turned = _turned(surface)
+    if turned.any():
+        said.append(f"turned round {turned.sum():,} of {len(turned):,} triangles to look outwards")
+        order = np.where(turned[:, None], [[0, 2, 1]], [[0, 1, 2]])
+        along = np.take_along_axis(surface.triangles, order, axis=1)
+        surface = Surface(points=surface.points, triangles=along)
+    return surface, said
+
+
+def compact(points: Floats, triangles: Ints) -> Surface:
+    """The surface of these triangles with the points that they use."""
+    used, numbers = np.unique(triangles, return_inverse=True)
+    return Surface(points=points[used], triangles=numbers.reshape(-1, 3))
+
+
+def pieces(surface: Surface) -> Ints:
+    """Which connected piece (k,) each triangle belongs to."""
+    from scipy import sparse
+
+    ends = surface.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T
+    n = len(surface.points)
+    graph = sparse.coo_array((np.ones(ends.shape[1], bool), tuple(ends)), shape=(n, n))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    return np.unique(label[surface.triangles[:, 0]], return_inverse=True)[1]
+
+
+def n_pieces(surface: Surface) -> int:
+    """How many connected pieces the surface is made of."""
+    return int(pieces(surface).max()) + 1
+
+
+def _array(name: str, values: ArrayLike, meaning: str) -> np.ndarray:
+    try:
+        array = np.array(values)
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"{name} are no array ({error}); give (n, 3) {meaning}") from None
+    if array.ndim != 2 or array.shape[1] != 3 or not len(array) or array.dtype.kind not in "biuf":
+        raise MeshError(
+            f"{name} of the surface have shape {array.shape} and type {array.dtype}; give (n, 3) "
+            f"{meaning}, n > 0"
+        )
+    return array
+
+
+def _corners(surface: Surface) -> tuple[Floats, Floats, Floats]:
+    """Corners about the middle of the surface, so that products of lengths lose no digits."""
+    points = surface.points - surface.points.mean(axis=0)
+    a, b, c = surface.triangles.T
+    return points[a], points[b], points[c]
+
+
+def _starts(surface: Surface) -> Ints:
+    """The point (3 k,) at which each side of each triangle starts; side 3 t + j of triangle t."""
+    return surface.triangles.ravel()
+
+
+def _paired_edges(surface: Surface) -> Ints:
+    """The two sides (m, 2) that meet at each edge; an error if anywhere there are not two."""
+    sides = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    keys = sides[:, 0] * len(surface.points) + sides[:, 1]
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    if (open_edges := first[count == 1]).size:
+        raise MeshError(
+            f"the surface is open along {len(open_edges):,} of its {len(first):,} edges, first "
+            f"near {_at(surface, open_edges[0])}; close its holes in the program that it comes from"
+        )
+    if (crowded := first[count > 2]).size:
+        raise MeshError(
+            f"{len(crowded):,} edges of the surface have more than two triangles, first near "
+            f"{_at(surface, crowded[0])}; keep its outer skin only"
+        )
+    return np.argsort(keys, kind="stable").reshape(-1, 2)
+
+
+def _turned(surface: Surface) -> np.ndarray:
+    """Which triangles (k,) must be turned round so that all of each piece look outwards."""
+    from scipy import sparse
+
+    pairs, n = _paired_edges(surface), len(surface.triangles)
+    t, other = pairs.T // 3
+    starts = _starts(surface)
+    against = starts[pairs[:, 0]] == starts[pairs[:, 1]]
+    # Each triangle twice, as it is and turned; those of neighbours that agree are connected.
+    rows = np.concatenate([t, t + n])
+    columns = np.concatenate([other + n * against, other + n * ~against])
+    graph = sparse.coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(2 * n, 2 * n))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    if (one_sided := np.flatnonzero(label[:n] == label[n:])).size:
+        raise MeshError(
+            f"{len(one_sided):,} triangles belong to a surface with only one side, like a Moebius "
+            "strip; give one that encloses a body"
+        )
+    turned = label[:n] > label[n:]
+    a, b, c = _corners(surface)
+    enclosed = np.einsum("ei,ei->e", np.cross(a, b), c) * np.where(turned, -1, 1)
+    piece = pieces(surface)
+    return turned ^ (np.bincount(piece, enclosed) < 0)[piece]
+
+
+def _check_fans(surface: Surface, pairs: Ints) -> None:
+    """That the triangles around each point are one fan."""
+    from scipy import sparse
+
+    n = surface.triangles.size
+    ends = pairs - pairs % 3 + (pairs + 1) % 3
+    rows, columns = pairs.ravel(), ends[:, ::-1].ravel()
+    graph = sparse.coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(n, n))
+    fans, label = sparse.csgraph.connected_components(graph, directed=False)
+    owner = np.empty(fans, np.int64)
+    owner[label] = _starts(surface)
+    used, count = np.unique(owner, return_counts=True)
+    if (pinched := used[count > 1]).size:
+        raise MeshError(
+            f"parts of the surface touch at {len(pinched):,} single points, first at "
+            f"{_place(surface.points[pinched[0]])}; separate them there"
+        )
+
+
+def _same_points(surface: Surface) -> Ints:
+    """The number (n,) of the first point that each coincides with."""
+    from scipy import sparse
+    from scipy.spatial import cKDTree
+
+    n, points = len(surface.points), surface.points
+    near = cKDTree(points).query_pairs(SAME_POINT * surface.diagonal, output_type="ndarray")
+    graph = sparse.coo_array((np.ones(len(near), bool), tuple(near.T)), shape=(n, n))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    _, first = np.unique(label, return_index=True)
+    return first[label]
+
+
+def _at(surface: Surface, side: int) -> str:
+    """Where a side of a triangle is."""
+    triangle, corner = divmod(int(side), 3)
+    ends = surface.triangles[triangle, [corner, (corner + 1) % 3]]
+    return _place(surface.points[ends].mean(axis=0))
+
+
+def _place(point: Floats) -> str:
+    return "({:.4g}, {:.4g}, {:.4g}) mm".format(*(1e3 * point))

@@ -1,0 +1,215 @@
+"""Tetrahedra within any closed surface, by fTetWild (Hu et al. 2020, doi 10.1145/3386569.3392385).
+
+The mesher differs from run to run, crashes on what it cannot read, never ends on some sizes, and
+returns nothing for bodies thinner than its envelope. So its input is checked, it runs in a process
+and a folder of its own with a time limit, its result is checked, and kept on disk: the same body is
+meshed once per machine.
+"""
+
+import logging
+import tempfile
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from meshes import cache, child
+from meshes.facets import named
+from meshes.quality import dihedral_angles
+from meshes.structured import Grading, extrude
+from meshes.surface import Surface, area, check, n_pieces, repaired, thinnest, volume
+from meshes.tetmesh import Floats, MeshError, TetMesh, boundary_facets, corner_volumes
+
+log = logging.getLogger(__name__)
+
+Sizing = Callable[[Floats], Floats]
+
+EPSILON = 0.05  # of h: how far the mesh may lie from the surface
+SMALLEST_EPSILON = 1e-4  # of the diagonal: below, the mesher takes minutes to hours
+MOST_OF_THICKNESS = 0.1  # what the envelope may be of the body's thickness, or it swallows it
+MOST_TETRAHEDRA = 1_000_000
+SHARPEST = 5.0  # degrees: least dihedral angle of a mesh that is accepted
+VOLUME_ERROR = 0.005
+LOST_SHELL = 0.3  # of the shell between surface and envelope: what chords of curves may cut off
+GRID_CELLS = 32  # along the longest side of the grid that carries the sizes
+
+
+def tetrahedralise(
+    surface: Surface,
+    h: float,
+    *,
+    sizing: Sizing | None = None,
+    timeout: float = 120.0,
+    epsilon: float | None = None,
+) -> TetMesh:
+    """Four-node tetrahedra that fill a closed surface, with its facets in the set `surface`.
+
+    Parameters
+    ----------
+    h : float, metre, edge length that is aimed at.
+    sizing : function of points (n, 3) in metre to edge lengths (n,) in metre that are aimed at;
+        `graded` makes one. None for h everywhere.
+    timeout : float, second, after which the mesher is stopped.
+    epsilon : float, metre, how far the mesh may lie from the surface; a twentieth of h if not
+        given. Where a surface curves, elements get as small as it needs: less is slower.
+
+    Raises
+    ------
+    MeshError
+        If the surface is not closed, crosses itself or is not sound otherwise; h, a size or
+        epsilon is out of range; the mesher fails, or what it returns is not what was asked for.
+    TimeoutError
+        If the mesher takes longer than `timeout`.
+    """
+    check(surface)
+    check_size(surface, "h", h)
+    epsilon = _checked_epsilon(surface, h, epsilon)
+    if not 0 < timeout < np.inf:
+        raise MeshError(f"timeout = {timeout} s must be finite and above 0")
+    grid = _size_grid(surface, h, sizing)
+    inputs = {
+        "points": surface.points,
+        "triangles": surface.triangles,
+        "h": grid["grid_sizes"].max(),  # sizes above it are not reached
+        "epsilon": np.array(epsilon / surface.diagonal),
+        **grid,
+    }
+    name = cache.key("tetrahedralise 1", *(inputs[part] for part in sorted(inputs)))
+    entry = cache.load(name) or {}
+    if {"points", "tets"} <= entry.keys():
+        return _accepted(surface, epsilon, entry["points"], entry["tets"])
+    mesh = _accepted(surface, epsilon, *_run(inputs, timeout))
+    cache.store(name, {}, points=mesh.points, tets=mesh.tets)
+    return mesh
+
+
+def graded(h: float, grading: Grading) -> Sizing:
+    """Edge lengths: h within the grading's radius of the origin, growing beyond, up to `coarsest`.
+
+    A growth of g from cell to cell is a slope of ln g of the size along the way.
+    """
+    slope = float(np.log(grading.growth))
+
+    def sizes(points: Floats) -> Floats:
+        beyond = np.maximum(np.linalg.norm(points, axis=1) - grading.radius, 0.0)
+        return np.minimum(h + slope * beyond, max(h, grading.coarsest))
+
+    return sizes
+
+
+def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float:
+    thickness, diagonal = thinnest(surface), surface.diagonal
+    most, least = MOST_OF_THICKNESS * thickness, SMALLEST_EPSILON * diagonal
+    if most < least:
+        raise MeshError(
+            f"the body is {1e3 * thickness:.3g} mm thick and {1e3 * diagonal:.3g} mm long, which "
+            f"is too thin for the mesher, whose limit is 1:{MOST_OF_THICKNESS / SMALLEST_EPSILON:g}"
+            "; use `meshes.sheet` or `meshes.block`"
+        )
+    if epsilon is None:
+        return min(max(EPSILON * h, least), most)
+    if not least <= epsilon <= most:
+        raise MeshError(
+            f"epsilon = {epsilon} m must be from {least:.2g} m, below which the mesher does not "
+            f"end, to {most:.2g} m, a tenth of the body's thickness; leave it out for a good one"
+        )
+    return epsilon
+
+
+def check_size(surface: Surface, name: str, length: float) -> None:
+    """That an edge length in metre is one that the body can be meshed with.
+
+    Raises
+    ------
+    MeshError
+        If it is longer than the body, or shorter than a thousandth of it.
+    """
+    longest = float(np.ptp(surface.points, axis=0).max())
+    if not 1e-3 * longest <= length <= longest:
+        raise MeshError(
+            f"{name} = {length} m must be from {1e-3 * longest:.2g} m to {longest:.2g} m, the "
+            "longest side of the body"
+        )
+
+
+def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, np.ndarray]:
+    """Tetrahedra around the body with the edge length (n,) aimed at by each of their points."""
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    pad = 0.05 * (high - low).max()
+    cells = np.maximum(2, np.ceil(GRID_CELLS * (high - low) / (high - low).max())).astype(int)
+    cells = cells if sizing else np.full(3, 2)
+    lines = [np.linspace(a - pad, b + pad, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
+    grid = extrude(*lines, order=1)
+    sizes = np.full(len(grid.points), float(h))
+    if sizing:
+        sizes = np.asarray(sizing(grid.points), np.float64)
+        if sizes.shape != (len(grid.points),) or not np.isfinite(sizes).all():
+            raise MeshError(
+                f"sizing gave an array of shape {sizes.shape} for {len(grid.points)} points; "
+                "return one finite edge length in metre for each"
+            )
+        check_size(surface, "least size", float(sizes.min()))
+        sizes = np.minimum(sizes, (high - low).max())
+    expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
+    expected *= 8.5 * volume(surface) / np.prod(high - low + 2 * pad)
+    if expected > MOST_TETRAHEDRA:
+        raise MeshError(
+            f"the mesh would have {expected:.2g} tetrahedra or more, the limit is "
+            f"{MOST_TETRAHEDRA:,}; take larger elements"
+        )
+    return {"grid_points": grid.points, "grid_tets": grid.tets, "grid_sizes": sizes}
+
+
+def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndarray]:
+    """What the mesher makes of its input, in a process and a folder of its own."""
+    if find_spec("pytetwild") is None:
+        raise MeshError(
+            "tetrahedra need the package pytetwild, which is not installed and has no wheel for "
+            "Intel Macs; install it, build the mesh on another machine, or read one from a file"
+        )
+    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
+        source, target = Path(folder, "input.npz"), Path(folder, "output.npz")
+        np.savez(source, **inputs)  # type: ignore[arg-type]
+        try:
+            child.run("tetwild_child.py", source, target, timeout, folder=folder, timeout=timeout)
+        except TimeoutError:
+            raise TimeoutError(
+                f"the mesher was stopped after {timeout:g} s; take larger elements or a longer "
+                "timeout"
+            ) from None
+        except MeshError as error:
+            raise MeshError(f"the mesher failed: {error}; simplify or smooth the surface") from None
+        with np.load(target) as result:
+            return result["points"], result["tets"].astype(np.int64)
+
+
+def _accepted(surface: Surface, epsilon: float, points: Floats, tets: np.ndarray) -> TetMesh:
+    """The mesh, if it fills the surface and has no bad element."""
+    if not len(tets):
+        raise MeshError(
+            "the mesher returned no tetrahedra, as for a body thinner than its tolerance; use a "
+            "thicker one or a smaller epsilon"
+        )
+    used, numbers = np.unique(tets, return_inverse=True)
+    mesh = named(TetMesh(points=points[used], tets=numbers.reshape(-1, 4)))
+    boundary = boundary_facets(mesh.tets)
+    outside, _ = repaired(mesh.points, boundary)  # which refuses open and crowded edges
+    if (n := n_pieces(outside)) != 1 or len(outside.triangles) != len(boundary):
+        raise MeshError(f"the boundary of the mesh is {n} pieces, not one; smooth the surface")
+    enclosed = volume(surface)
+    ratio = corner_volumes(mesh.points, mesh.tets).sum() / enclosed
+    limit = VOLUME_ERROR + LOST_SHELL * epsilon * area(surface) / enclosed
+    if not abs(ratio - 1) <= limit:
+        raise MeshError(
+            f"the mesh has {100 * ratio:.2f} % of the volume within the surface, and may differ "
+            f"by {100 * limit:.2g} %; take a smaller epsilon"
+        )
+    angles = dihedral_angles(mesh).min(axis=1)
+    if not angles.min() >= SHARPEST:
+        raise MeshError(
+            f"{(angles < SHARPEST).sum()} tetrahedra have dihedral angles below {SHARPEST:g} "
+            f"degrees, the least is {angles.min():.2g}; smooth the surface or take smaller elements"
+        )
+    log.info("%d tetrahedra, least dihedral angle %.1f degrees", len(mesh.tets), angles.min())
+    return mesh

@@ -1,0 +1,61 @@
+"""A body from a surface or mesh in a file."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import add_reporting, progress_of, summarise
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, glb, vtp) or mesh (vtu, "
+        "msh, inp, vtk)",
+    )  # fmt: skip
+    parser.add_argument("--unit", default="m", help="of the file: m (default), cm, mm, um or in")
+    parser.add_argument("--up", default="+z", help="axis that points to the device (default +z)")
+    parser.add_argument(
+        "--clip", type=float, nargs=4, metavar=("XMIN", "XMAX", "YMIN", "YMAX"),
+        help="keep this patch, mm from the middle of the palm",
+    )  # fmt: skip
+    parser.add_argument("--h", type=float, default=4.0, metavar="MM", help="element size, mm (4)")
+    parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="of the mesher")
+    parser.add_argument("--out", type=Path, metavar="FILE.vtu", help="file to write")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    add_reporting(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from meshes import body_from_file, dihedral_angles, write
+    from meshes.files import WRITTEN
+
+    out = options.out or Path(f"{options.file.stem}-mesh.vtu")
+    if out.suffix.lower() not in WRITTEN:
+        raise ValueError(f"{out} cannot be written; name a file that ends in .vtu or .msh")
+    if out.is_dir() or (out.exists() and not options.overwrite):
+        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
+    if not out.parent.is_dir():
+        raise ValueError(f"{out.parent} is no folder; make it or choose another --out")
+    said: list[str] = []
+    with progress_of(options) as progress:
+        mesh = body_from_file(
+            options.file, options.h / 1e3,
+            unit=options.unit, up=options.up, timeout=options.timeout, say=said.append,
+            progress=progress,
+            clip=None if options.clip is None else [side / 1e3 for side in options.clip],
+        )  # fmt: skip
+        progress("writing", 0.9)
+        write(out, mesh)
+    summary = {
+        "out": str(out),
+        "tetrahedra": len(mesh.tets),
+        "points": len(mesh.points),
+        "least_dihedral_angle": round(float(dihedral_angles(mesh).min()), 2),
+        "facets": {name: len(facets) for name, facets in sorted(mesh.facets.items())},
+        "said": said,
+    }
+    sets = ", ".join(f"{name} {len(facets):,}" for name, facets in sorted(mesh.facets.items()))
+    summarise(options, summary, "\n".join([*said, f"facets: {sets}", f"wrote {out}"]))
+    return 0
