@@ -14,6 +14,7 @@ from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
 from meshes.structured import check_size, round_up, with_planes
 from meshes.tetmesh import Floats, Ints
 from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
+from skinwave import hands
 from skinwave.scene import Body
 
 SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
@@ -66,7 +67,13 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
         materials: Sequence[Material] = [bending_equivalent(body.solid, body.depth / thickness)]
     else:
         starts, materials = zip(*body.strata, strict=True)
-        mesh = in_strata(extrude(*slab_lines(body, size)), starts)
+        if body.kind == "slab":
+            mesh = extrude(*slab_lines(body, size))
+            depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+        else:
+            mesh = hands.hand(body, size)
+            depth = hands.depths(mesh)
+        mesh = replace(mesh, region=_strata(starts, depth, size if body.kind != "slab" else 0.0))
     ends = {"bottom": body.base, "sides": body.sides}
     fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
     for axis in symmetry:
@@ -104,25 +111,19 @@ def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
     return load_operator(build.mesh) * cosine**2, facet_points(build.mesh)
 
 
-def cells(body: Body, h: float, symmetry: str = "") -> tuple[int, int, int]:
-    """How many cells of h in metre `build` makes along x, y and downwards.
+def check_mesh(body: Body, h: float) -> None:
+    """Refuse, before anything is computed, what `build` cannot mesh with cells of h in metre.
 
     Raises
     ------
     ValueError
-        If there are none, they are larger than the body or more than can be solved for.
+        If cells are larger than the body, or more than can be solved for.
     """
-    sides, h = (body.width, body.height), _checked(body, h)
+    h = _checked(body, h)
     if body.kind == "sheet":
-        halves = [max(1, round_up(side / (2 * h))) for side in sides]
-        layers = 1
-    else:
-        x_line, y_line, z_line = slab_lines(body, h)
-        halves = [len(line) // 2 for line in (x_line, y_line)]
-        layers = len(z_line) - 1
-    check_size((2 * halves[0], 2 * halves[1], layers))
-    x, y = (n if axis in symmetry else 2 * n for axis, n in zip("xy", halves, strict=True))
-    return x, y, layers
+        check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
+    elif body.kind == "slab":
+        check_size(len(line) - 1 for line in slab_lines(body, h))
 
 
 def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
@@ -139,10 +140,15 @@ def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
     return x, y, -with_planes(z, [start for start, _ in body.strata[1:]])[::-1]
 
 
-def in_strata(mesh: TetMesh, starts: Sequence[float]) -> TetMesh:
-    """The mesh with each tetrahedron in the region of the stratum that its middle lies in."""
-    depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
-    return replace(mesh, region=np.searchsorted(starts[1:], depth, side="right"))
+def _strata(starts: Sequence[float], depth: Floats, h: float) -> Ints:
+    """Which stratum (m,) the middle of each tetrahedron lies in, of a mesh without its planes."""
+    thinnest = np.diff(starts).min(initial=np.inf)
+    if thinnest < 0.5 * h:
+        raise ValueError(
+            f"a layer of {1e3 * thinnest:g} mm is thinner than half an element of {1e3 * h:g} mm; "
+            "take smaller elements, thicker layers, or a slab, whose elements follow its layers"
+        )
+    return np.searchsorted(starts[1:], depth, side="right")
 
 
 def has_layer(body: Body) -> bool:
@@ -174,6 +180,8 @@ def layer_drag(body: Body, mesh: TetMesh) -> Floats:
 def _checked(body: Body, h: float) -> float:
     if body.kind == "none":
         raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    if body.kind == "mesh":
+        return h
     if not isfinite(body.depth):
         raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
     longest = max(body.width, body.height, body.depth)
@@ -222,7 +230,7 @@ def compliance(body: Body) -> Compliance:
             viscous_lag=solid.viscosity / solid.shear_modulus,
             air_density=0.0,
         )
-    if body.kind == "none" or (body.base != "clamped" and isfinite(body.depth)):
+    if body.kind not in ("sheet", "slab") or (body.base != "clamped" and isfinite(body.depth)):
         raise ValueError(
             "flat-body answers a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
         )

@@ -21,7 +21,7 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     the motion's power; by exact waves of the endless body, or as the load has them.
     """
     body = scene.body
-    if body.kind == "slab" and body.base != "clamped":
+    if body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped"):
         lines = load_lines(scene.pressure, tolerance / 100)
         f, a = summed(lines.frequencies, lines.coefficients[:, None])
     else:

@@ -7,7 +7,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model.flat_body import AIR_DENSITY
 from simple_model.focus import spot_width
-from skinwave.bodies import cells
+from skinwave.bodies import check_mesh
 from skinwave.effort import Progress
 from skinwave.estimates import (
     FAR,
@@ -110,9 +110,9 @@ def plan(
         return _without_mesh(scene, tolerance, highest, returned, rows)
     body, extent = _extent(scene, tolerance, highest)
     if h:
-        cells(body, h)  # refuses what cannot be meshed before anything is computed
+        check_mesh(body, h)  # refuses what cannot be meshed before anything is computed
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *extent]
-    symmetry = _symmetry(scene) if model in (None, "fem") and body.placement == FLAT else ""
+    symmetry = _symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver, h=h)
     scene = replace(scene, body=body)
     step_error, start_error = _march_errors(scene, model, dt)
@@ -123,6 +123,7 @@ def plan(
         memory=found.prepared.effort.peak_memory,
         rows=(*rows, *_element_rows(scene, tolerance, symmetry, found, highest, h)),
         warnings=(
+            *_unknown(found),
             *_exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
                       f"about {1e3 * _enough(found, tolerance):.2g} mm is"),
             *_exceeds(f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
@@ -210,8 +211,17 @@ def _enough(found: Refined, tolerance: float) -> float:
     return found.h * (aim / max(aim, found.error)) ** (1 / ORDER)
 
 
+def _unknown(found: Refined) -> tuple[str, ...]:
+    if np.isfinite(found.error):
+        return ()
+    return (
+        "how wrong this mesh makes the answer is not known, because its file has only one; give a "
+        "finer one and compare",
+    )
+
+
 def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
-    if error <= tolerance:
+    if not error > tolerance:
         return ()
     return (
         f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
@@ -223,6 +233,8 @@ def _why_elements(scene: Scene) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
         return f"exact waves need a Gaussian focus, not '{scene.pressure.focus}'"
+    if body.kind in ("palm", "mesh"):
+        return "a body that is not flat"
     if len(body.strata) > 1:
         return f"{len(body.strata)} layers; exact waves are for one material"
     if body.placement != FLAT:
@@ -241,6 +253,8 @@ def _under_resolved(h: float, width: float) -> tuple[str, ...]:
 
 def _symmetry(scene: Scene) -> str:
     """Axes across whose middle plane the load is its own mirror image at all times."""
+    if scene.body.kind not in ("sheet", "slab") or scene.body.placement != FLAT:
+        return ""
     path = scene.tacton.trajectory
     if path.is_static:
         path_points = path.at_phase(np.zeros(1))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simple_model import Response
+from skinwave import hands
 from skinwave.bodies import default_size
 from skinwave.effort import Progress
 from skinwave.prepared import Prepared, answer, prepare
@@ -55,6 +56,8 @@ def refined(
         )  # fmt: skip
         return prepared, answer(prepared, scene)
 
+    if scene.body.kind in hands.KINDS:
+        h = h or default_size(scene.body)  # each mesh takes a minute: two tell how good the last is
     least = FINEST * default_size(scene.body)
     longest = max(body.width, body.height)
     before = min(h * RATIO if h else FIRST * default_size(scene.body), longest)
@@ -63,7 +66,7 @@ def refined(
     while True:
         prepared, fine = answered(size)
         if coarse.effort.dofs == fine.effort.dofs:  # two sizes beyond the body's own: one mesh
-            error = 1.0
+            error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
         else:
             error = _change(coarse, fine) / ((before / size) ** ORDER - 1)
         if h or error <= tolerance or size <= least:

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.materials import PRESETS, Material
+from meshes import Palm
 from simple_model import MovingPressure, Tacton
 from simple_model.choices import choose
 
-KINDS = ("none", "sheet", "slab")
+KINDS = ("none", "sheet", "slab", "palm", "mesh")
 BASES = ("clamped", "absorbing", "free")
 
 
@@ -39,6 +40,20 @@ class Layer:
             raise ValueError(
                 f"layer thickness = {1e3 * self.thickness} mm must be finite and above 0"
             )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relief:
+    """What makes a palm of a slab, in metre, as in `meshes.Palm`; all heights 0 is a slab with
+    rounded edges.
+    """
+
+    cup_depth: float = 0.003
+    thenar_height: float = 0.005
+    hypothenar_height: float = 0.003
+    pad_height: float = 0.0012
+    corner_radius: float = 0.028
+    edge_radius: float = 0.007
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,16 +112,20 @@ FLAT = Placement()
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A flat body below the plane that the focus moves in, centred under the origin.
+    """A body below the plane that the focus moves in, the middle of its surface at the origin.
 
     Parameters
     ----------
-    kind : "none" (the point kernel needs no body), "sheet" (thin, bends) or "slab" (thick)
+    kind : "none" (the point kernel needs no body), "sheet" (thin, bends), "slab" (thick), "palm"
+        (soft tissue on bone, `depth` below the middle of the palm) or "mesh" (from a file)
     material : the name of a preset, or a Material
     width, height, depth : float, metre, along x, y and downwards; a slab's depth may be inf,
         a half-space, which only flat-body answers
-    base, sides : "clamped", "absorbing" or "free"
-    layers : from the surface of a slab downwards; what is below them is of `material`
+    base, sides : "clamped", "absorbing" or "free"; of a hand the part that looks downwards, and
+        the ends at the wrist and the fingers or the cuts of a file
+    layers : from the surface downwards; what is below them is of `material`
+    relief : of a palm
+    file, unit, up : of a mesh, as `meshes.body_from_file` takes them
     placement : how the body lies under the device
 
     Raises
@@ -123,6 +142,10 @@ class Body:
     base: str = "clamped"
     sides: str = "absorbing"
     layers: tuple[Layer, ...] = ()
+    relief: Relief = Relief()
+    file: str = ""
+    unit: str = "m"
+    up: str = "+z"
     placement: Placement = FLAT
 
     def __post_init__(self) -> None:
@@ -138,6 +161,13 @@ class Body:
             raise ValueError("a body with free base and free sides flies away; clamp one of them")
 
         self._check_layers()
+
+        if (self.kind == "mesh") != bool(self.file):
+            raise ValueError(
+                "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
+            )
+        if self.kind == "palm":
+            Palm(breadth=self.width, length=self.height, thickness=self.depth, **vars(self.relief))
 
     def _check_layers(self) -> None:
         if not self.layers:
@@ -191,6 +221,7 @@ BODIES = {
     "paper-sheet": Body(kind="sheet", material="paper", depth=1e-4, base="free", sides="clamped"),
     # Effective soft tissue of the palm on bone.
     "skin-slab": Body(),
+    "palm": Body(kind="palm", width=0.085),
 }
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
@@ -220,7 +251,7 @@ class Scene:
     def __post_init__(self) -> None:
         if not self.probes:
             raise ValueError("points_mm is empty; give at least one probe")
-        if self.body.kind == "none":
+        if self.body.kind in ("none", "mesh"):
             return
         half = np.array([self.body.width, self.body.height]) / 2
         for x, y in self.probes:

@@ -13,7 +13,7 @@ import tomli_w
 from fem.materials import Material
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
-from skinwave.scene import BODIES, KINDS, Body, Layer, Placement, Scene
+from skinwave.scene import BODIES, KINDS, Body, Layer, Placement, Relief, Scene
 
 LARGEST = 1_000_000  # bytes of a file
 
@@ -31,7 +31,11 @@ def read(path: str | Path) -> Scene:
             content = file.read(LARGEST + 1)
         if len(content) > LARGEST:
             raise ValueError(f"larger than {LARGEST / 1e6:g} MB, which no scene is; check the path")
-        return loads(content.decode("utf-8-sig"))
+        scene = loads(content.decode("utf-8-sig"))
+        if scene.body.file:  # is named from where the scene is
+            place = str((Path(path).parent / scene.body.file).resolve())
+            scene = replace(scene, body=replace(scene.body, file=place))
+        return scene
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror}); check the path") from None
     except ValueError as error:
@@ -85,6 +89,8 @@ def dumps(scene: Scene) -> str:
     if body.kind == "none":
         table["body"] = {"kind": "none"}
         del table["placement"]
+    for key in {key for key, kind in ONLY_OF.items() if kind != body.kind} & set(table["body"]):
+        del table["body"][key]
     return tomli_w.dumps(table)
 
 
@@ -177,6 +183,14 @@ def _write_layers(layers: tuple[Layer, ...]) -> Any:
     ]
 
 
+def _relief(key: str, value: Any) -> Relief:
+    return Relief(**_checked(f"[body.{key}]", _table(f"body.{key}", value), RELIEF))
+
+
+def _write_relief(relief: Relief) -> Any:
+    return {key: field.write(getattr(relief, field.name)) for key, field in RELIEF.items()}
+
+
 def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     x, y = _pair(key, value)
     return x / 1e3, y / 1e3
@@ -211,6 +225,13 @@ MATERIAL = {
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
 }
+RELIEF = {
+    f"{name}_mm": _scaled(name, 1e3)
+    for name in (
+        "cup_depth", "thenar_height", "hypothenar_height", "pad_height", "corner_radius",
+        "edge_radius",
+    )
+}  # fmt: skip
 LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
     "material": Field("material", _material, _write_material),
@@ -244,6 +265,10 @@ SECTIONS = {
         "base": _word("base"),
         "sides": _word("sides"),
         "layers": Field("layers", _layers, _write_layers),
+        "relief": Field("relief", _relief, _write_relief),
+        "file": _word("file"),
+        "unit": _word("unit"),
+        "up": _word("up"),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
@@ -263,11 +288,19 @@ SECTIONS = {
 }
 
 
+ONLY_OF = {"relief": "palm", "file": "mesh", "unit": "mesh", "up": "mesh"}
+
+
 def _body(values: dict[str, Any]) -> Body:
-    presets = {"none": "none", "sheet": "paper-sheet", "slab": "skin-slab"}
+    presets = {"none": "none", "sheet": "paper-sheet", "slab": "skin-slab", "palm": "palm"}
     kind = values.get("kind", "slab")
     choose("body kind", kind, KINDS)
+    for key in ONLY_OF.keys() & values.keys():
+        if ONLY_OF[key] != kind:
+            raise ValueError(f'[body] {key} is for kind = "{ONLY_OF[key]}", not "{kind}"')
     shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
+    if kind == "mesh":
+        return Body(**shape, placement=Placement(**placement))
     return replace(BODIES[presets[kind]], **shape, placement=Placement(**placement))
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from skinwave import paper15, report
-from skinwave.bodies import cells, default_size
+from skinwave.bodies import check_mesh, default_size
 from skinwave.claims import Run, Verdict, evaluate
 from skinwave.effort import Progress, peak_memory
 from skinwave.figures import label, overview_figure, png, tacton_figure
 from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.prepared import Prepared, answer, prepare
-from skinwave.scene import BODIES, Scene, with_body
+from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.simulation import check_knobs, simulate
 
@@ -33,9 +33,9 @@ class Outcome:
     peak_memory: int
 
 
-def paper_scenes() -> dict[str, dict[str, Scene]]:
-    """Tacton -> body -> scene of the paper's 15 Tactons."""
-    return {name: paper15.scenes(name, tacton) for name, tacton in paper15.tactons()}
+def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str, Scene]]:
+    """Tacton -> body -> scene of the paper's 15 Tactons, on bodies by name or on paper and skin."""
+    return {name: paper15.scenes(name, tacton, bodies) for name, tacton in paper15.tactons()}
 
 
 def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
@@ -45,7 +45,7 @@ def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
         known = (label for label, body in BODIES.items() if body == scene.body)
         return {name: {"none": published, next(known, scene.body.kind): scene}}
     physical = {"drive": "pressure_squared", "focus": "gaussian"}
-    bodies = {k: with_body(scene, b, **physical) for k, b in BODIES.items() if b.kind != "none"}
+    bodies = {k: with_body(scene, BODIES[k], **physical) for k in paper15.MEASURED_ON}
     return {name: {"none": published, **bodies}}
 
 
@@ -66,7 +66,9 @@ def run_study(
     check_knobs(solver, h=h)
     for solid in {s.body for group in scenes.values() for s in group.values()}:
         if solid.kind != "none":
-            cells(solid, h or default_size(solid))  # refuses what cannot be meshed before any run
+            check_mesh(
+                solid, h or default_size(solid)
+            )  # refuses what cannot be meshed before any run
     started = time.perf_counter()
     runs: list[Run] = []
     prepared: dict[str, Prepared] = {}

@@ -2,8 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise
+
+if TYPE_CHECKING:
+    from skinwave.scene import Body
 
 TITLE = "The paper's 15 Tactons: point kernel, paper and skin"
 
@@ -14,6 +18,12 @@ def options(parser: argparse.ArgumentParser) -> None:
         "scene", nargs="?", default="paper-15", metavar="SCENE",
         help="scene file, or paper-15, the 15 Tactons of Lim, Seifi and Park (default)",
     )  # fmt: skip
+    parser.add_argument(
+        "--body", metavar="BODY", help="on this body instead: paper-sheet, skin-slab, palm, or the "
+        "file of a hand's surface (stl, ply, obj, glb, vtp) or mesh (vtu, msh, inp, vtk)",
+    )  # fmt: skip
+    parser.add_argument("--unit", default="m", help="of that file: m (default), cm, mm, um or in")
+    parser.add_argument("--up", default="+z", help="its axis that points to the device")
     add_mesh(parser)
     add_output(parser)
 
@@ -21,12 +31,19 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import folder_name, output_folder
+    from skinwave.scene import with_body
     from skinwave.scene_file import read
     from skinwave.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)
-    scenes = paper_scenes() if scene is None else own_scenes(scene, folder_name(scene.name))
+    bodies = _chosen_body(options) if options.body else None
+    if scene is None:
+        scenes = paper_scenes(bodies)
+    else:
+        for body in (bodies or {}).values():
+            scene = with_body(scene, body)
+        scenes = own_scenes(scene, folder_name(scene.name))
     out = options.out or Path("paper-15" if paper else f"{Path(options.scene).stem}-compared")
     with (
         output_folder(out, overwrite=options.overwrite) as folder,
@@ -56,3 +73,18 @@ def run(options: argparse.Namespace) -> int:
         f"hold; open {out}/index.html",
     )
     return 0 if outcome.runs == outcome.planned else 1
+
+
+def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":
+    """By its name, the body of what is asked for instead of paper and skin."""
+    from skinwave.scene import BODIES, Body
+
+    if options.body in BODIES:
+        return {options.body: BODIES[options.body]}
+    if not Path(options.body).is_file():
+        known = ", ".join(name for name in BODIES if name != "none")
+        raise ValueError(
+            f"body '{options.body}' is no file and none of {known}; name one of these or a file"
+        )
+    file = str(Path(options.body).resolve())
+    return {"hand": Body(kind="mesh", file=file, unit=options.unit, up=options.up)}

@@ -1,0 +1,62 @@
+"""Hands: a palm from its parameters, or the body in a file, meshed for the focus above it."""
+
+import numpy as np
+
+from meshes import (
+    Grading,
+    Palm,
+    TetMesh,
+    body_from_file,
+    graded,
+    named,
+    palm_mesh,
+    quadratic,
+)
+from meshes.tetmesh import Floats
+from skinwave.scene import Body
+
+KINDS = ("palm", "mesh")
+FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 3.0  # m about the middle; cells; of h
+DOWNWARDS = -0.7  # z of the normals of what rests on bone
+
+
+def hand(body: Body, h: float) -> TetMesh:
+    """Ten-node tetrahedra of h in metre about the middle of the palm, growing away from it.
+
+    The facet sets are those of a slab: `top`, seen from above; `bottom`, which looks downwards and
+    rests on bone; `sides`, where a palm ends at the wrist and the fingers and a body from a file
+    was cut.
+
+    Raises
+    ------
+    MeshError
+        If the body cannot be meshed.
+    """
+    if body.kind == "palm":
+        sizing = graded(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h))
+        mesh = palm_mesh(palm_of(body), h, sizing=sizing)
+        cut = [mesh.facets["wrist"], mesh.facets["fingers"]]
+    else:
+        mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
+        cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
+    facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
+    within = named(mesh, bottom=lambda centroids, normals: normals[:, 2] < DOWNWARDS)
+    bottom = within.facets["bottom"]
+    return TetMesh(points=mesh.points, tets=mesh.tets, facets={**facets, "bottom": bottom})
+
+
+def palm_of(body: Body) -> Palm:
+    """The palm that a body's outline and relief describe."""
+    return Palm(breadth=body.width, length=body.height, thickness=body.depth, **vars(body.relief))
+
+
+def depths(mesh: TetMesh) -> Floats:
+    """How far (m,) in metre the middle of each tetrahedron lies below the top, along the beam."""
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    seen = mesh.points[np.unique(mesh.facets["top"])]
+    middles = mesh.points[mesh.tets[:, :4]].mean(axis=1)
+    height = LinearNDInterpolator(seen[:, :2], seen[:, 2])(middles[:, :2])
+    beside = np.isnan(height)
+    height[beside] = NearestNDInterpolator(seen[:, :2], seen[:, 2])(middles[beside, :2])
+    return height - middles[:, 2]
