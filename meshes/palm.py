@@ -22,6 +22,7 @@ from meshes.surface import Surface, repaired
 from meshes.tetmesh import Floats, MeshError, TetMesh
 
 Field = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
+EPSILON = 0.2  # of h: how far the straight mesh may lie from the surface
 PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: where the fingers begin
 
 
@@ -137,7 +138,7 @@ def palm_mesh(
     # Facets of the contour must be finer than elements, or the mesher keeps its corners.
     body = surface(palm, min(h / 1.5, palm.thickness / 8))
     # Coarser than the surface of a file may be, because boundary nodes are moved onto it.
-    epsilon = min(h, palm.thickness / 4) / 10
+    epsilon = EPSILON * min(h, palm.thickness / 4)
     mesh = tetrahedralise(body, h, sizing=sizing, timeout=timeout, epsilon=epsilon)
     return shaped(palm, mesh)
 

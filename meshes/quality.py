@@ -9,10 +9,15 @@ from meshes.tetmesh import EDGES, Floats, Ints, TetMesh, corner_volumes
 
 def dihedral_angles(mesh: TetMesh) -> Floats:
     """Angles (m, 6) in degrees between the faces of each straight tetrahedron."""
-    corners = mesh.points[mesh.tets[:, :4]]
+    return angles_between_faces(mesh.points, mesh.tets)
+
+
+def angles_between_faces(points: Floats, tets: Ints) -> Floats:
+    """Dihedral angles (m, 6) in degrees of tetrahedra (m, 4 or 10) with positive volume."""
+    corners = points[tets[:, :4]]
     faces = corners[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]]
     normals = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
-    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
     a, b = np.array(list(combinations(range(4), 2))).T
     cosine = np.einsum("eki,eki->ek", normals[:, a], normals[:, b])
     return np.degrees(np.pi - np.arccos(np.clip(cosine, -1, 1)))

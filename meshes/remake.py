@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.palm import Palm, surface
+from meshes.palm import EPSILON, Palm, surface
 from meshes.ready import CHECKSUMS
 from meshes.structured import block
 from meshes.surface import repaired
@@ -30,7 +30,7 @@ def make(folder: Path) -> None:
     sums = []
     for name, (palm, h) in PALMS.items():
         body = surface(palm, h / 2)
-        mesh = tetrahedralise(body, h, epsilon=h / 10)
+        mesh = tetrahedralise(body, h, epsilon=EPSILON * h)
         sums.append(_store(folder / f"{name}.npz", mesh, asdict(palm)))
     box = block(SLAB, max(SLAB), order=1)
     body, _ = repaired(box.points, boundary_facets(box.tets))

@@ -17,6 +17,7 @@ import numpy as np
 from meshes import cache, child
 from meshes.facets import named
 from meshes.quality import dihedral_angles
+from meshes.smoothing import smoothed
 from meshes.structured import Grading, extrude
 from meshes.surface import Surface, area, check, n_pieces, repaired, thinnest, volume
 from meshes.tetmesh import Floats, MeshError, TetMesh, boundary_facets, corner_volumes
@@ -75,11 +76,11 @@ def tetrahedralise(
         "epsilon": np.array(epsilon / surface.diagonal),
         **grid,
     }
-    name = cache.key("tetrahedralise 1", *(inputs[part] for part in sorted(inputs)))
+    name = cache.key("tetrahedralise 2", *(inputs[part] for part in sorted(inputs)))
     entry = cache.load(name) or {}
     if {"points", "tets"} <= entry.keys():
         return _accepted(surface, epsilon, entry["points"], entry["tets"])
-    mesh = _accepted(surface, epsilon, *_run(inputs, timeout))
+    mesh = smoothed(_accepted(surface, epsilon, *_run(inputs, timeout)), sizing)
     cache.store(name, {}, points=mesh.points, tets=mesh.tets)
     return mesh
 

@@ -11,6 +11,7 @@ import pytest
 
 from skinwave import loads, simulate
 from skinwave.cli import main
+from skinwave.plan import plan
 
 LONGEST = 10.0  # s
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
@@ -178,3 +179,8 @@ def test_a_probe_on_a_clamped_edge_stays_and_spoils_no_other():
 def test_a_silent_tacton_moves_nothing(model):
     silent = loads(corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0"))
     assert not simulate(silent, model, 0.3, h=0.006).displacement.any()
+
+
+def test_a_silent_tacton_is_planned():
+    sheet = corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0")
+    assert plan(loads(sheet), 0.3, model="fem", h=0.006).error == 0
