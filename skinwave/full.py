@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.steady import along_path, load_lines, path_knots, summed
+from simple_model.steady import along_path, load_lines, path_knots
 from skinwave.bodies import Build
 from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
@@ -19,6 +19,7 @@ from skinwave.scene import Body, Scene
 MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
 CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
+MOST_LINES = 500  # of fem-harmonic
 MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 
@@ -127,6 +128,8 @@ def harmonic_answer(
     threshold: float = 1e-3,
 ) -> Response:
     """The steady state: one factorisation for each line of the load above the threshold."""
+    if scene.tacton.trajectory.shape == "recorded":
+        raise ValueError("a recorded path has no steady state; take --model fem")
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
     operators = assembled(build, clock, report)
@@ -135,8 +138,12 @@ def harmonic_answer(
     with clock("lines"):
         lines = load_lines(scene.pressure, threshold)
         spots = along_path(scene.pressure.spot(points, path_knots(scene.pressure)).T)
-        patterns = lines.coefficients[:, None] * spots.T[lines.harmonics]
-        frequencies, pressures = summed(lines.frequencies, patterns)
+        frequencies, pressures = lines.gather(spots.T)
+        if len(frequencies) > MOST_LINES:
+            raise ValueError(
+                f"this load has {len(frequencies):,} lines, each a factorisation, the limit is "
+                f"{MOST_LINES}; take --model fem"
+            )
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         energy = 0.0
         for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):

@@ -237,10 +237,7 @@ def _under_resolved(h: float, width: float) -> tuple[str, ...]:
 def _symmetry(scene: Scene) -> str:
     """Axes across whose middle plane the load is its own mirror image at all times."""
     path = scene.tacton.trajectory
-    if path.is_static:
-        path_points = path.at_phase(np.zeros(1))
-    else:
-        path_points = path.at_phase(np.linspace(0, 1, 25))
+    path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
     return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
 
 
