@@ -51,7 +51,6 @@ LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
 CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
-FINER = 8  # samples in each average of a rhythm or signal
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
 
 
@@ -206,7 +205,8 @@ def flat_body(
     damping = -np.log(WRAPPED) / (padded * dt)
     t = np.asarray(np.arange(padded) * dt, np.float64)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
-    gain = _gain(pressure, t, dt) * (np.arange(padded) < n) * np.exp(-damping * t)
+    gain = pressure.gain(t, over=dt) * (np.arange(padded) < n) * np.exp(-damping * t)
+    gain[0] /= 2  # the trapezoidal rule's end point: the load begins in the middle of a sample
     answered = _recorded if pressure.tacton.trajectory.shape == "recorded" else _circling
     u = answered(compliance, pressure, probes, w, gain, t)
     displacement = np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None])
@@ -218,16 +218,6 @@ def flat_body(
         displacement=displacement,
         effort=effort,
     )
-
-
-def _gain(pressure: MovingPressure, t: Floats, dt: float) -> Floats:
-    """Pressure (t,) in Pa at the focus, which begins with t = 0, in the middle of a sample."""
-    if not pressure.tacton.is_sampled:
-        gain = pressure.gain(t)
-        gain[0] /= 2  # the trapezoidal rule's end point
-        return gain
-    fine = t[:, None] + (np.arange(FINER) + 0.5) * (dt / FINER) - dt / 2  # edges of pulses
-    return np.asarray((pressure.gain(np.maximum(fine, 0)) * (fine >= 0)).mean(axis=1))
 
 
 def _circling(

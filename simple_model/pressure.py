@@ -18,6 +18,7 @@ from simple_model.focus import FOCI, NOMINAL_HEIGHT, moved_spot, relative_intens
 from simple_model.tacton import Tacton, level, modulation
 from simple_model.trajectory import Floats
 
+FINER = 8  # samples of a rhythm or signal in each average
 IN_CACHE = 2**15  # samples worked on at a time
 
 
@@ -59,10 +60,13 @@ class MovingPressure:
             )
         relative_intensity(self.height)
 
-    def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
-        """Pressure (..., n) in Pa at points (n, 2) in metre and times (...) in s."""
+    def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
+        """Pressure (..., n) in Pa at points (n, 2) in metre and times (...) in s.
+
+        `over` s: see `gain`.
+        """
         t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)[:, :2]
-        path, gain = self.tacton.trajectory, self.gain(t).ravel()
+        path, gain = self.tacton.trajectory, self.gain(t, over).ravel()
         phases = [np.mod(path.phase(t).ravel() + ahead, 1.0) for ahead in self.tacton.foci]
         gains = [gain * self.weight(phase) if path.levels else gain for phase in phases]
         foci = [path.at_phase(phase) for phase in phases]
@@ -82,8 +86,18 @@ class MovingPressure:
         levels = self.tacton.trajectory.level_at_phase(phase)
         return DRIVES[self.drive](levels, one, self.depth_of_modulation) / full
 
-    def gain(self, t: ArrayLike) -> Floats:
-        """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level."""
+    def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
+        """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level.
+
+        A rhythm or a signal is averaged over the time `over` in s about each, as far as it is not
+        before the start: for steps in time, between which the edges of pulses fall.
+        """
+        if over and self.tacton.is_sampled:
+            parts = ((np.arange(FINER) + 0.5) / FINER - 0.5) * over
+            fine = np.asarray(t, np.float64)[..., None] + parts
+            begun = fine >= 0
+            gain = self.gain(np.maximum(fine, 0.0)) * begun
+            return np.asarray(gain.sum(axis=-1) / begun.sum(axis=-1))
         return self.driven(modulation(self.tacton, t), level(self.tacton, t))
 
     def driven(self, modulation: Floats, level: Floats | float = 1.0) -> Floats:

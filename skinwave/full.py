@@ -79,7 +79,7 @@ def transient_answer(
 
     @lru_cache(maxsize=4)
     def force(t: float) -> Floats:
-        return P @ scene.pressure(points, t)
+        return P @ scene.pressure(points, t, over=dt)
 
     with clock("march"):
         states = fem.transient(operators, force, dt, solver=solver)

@@ -157,7 +157,7 @@ def _junk() -> dict[str, bytes]:
     found["a zero byte"] = GOOD.encode().replace(b"small", b"sm\0all")
     found["carriage returns only"] = GOOD.encode().replace(b"\n", b"\r")
     found["a PNG"] = b"\x89PNG\r\n\x1a\n" + rng.randbytes(50)
-    found["two megabytes"] = b"# " + b"x" * 2_000_000
+    found["larger than any scene"] = b"# " + b"x" * 32_000_000
     return found
 
 
