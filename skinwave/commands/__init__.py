@@ -3,12 +3,13 @@
 The one line of a module is its help. Whatever is slow to import is imported in `run`.
 """
 
-from skinwave.commands import compare, plan, run, tradeoff, verify
+from skinwave.commands import compare, convert, plan, run, tradeoff, verify
 
 COMMANDS = {
     "run": run,
     "compare": compare,
     "tradeoff": tradeoff,
     "plan": plan,
+    "convert": convert,
     "verify": verify,
 }
