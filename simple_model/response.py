@@ -110,9 +110,12 @@ def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
 
     f_AM, n f_AM, f_d, n f_d, n f_d-f_AM and n f_d+f_AM (as a positive frequency); also with the
     second AM frequency f_AM2, the envelope f_e and the rhythm's f_r, one over its period, where
-    they are used. Harmonics of f_d that several foci cancel are left out.
+    they are used. Harmonics of f_d that several foci cancel are left out, and those of a recording
+    that is run through once.
     """
     f_d = tacton.trajectory.drawing_frequency
+    if tacton.trajectory.shape == "recorded" and f_d * tacton.duration < 1.5 * len(tacton.foci):
+        f_d = 0.0  # run through once
     w1, w2 = tacton.superposition
     tones = {
         "f_AM": tacton.am_frequency * (w1 > 0),

@@ -148,7 +148,7 @@ def _swept(pressure: MovingPressure) -> Floats:
 def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floats, Complex]:
     """Frequencies (n, k) in Hz and coefficients (n, k) in Pa of the gain as harmonics n see it.
 
-    Sampled averages of the gain; averaging takes sin(x)/x off a line, which is put back.
+    Sampled averages of the gain; averaging takes sin(x)/x off its lines, which is put back.
     """
     tacton = pressure.tacton
     count = max(2, int(np.ceil(tacton.duration * SAMPLED)))
@@ -156,9 +156,13 @@ def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Float
     t = (np.arange(count) + 0.5) * dt
     gain = pressure.gain(t, over=dt)
     k = np.arange(min(count // 2, int(HIGHEST * tacton.duration) + 1))
-    middle = np.exp(-1j * np.pi * k / count) / np.sinc(k / count) / count
-    turn = 2j * np.pi * tacton.trajectory.drawing_frequency * t
-    c = np.array([np.fft.fft(gain * np.exp(turn * order))[k] * middle for order in n])
+    middle = np.exp(-1j * np.pi * k / count) / count
+    f_d = tacton.trajectory.drawing_frequency
+    c = np.empty((len(n), len(k)), np.complex128)
+    for row, order in zip(c, n, strict=True):
+        transform = np.fft.fft(gain * np.exp(2j * np.pi * f_d * order * t))[k]
+        averaged = np.sinc(np.clip(k / count - order * f_d * dt, -0.5, 0.5))
+        row[:] = transform * middle / averaged
     return np.tile(k / tacton.duration, (len(n), 1)), c
 
 

@@ -43,7 +43,8 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     brush, place = _brush(tacton)
     if brush is None:
         brush = _circle(0.0, tacton, 0.0)
-        times, places, levels = _corners(path, end, tacton.foci[0])
+        times, phases = _corners(path, end, tacton.foci[0])
+        places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
         notes.append(f"{len(times)} keyframes, the path once along")
     else:
         times, places, levels = np.array([0.0, end]), np.array([place, place]), np.ones(2)
@@ -95,12 +96,10 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
     return _named("line", numbers, tacton, path.drawing_frequency), (float(x), float(y))
 
 
-def _corners(path: Trajectory, end: float, ahead: float) -> tuple[Floats, Floats, Floats]:
-    """Times (k,) in s, places (k, 2) in metre and levels (k,) between which the path is straight,
-    from start to end.
-    """
+def _corners(path: Trajectory, end: float, ahead: float) -> tuple[Floats, Floats]:
+    """Times (k,) in s and phases (k,) between which the path is straight, from start to end."""
     if path.shape == "circle" or path.sweep == "sinusoidal":
-        raise ValueError("a circle that starts elsewhere than at angle 0 has no brush; write .csv")
+        raise ValueError("no brush draws this path, and it is not straight either; write .csv")
     f_d = path.drawing_frequency
     if path.shape == "recorded":
         clock = np.array(path.times) * f_d
@@ -111,26 +110,24 @@ def _corners(path: Trajectory, end: float, ahead: float) -> tuple[Floats, Floats
     else:
         clock = np.arange(CORNERS.get(path.shape, 2) + 1) / CORNERS.get(path.shape, 2)
         clock = clock if path.sweep == "there_and_back" or path.shape in CORNERS else clock[::2]
-    periods = int(np.ceil(end * f_d + ahead)) + 1
+    periods = int(np.ceil(end * f_d + ahead - TINY))
     if periods * len(clock) > MOST_KEYFRAMES:
         raise ValueError(
             f"the path has {periods * len(clock):,} corners in {end:g} s, the limit is "
             f"{MOST_KEYFRAMES:,} keyframes; shorten it, or write .csv"
         )
     # Each corner twice, just before and just after it, so that jumps stay jumps.
-    around = (np.arange(periods)[:, None] + clock).ravel() - ahead
+    around = np.unique(np.round(np.arange(periods)[:, None] + clock, 12)) - ahead
     sides = np.stack([around - TINY, around + TINY], axis=1).ravel()
     inside = sides[(sides > TINY) & (sides < end * f_d - TINY)]
     at = np.concatenate([[0.0], inside, [end * f_d - TINY]])
     phase = np.mod(at + ahead, 1.0)
-    places, levels = path.at_phase(phase), path.level_at_phase(phase)
-    kept = _needed(places, levels)
-    return at[kept] / f_d, places[kept], levels[kept]
+    kept = _needed(np.column_stack([path.at_phase(phase), path.level_at_phase(phase)]))
+    return at[kept] / f_d, phase[kept]
 
 
-def _needed(places: Floats, levels: Floats) -> np.ndarray:
-    """Which of two neighbours to keep: one, where they agree."""
-    values = np.column_stack([places, levels])
+def _needed(values: Floats) -> np.ndarray:
+    """Which of the two sides of a corner to keep: one, where they agree."""
     same = np.abs(np.diff(values, axis=0)).max(axis=1) < 1e-8
     return np.concatenate([[True], ~same])
 

@@ -2,12 +2,13 @@
 
 import io
 import warnings
+from dataclasses import replace
 
 import numpy as np
 from scipy.io import wavfile
 
 from meshes.tetmesh import Floats
-from simple_model import Signal, Tacton
+from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.rhythm import ROLES
 from simple_model.tacton import LONGEST, level, modulation
@@ -16,11 +17,13 @@ from skinwave.scene import Scene
 
 SCALES = ("full", "peak", "rms")
 WRITTEN_RATE = 48_000.0  # Hz
+CUT = 0.02  # beyond full drive that is cut off: what rounding adds to a sine of 8 bits
 STEP = 2.0**-15  # of full scale, the least that 16 bits tell: rounding below 0 is no pull
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
-    """The base scene's Tacton, for as long as the WAV lasts, with it as its signal.
+    """The base scene's Tacton for as long as the WAV lasts, with it as its envelope, or as its
+    modulation in place of the sinusoids.
 
     Raises
     ------
@@ -44,10 +47,9 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     kept = base.tacton
     if kept.trajectory.shape == "recorded":
         raise ValueError("a recorded path has levels of its own; give a scene with another path")
-    tacton = Tacton(
-        amplitude=kept.amplitude, trajectory=kept.trajectory, foci=kept.foci,
-        sharing=kept.sharing, duration=duration, signal=signal,
-    )  # fmt: skip
+    tacton = replace(kept, duration=duration, signal=signal)
+    if options.role == "modulation":  # in place of the sinusoids
+        tacton = replace(tacton, am_frequency=0.0, second_am_frequency=0.0, envelope_frequency=0.0)
     notes = (f"{len(samples):,} samples at {rate:g} Hz as {options.role}, {said}",)
     return Pattern(tacton=tacton, notes=notes)
 
@@ -99,7 +101,7 @@ def _scaled(samples: Floats, scale: str) -> tuple[Floats, str]:
     if peak == 0:
         raise ValueError("the WAV is silent; there is nothing to command")
     factor = {"full": 1.0, "peak": 1 / peak, "rms": np.sqrt(0.5) / rms}[scale]
-    if factor * peak > 1 + 1e-9:
+    if factor * peak > 1 + CUT:
         raise ValueError(
             f"samples of the WAV reach {factor * peak:.3g} on the scale '{scale}', beyond full "
             "drive; take the scale 'peak'"
