@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.steady import along_path, load_lines, path_knots
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.bodies import Build
 from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
@@ -19,7 +19,7 @@ from skinwave.scene import Body, Scene
 MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
 CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
-MOST_LINES = 500  # of fem-harmonic
+MOST_LINES, MOST_KNOTS = 1000, 10_000  # of fem-harmonic, each a factorisation or a pattern
 MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 
@@ -128,22 +128,22 @@ def harmonic_answer(
     threshold: float = 1e-3,
 ) -> Response:
     """The steady state: one factorisation for each line of the load above the threshold."""
-    if scene.tacton.trajectory.shape == "recorded":
-        raise ValueError("a recorded path has no steady state; take --model fem")
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
     operators = assembled(build, clock, report)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     S = fem.probe_operator(build.mesh, scene.probe_points)
     with clock("lines"):
-        lines = load_lines(scene.pressure, threshold)
-        spots = along_path(scene.pressure.spot(points, path_knots(scene.pressure)).T)
-        frequencies, pressures = lines.gather(spots.T)
-        if len(frequencies) > MOST_LINES:
+        lines, knots = load_lines(scene.pressure, threshold), path_knots(scene.pressure)
+        count = len(np.unique(np.round(lines.frequencies, 9)))
+        if count > MOST_LINES or len(knots) > MOST_KNOTS:
             raise ValueError(
-                f"this load has {len(frequencies):,} lines, each a factorisation, the limit is "
-                f"{MOST_LINES}; take --model fem"
+                f"this load has {count:,} lines from {len(knots):,} positions, the limits are "
+                f"{MOST_LINES:,} and {MOST_KNOTS:,}; take --model fem"
             )
+        weights = path_weights(scene.pressure)[:, None]
+        spots = along_path((scene.pressure.spot(points, knots) * weights).T)
+        frequencies, pressures = lines.gather(spots.T)
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         energy = 0.0
         for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):

@@ -102,15 +102,20 @@ tactons = st.builds(
     trajectory=sized,
     foci=st.just((0.0,)) | several,
     sharing=st.sampled_from(SHARINGS),
-    rhythm=st.none() | rhythms,
-    signal=st.none() | signals,
-) | st.builds(
-    Tacton,
-    am_frequency=frequencies,
-    duration=numbers(0.001, 0.03),
-    trajectory=recordings() | polylines(),
-    foci=st.just((0.0,)) | several,
 )
+every_tacton = (
+    tactons
+    | st.builds(
+        replace, tactons, rhythm=st.none() | rhythms, signal=st.none() | signals
+    )
+    | st.builds(
+        Tacton,
+        am_frequency=frequencies,
+        duration=numbers(0.001, 0.03),
+        trajectory=recordings() | polylines(),
+        foci=st.just((0.0,)) | several,
+    )
+)  # fmt: skip
 pressures = st.builds(
     MovingPressure,
     tacton=tactons,
@@ -240,6 +245,17 @@ def test_what_the_load_does_later_changes_nothing_before(model, tacton):
     assert np.abs(long[: len(short)] - short).max() <= bound * np.abs(long).max()
 
 
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem"])
+@settings(max_examples=10)
+@given(every_tacton, numbers(0.01, 100))
+def test_pulses_and_recordings_are_linear_in_the_pressure_too(model, tacton, factor):
+    once, many = (
+        simulate(small_scene(tacton, peak_pressure=p), model, 0.3, h=0.006).displacement
+        for p in (10.0, 10.0 * factor)
+    )
+    np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
+
+
 circles = st.builds(
     Tacton,
     am_frequency=frequencies,
@@ -341,8 +357,10 @@ def test_the_order_of_nodes_and_elements_does_not_matter(mesh, material, rng):
 
 
 @settings(max_examples=100)
-@given(scenes())
-def test_a_scene_comes_back_from_its_file(scene):
+@given(scenes(), st.none() | every_tacton)
+def test_a_scene_comes_back_from_its_file(scene, tacton):
+    if tacton:
+        scene = replace(scene, body=Body(), pressure=replace(scene.pressure, tacton=tacton))
     once = loads(dumps(scene))
     assert dumps(once) == dumps(scene)
     assert loads(dumps(once)) == once
