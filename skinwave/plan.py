@@ -206,7 +206,8 @@ def _march_errors(scene: Scene, model: str | None, dt: float | None) -> tuple[fl
 
 
 def _enough(found: Refined, tolerance: float) -> float:
-    return found.h * (AIM * tolerance / found.error) ** (1 / ORDER)
+    error = max(found.error, 1e-300)  # a silent load has none
+    return found.h * (AIM * tolerance / error) ** (1 / ORDER)
 
 
 def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
