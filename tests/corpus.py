@@ -250,7 +250,8 @@ def wrong_usage() -> list[list[str]]:
     found += [[*run, "--model", m] for m in ("magic", "", "FEM", "fem-nonlinear")]
     found += [[*run, "--h", h] for h in ("", "abc", "1,5", "1 mm", "0x10", "--quiet")]
     found += [[*run, "--dt", "soon"], [*run, "--tolerance", "5 %"], [*run, "--out"]]
-    found += [["plan", "good.toml", *o] for o in (["--out", "x"], ["--solver", "auto"], ["--h"])]
+    found += [["plan", "good.toml", *o] for o in (["--out", "x"], ["--h"])]
+    found += [["convert"], ["convert", "good.toml"], ["convert", "a", "b", "--rate", "fast"]]
     found += [["compare", "a", "b"], ["compare", "--tolerance", "0.1"], ["compare", "--dt", "1"]]
     return found
 
