@@ -19,6 +19,7 @@ from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
 CHUNK = 256  # times that share their exponentials
+MOST_RATES = 8192  # summed at a time, to bound memory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,6 +78,15 @@ def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Float
     Exponentials are taken within one chunk of times and at the start of each, and multiplied.
     """
     j, p = amplitudes.shape
+    if j > MOST_RATES:
+        parts = range(0, j, MOST_RATES)
+        return np.sum(
+            [
+                exponential_sum(rates[k : k + MOST_RATES], amplitudes[k : k + MOST_RATES], times)
+                for k in parts
+            ],
+            axis=0,
+        )
     within = np.exp(rates * times[:CHUNK, None])
     starts = np.exp(rates * times[::CHUNK, None])
     driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, -1)

@@ -106,7 +106,8 @@ def _acceleration(operators: Operators, unbalanced: Floats) -> Floats:
         return np.zeros_like(unbalanced)
     scale = 1 / np.sqrt(operators.M.diagonal())
     scaled = operators.M.multiply(scale).T.multiply(scale).tocsr()
-    a, failed = cg(scaled, scale * unbalanced, rtol=1e-13, atol=0.0, maxiter=500)
+    size = 2.0 ** np.frexp(np.abs(unbalanced).max())[1]  # squares of tiny loads would be 0
+    a, failed = cg(scaled, scale * (unbalanced / size), rtol=1e-13, atol=0.0, maxiter=500)
     if failed:
         raise Diverged("the mass matrix could not be inverted; are all densities above 0?")
-    return scale * a
+    return scale * a * size

@@ -5,6 +5,7 @@ from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.point_kernel import point_kernel
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, lines, spectrum, tacton_lines
+from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
 from simple_model.trajectory import SHAPES, Trajectory
 
@@ -14,6 +15,8 @@ __all__ = [
     "Effort",
     "MovingPressure",
     "Response",
+    "Rhythm",
+    "Signal",
     "Tacton",
     "Trajectory",
     "array_field",

@@ -9,7 +9,12 @@ and a focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe
 
     u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(|x_p - X(a)|, w) exp(-2 pi i n a) da
 
-where Q is the transform of the pressure at the focus. The path of integration over k runs above
+where Q is the transform of the pressure at the focus. A recorded path may be long and run through
+once; with splines B_j(r) that carry g(r, w) = sum_j g_j(w) B_j(r), it moves the probe by
+
+    u(w) = sum_j g_j(w) int q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
+
+The path of integration over k runs above
 the real axis, away from the poles of the waves, which lie below it for any loss.
 """
 
@@ -24,7 +29,14 @@ from scipy.special import jv
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, step
-from simple_model.steady import along_path, harmonics, load_lines, path_knots, summed
+from simple_model.steady import (
+    along_path,
+    foci_harmonics,
+    harmonics,
+    load_lines,
+    path_knots,
+    summed,
+)
 from simple_model.trajectory import Floats
 
 Complex = NDArray[np.complex128]
@@ -158,9 +170,11 @@ def steady_lines(
     Raises
     ------
     ValueError
-        If the focus is not Gaussian.
+        If the focus is not Gaussian, or its path recorded.
     """
     _check(pressure)
+    if pressure.tacton.trajectory.shape == "recorded":
+        raise ValueError("a recorded path has no steady state; ask for its motion from rest")
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     lines = load_lines(pressure, threshold)
     f, which = np.unique(lines.frequencies, return_inverse=True)
@@ -189,18 +203,12 @@ def flat_body(
     dt, n = step(times), len(times)
     padded = int(PADDING * n)
     damping = -np.log(WRAPPED) / (padded * dt)
-    t = np.arange(padded) * dt
-    gain = np.where(np.arange(padded) < n, pressure.gain(t), 0.0) * np.exp(-damping * t)
+    t = np.asarray(np.arange(padded) * dt, np.float64)
+    w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
+    gain = pressure.gain(t, over=dt) * (np.arange(padded) < n) * np.exp(-damping * t)
     gain[0] /= 2  # the trapezoidal rule's end point: the load begins in the middle of a sample
-    w = 2 * np.pi * np.fft.rfftfreq(padded, dt)
-    f_d = pressure.tacton.trajectory.drawing_frequency
-    u = np.zeros((len(w), len(probes)), np.complex128)
-    h = along_path(_on_path(compliance, pressure, probes, w - 1j * damping, NEGLIGIBLE))
-    largest = np.abs(h).max()
-    for m in harmonics(h.shape[2]):
-        if np.abs(h[:, :, m]).max() > 1e-7 * largest:
-            driven = np.fft.fft(gain * np.exp(2j * np.pi * m * f_d * t))[: len(w)]
-            u += h[:, :, m] * driven[:, None]
+    answered = _recorded if pressure.tacton.trajectory.shape == "recorded" else _circling
+    u = answered(compliance, pressure, probes, w, gain, t)
     displacement = np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None])
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=n, dofs=len(w))
     return Response(
@@ -210,6 +218,62 @@ def flat_body(
         displacement=displacement,
         effort=effort,
     )
+
+
+def _circling(
+    compliance: Compliance,
+    pressure: MovingPressure,
+    probes: Floats,
+    w: Complex,
+    gain: Floats,
+    t: Floats,
+) -> Complex:
+    """Transform (f, p) of the probes' motion under foci that run a closed path."""
+    f_d = pressure.tacton.trajectory.drawing_frequency
+    u = np.zeros((len(w), len(probes)), np.complex128)
+    h = along_path(_on_path(compliance, pressure, probes, w, NEGLIGIBLE))
+    orders = harmonics(h.shape[2])
+    h[:, :, orders] *= foci_harmonics(pressure, orders)
+    largest = np.abs(h).max()
+    for m in orders:
+        if np.abs(h[:, :, m]).max() > 1e-7 * largest:
+            driven = np.fft.fft(gain * np.exp(2j * np.pi * m * f_d * t))[: len(w)]
+            u += h[:, :, m] * driven[:, None]
+    return u
+
+
+def _recorded(
+    compliance: Compliance,
+    pressure: MovingPressure,
+    probes: Floats,
+    w: Complex,
+    gain: Floats,
+    t: Floats,
+) -> Complex:
+    """Transform (f, p) of the probes' motion under foci that run any path."""
+    path = pressure.tacton.trajectory
+    phases = [np.mod(path.phase(t) + ahead, 1.0) for ahead in pressure.tacton.foci]
+    away = np.stack([np.linalg.norm(probes[:, None] - path.at_phase(a), axis=2) for a in phases])
+    table = _table(away.max(), spot_width(pressure.height))
+    g = point_response(compliance, table, w, spot_width(pressure.height), negligible=NEGLIGIBLE)
+    carriers = _spline(table, np.eye(len(table)))
+    gains = [gain * pressure.weight(phase) for phase in phases]
+    u = np.empty((len(w), len(probes)), np.complex128)
+    for p in range(len(probes)):
+        load = sum(q[:, None] * carriers(r[p]) for q, r in zip(gains, away, strict=True))
+        u[:, p] = (g * np.fft.rfft(load, axis=0)).sum(axis=1)
+    return u
+
+
+def _table(furthest: float, width: float) -> Floats:
+    """Distances (j,) in metre that carry every other: g is as smooth as the spot."""
+    return np.linspace(0, furthest, max(8, int(np.ceil(furthest / width * 6))))
+
+
+def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
+    """A spline that is flat at distance 0."""
+    flat = (1, np.zeros(np.delete(values.shape, axis), values.dtype))
+    return CubicSpline(table, values, axis=axis, bc_type=(flat, "not-a-knot"))
 
 
 def _check(pressure: MovingPressure) -> None:
@@ -278,9 +342,6 @@ def _on_path(
         return point_response(compliance, unique, w, width, negligible=negligible)[
             :, which.reshape(distance.shape)
         ]
-    # g is as smooth as the spot: a table six to its standard deviation serves every distance.
-    table = np.linspace(0, distance.max(), max(8, int(np.ceil(distance.max() / width * 6))))
+    table = _table(distance.max(), width)
     g = point_response(compliance, table, w, width, negligible=negligible)
-    flat = (1, np.zeros(len(g), np.complex128))
-    spline = CubicSpline(table, g, axis=1, bc_type=(flat, "not-a-knot"))
-    return np.asarray(spline(distance))
+    return np.asarray(_spline(table, g, axis=1)(distance))

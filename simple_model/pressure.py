@@ -1,6 +1,9 @@
 """The one load that every model receives:
 
-q(x, t) = p0 I(h) drive(A, M(t)) S(x - x(t))
+q(x, t) = p0 I(h)/n sum_j drive(A, M(t)) S(x - x_j(t))
+
+of n foci, which run the same path at phases of their own. A recorded path brings a level L along
+it, which multiplies the amplitude.
 """
 
 from dataclasses import dataclass
@@ -12,9 +15,10 @@ from numpy.typing import ArrayLike
 from simple_model.choices import choose
 from simple_model.drive import DRIVES
 from simple_model.focus import FOCI, NOMINAL_HEIGHT, along_axis, moved_spot, relative_intensity
-from simple_model.tacton import Tacton, modulation
+from simple_model.tacton import Tacton, level, modulation
 from simple_model.trajectory import Floats
 
+FINER = 8  # samples of a rhythm or signal in each average
 IN_CACHE = 2**15  # samples worked on at a time
 
 
@@ -59,26 +63,52 @@ class MovingPressure:
             )
         relative_intensity(self.height)
 
-    def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
-        """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s."""
+    def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
+        """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s.
+
+        `over` s: see `gain`.
+        """
         t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)
-        gain, centres = self.gain(t).ravel(), self.tacton.trajectory.position(t).reshape(-1, 2)
-        pressure = np.empty((t.size, len(points)))
+        path, gain = self.tacton.trajectory, self.gain(t, over).ravel()
+        phases = [np.mod(path.phase(t).ravel() + ahead, 1.0) for ahead in self.tacton.foci]
+        gains = [gain * self.weight(phase) if path.levels else gain for phase in phases]
+        foci = [path.at_phase(phase) for phase in phases]
+        pressure = np.zeros((t.size, len(points)))
         block = max(1, IN_CACHE // max(1, len(points)))
         for start in range(0, t.size, block):
             part = slice(start, start + block)
-            spot = self.spot(points, centres[part])
-            np.multiply(gain[part, None], spot, out=pressure[part])
+            for each, centres in zip(gains, foci, strict=True):
+                spot = self.spot(points, centres[part])
+                pressure[part] += np.multiply(each[part, None], spot, out=spot)
         return pressure.reshape(*t.shape, len(points))
 
-    def gain(self, t: ArrayLike) -> Floats:
-        """Pressure (...) in Pa at the focus at times (...) in s."""
-        return self.driven(modulation(self.tacton, t))
+    def weight(self, phase: ArrayLike) -> Floats:
+        """What the path's level makes of the pressure (...) at fractions (...) of the period."""
+        one = np.ones(1)
+        full = DRIVES[self.drive](1.0, one, self.depth_of_modulation)
+        levels = self.tacton.trajectory.level_at_phase(phase)
+        return DRIVES[self.drive](levels, one, self.depth_of_modulation) / full
 
-    def driven(self, modulation: Floats) -> Floats:
-        """Pressure (...) in Pa at the focus where the modulation (...) has these values."""
-        driven = DRIVES[self.drive](self.tacton.amplitude, modulation, self.depth_of_modulation)
-        return self.peak_pressure * relative_intensity(self.height) * driven
+    def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
+        """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level.
+
+        A rhythm or a signal is averaged over the time `over` in s about each, as far as it is not
+        before the start: for steps in time, between which the edges of pulses fall.
+        """
+        if over and self.tacton.is_sampled:
+            parts = ((np.arange(FINER) + 0.5) / FINER - 0.5) * over
+            fine = np.asarray(t, np.float64)[..., None] + parts
+            begun = fine >= 0
+            gain = self.gain(np.maximum(fine, 0.0)) * begun
+            return np.asarray(gain.sum(axis=-1) / begun.sum(axis=-1))
+        return self.driven(modulation(self.tacton, t), level(self.tacton, t))
+
+    def driven(self, modulation: Floats, level: Floats | float = 1.0) -> Floats:
+        """Pressure (...) in Pa at each focus where modulation and level (...) have these values."""
+        amplitude = self.tacton.amplitude * level
+        driven = DRIVES[self.drive](amplitude, modulation, self.depth_of_modulation)
+        full = self.peak_pressure * relative_intensity(self.height)
+        return full / len(self.tacton.foci) * driven
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
         """Relative pressure (..., n) at points (n, 2 or 3) with the focus at centres (..., 2)."""

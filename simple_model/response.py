@@ -112,17 +112,22 @@ def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
     """Names and frequencies in Hz of the lines that a Tacton can make.
 
     f_AM, n f_AM, f_d, n f_d, n f_d-f_AM and n f_d+f_AM (as a positive frequency); also with the
-    second AM frequency f_AM2 and the envelope f_e where they are used.
+    second AM frequency f_AM2, the envelope f_e and the rhythm's f_r, one over its period, where
+    they are used. Harmonics of f_d that several foci cancel are left out, and those of a recording
+    that is run through once.
     """
     f_d = tacton.trajectory.drawing_frequency
+    if tacton.trajectory.shape == "recorded" and f_d * tacton.duration < 1.5 * len(tacton.foci):
+        f_d = 0.0  # run through once
     w1, w2 = tacton.superposition
     tones = {
         "f_AM": tacton.am_frequency * (w1 > 0),
         "f_AM2": tacton.second_am_frequency * (w2 > 0),
         "f_e": tacton.envelope_frequency,
+        "f_r": 1 / tacton.rhythm.period if tacton.rhythm else 0.0,
     }
     tones = {name: f for name, f in tones.items() if f > 0}
-    drawn = {f"{_times(n)}f_d": n * f_d for n in range(1, harmonics + 1) if f_d > 0}
+    drawn = {f"{_times(n)}f_d": n * f_d for n in _drawn(tacton.foci, harmonics) if f_d > 0}
     found = {
         f"{_times(n)}{name}": n * f for name, f in tones.items() for n in range(1, harmonics + 1)
     }
@@ -137,6 +142,13 @@ def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
 def step(times: Floats) -> float:
     """Sampling interval in s of equally spaced times (t,)."""
     return float((times[-1] - times[0]) / (len(times) - 1))
+
+
+def _drawn(foci: tuple[float, ...], harmonics: int) -> list[int]:
+    """Orders of the first harmonics of the path that the foci do not cancel."""
+    n = np.arange(1, harmonics * len(foci) + 1)
+    together = np.abs(np.exp(2j * np.pi * n[:, None] * foci).sum(axis=1))
+    return n[together > 1e-9 * len(foci)][:harmonics].tolist()
 
 
 def _times(n: int) -> str:

@@ -1,15 +1,21 @@
 """The lines that a periodic load contains, exactly, before any body has answered it.
 
-    q(x, t) = Q(t) S(x - X(f_d t))
+    q(x, t) = Q(t) sum_j S(x - X(f_d t + a_j))
     Q = sum_m c_m exp(2 pi i f_m t),  S = sum_n s_n(x) exp(2 pi i n f_d t)
 
-so that a line at f = f_m + n f_d has the pattern c_m s_n(x).
+so that a line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j): n foci at even
+phases leave only every n-th harmonic of the path.
+
+A rhythm or a signal makes Q more than a few sinusoids. The lines are then those of the Tacton
+played over and over, at multiples of one over its duration. From rest that is the same load: a body
+cannot feel what comes after.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
@@ -21,6 +27,8 @@ Complex = NDArray[np.complex128]
 FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
 KNOTS_PER_WIDTH = 8  # of the spot, which makes corners right to 1e-4
 PHASES = 8  # of each sinusoid: the drive laws are polynomials of second degree
+HIGHEST = 10_000.0  # Hz of what is kept of pulses and recordings: the rest moves bodies by 0.1 %
+SAMPLED = 40_000.0  # Hz at which a rhythm or signal is averaged
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,30 +36,56 @@ class LoadLines:
     """Lines at `frequencies` (f,) in Hz >= 0, several of which may coincide.
 
     Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the spot along the path
-    times exp(2 pi i f t)) is the pressure of a line.
+    times exp(2 pi i f t)) is the pressure of a line; `strengths` (f,) in Pa is its largest
+    amplitude on the path.
     """
 
     frequencies: Floats
     harmonics: NDArray[np.int_]
     coefficients: Complex
+    strengths: Floats
+
+    def gather(self, of_path: Complex) -> tuple[Floats, Complex]:
+        """Distinct frequencies (g,) in Hz and what each is made of (g, ...), from the harmonics
+        (n, ...) along the path.
+        """
+        distinct, which = np.unique(np.round(self.frequencies, 9), return_inverse=True)
+        shape = (len(distinct), len(of_path))
+        orders = self.harmonics % len(of_path)
+        table = sparse.csr_array((self.coefficients, (which, orders)), shape=shape)
+        return distinct, np.asarray(table @ of_path)
 
 
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
     """The lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
     that is silent, the mean alone.
     """
-    gain_f, gain_c = _gain_lines(pressure)
-    f_d = pressure.tacton.trajectory.drawing_frequency
-    of_spot = np.abs(along_path(_swept(pressure)))
-    n = harmonics(of_spot.shape[-1])
-    f = (n[:, None] * f_d + gain_f).ravel()
-    c = np.broadcast_to(gain_c, (len(n), len(gain_c))).ravel() * np.where(f > 1e-9, 2, 1)
-    order = np.repeat(n, len(gain_f))
-    strength = np.abs(c) * of_spot.max(axis=0)[order]
+    of_spot = np.abs(along_path(_swept(pressure))).max(axis=0)
+    n = harmonics(len(of_spot))
+    of_foci = foci_harmonics(pressure, n)
+    share = np.abs(of_foci) * of_spot[n]
+    heard = (share > threshold * share.max()) | (n == 0)
+    n, of_foci, share = n[heard], of_foci[heard], share[heard]
+    f, c = (_sampled_lines if pressure.tacton.is_sampled else _sinusoid_lines)(pressure, n)
+    order = np.repeat(n, f.shape[1])
+    c = (c * of_foci[:, None]).ravel() * np.where((f := f.ravel()) > 1e-9, 2, 1)
+    strength = np.abs(c) * of_spot[order]
     kept = (f > -1e-9) & (strength > threshold * strength.max())
+    if pressure.tacton.trajectory.shape == "recorded":
+        kept &= f <= HIGHEST
     if not kept.any():
         kept = (order == 0) & (f == 0)
-    return LoadLines(frequencies=np.abs(f[kept]), harmonics=order[kept], coefficients=c[kept])
+    return LoadLines(
+        frequencies=np.abs(f[kept]),
+        harmonics=order[kept],
+        coefficients=c[kept],
+        strengths=strength[kept],
+    )
+
+
+def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
+    """What all foci together make of harmonic n (k,) of one: (k,), 1 for a single focus."""
+    return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
 
 
 def path_knots(pressure: MovingPressure) -> Floats:
@@ -60,11 +94,12 @@ def path_knots(pressure: MovingPressure) -> Floats:
     They are the middles of k equal parts, between which corners and jumps of the path fall.
     """
     path = pressure.tacton.trajectory
-    if path.is_static:
-        return path.at_phase(np.zeros(1))
-    enough = max(FEWEST_KNOTS, KNOTS_PER_WIDTH * path.length / spot_width(pressure.height))
-    k = 12 * int(np.ceil(enough / 12))
-    return path.at_phase((np.arange(k) + 0.5) / k)
+    return path.at_phase(_knot_phases(pressure))
+
+
+def path_weights(pressure: MovingPressure) -> Floats:
+    """What the levels of a recording make of the pressure (k,) at `path_knots`; 1 without any."""
+    return pressure.weight(_knot_phases(pressure))
 
 
 def harmonics(knots: int) -> NDArray[np.int_]:
@@ -87,10 +122,55 @@ def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
     return distinct, total
 
 
+def _knot_phases(pressure: MovingPressure) -> Floats:
+    """Fractions (k,) of the period, the middles of equal parts of it; 0 if the focus rests."""
+    path = pressure.tacton.trajectory
+    if path.is_static:
+        return np.zeros(1)
+    width = spot_width(pressure.height)
+    if path.shape == "recorded":
+        parts, period = len(path.times) - 1, path.times[-1]
+        enough = max(KNOTS_PER_WIDTH * path.length / width, 2.5 * HIGHEST * period)
+        k = parts * int(np.ceil(max(enough, FEWEST_KNOTS) / parts))
+    else:
+        enough = max(FEWEST_KNOTS, KNOTS_PER_WIDTH * path.length / width)
+        k = 12 * int(np.ceil(enough / 12))
+    return (np.arange(k) + 0.5) / k
+
+
 def _swept(pressure: MovingPressure) -> Floats:
     """The spot (8, k) at about eight points of the path while the focus runs round."""
     knots = path_knots(pressure)
-    return pressure.spot(knots[:: max(1, len(knots) // 8)], knots).T
+    watched = knots[:: max(1, len(knots) // 8)][:9]
+    return (pressure.spot(watched, knots) * path_weights(pressure)[:, None]).T
+
+
+def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floats, Complex]:
+    """Frequencies (n, k) in Hz and coefficients (n, k) in Pa of the gain as harmonics n see it.
+
+    Sampled averages of the gain; averaging takes sin(x)/x off its lines, which is put back.
+    """
+    tacton = pressure.tacton
+    count = max(2, int(np.ceil(tacton.duration * SAMPLED)))
+    dt = tacton.duration / count
+    t = (np.arange(count) + 0.5) * dt
+    gain = pressure.gain(t, over=dt)
+    k = np.arange(min(count // 2, int(HIGHEST * tacton.duration) + 1))
+    middle = np.exp(-1j * np.pi * k / count) / count
+    f_d = tacton.trajectory.drawing_frequency
+    c = np.empty((len(n), len(k)), np.complex128)
+    for row, order in zip(c, n, strict=True):
+        transform = np.fft.fft(gain * np.exp(2j * np.pi * f_d * order * t))[k]
+        averaged = np.sinc(np.clip(k / count - order * f_d * dt, -0.5, 0.5))
+        row[:] = transform * middle / averaged
+    return np.tile(k / tacton.duration, (len(n), 1)), c
+
+
+def _sinusoid_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floats, Complex]:
+    """The same of a gain that is made of sinusoids, exactly."""
+    f, c = _gain_lines(pressure)
+    f_d = pressure.tacton.trajectory.drawing_frequency
+    return n[:, None] * f_d + f, np.broadcast_to(c, (len(n), len(c)))
 
 
 def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:

@@ -3,7 +3,8 @@
     p(t) = A U(t) {w1 M1(t) + w2 M2(t)} E(t)
 
 with the carrier U at 40 kHz, AM sinusoids M = sin(2 pi f_AM t) and the envelope
-E = sin(2 pi f_e t). A frequency of 0 means a factor of exactly 1.
+E = sin(2 pi f_e t). A frequency of 0 means a factor of exactly 1. A rhythm, and a signal that is
+an envelope, are further factors of A; a signal that is a modulation is one of {...}.
 """
 
 from dataclasses import dataclass, field
@@ -12,16 +13,20 @@ from math import isfinite
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simple_model.choices import choose
+from simple_model.rhythm import Rhythm, Signal
 from simple_model.trajectory import Floats, Trajectory
 
 CARRIER = 40e3  # Hz
 LONGEST = 10.0  # s
+MOST_FOCI = 8  # what devices make at a time
+SHARINGS = ("simultaneous", "time_multiplexed")
 SUPERPOSITIONS = ((1.0, 0.0), (0.75, 0.25), (0.5, 0.5), (0.25, 0.75), (0.0, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tacton:
-    """A mid-air tactile pattern of one focus.
+    """A mid-air tactile pattern.
 
     Parameters
     ----------
@@ -31,11 +36,21 @@ class Tacton:
     envelope_frequency : float, Hz, 0 = constant
     duration : float, s, above 0 and at most 10
     trajectory : Trajectory
+    foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the
+        same path
+    sharing : how the array makes several foci, each of which pushes with 1/n of the pressure that
+        one alone would have, so that the total force stays the same. "simultaneous": all at once,
+        each at 1/sqrt(n) of the sound pressure, which conserves the acoustic power; that the
+        sound of one interferes with another's is left out. "time_multiplexed": in turn, each at
+        full pressure for 1/n of the time, faster than a body can follow. The load is the same.
+    rhythm : Rhythm or None
+    signal : Signal or None
 
     Raises
     ------
     ValueError
-        If a value is not finite or out of range.
+        If a value is not finite or out of range, or a recorded path is given a rhythm or a signal:
+        its levels are its own.
     """
 
     amplitude: float = 1.0
@@ -45,6 +60,10 @@ class Tacton:
     envelope_frequency: float = 0.0
     duration: float = 1.0
     trajectory: Trajectory = field(default_factory=Trajectory)
+    foci: tuple[float, ...] = (0.0,)
+    sharing: str = "simultaneous"
+    rhythm: Rhythm | None = None
+    signal: Signal | None = None
 
     def __post_init__(self) -> None:
         if not (isfinite(self.amplitude) and 0 <= self.amplitude <= 1):
@@ -74,12 +93,41 @@ class Tacton:
                 f"superposition = [{w1}, {w2}] must be two weights of 0 or above with sum 1, "
                 "such as [0.75, 0.25]"
             )
+        choose("sharing", self.sharing, SHARINGS)
+        if not 1 <= len(self.foci) <= MOST_FOCI:
+            raise ValueError(f"{len(self.foci)} foci are outside 1..{MOST_FOCI}, what devices make")
+        for phase in self.foci:
+            if not 0 <= phase <= 1:
+                raise ValueError(f"focus phase {phase} is outside 0..1 of the drawing period")
+        if self.is_sampled and self.trajectory.shape == "recorded":
+            raise ValueError(
+                "a recorded path has levels of its own; put the rhythm or signal into them, or "
+                "leave it out"
+            )
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the amplitude follows more than sinusoids."""
+        return self.rhythm is not None or self.signal is not None
 
 
 def modulation(tacton: Tacton, t: ArrayLike) -> Floats:
     """{w1 M1 + w2 M2} E at times (...) in s: what the carrier is multiplied by, -1..1."""
     t = np.asarray(t, np.float64)
-    return modulation_at_phases(tacton, *(2 * np.pi * f * t for f in tones(tacton)))
+    sinusoids = modulation_at_phases(tacton, *(2 * np.pi * f * t for f in tones(tacton)))
+    if tacton.signal and tacton.signal.role == "modulation":
+        return sinusoids * tacton.signal.at(t)
+    return sinusoids
+
+
+def level(tacton: Tacton, t: ArrayLike) -> Floats | float:
+    """What rhythm and envelope multiply the amplitude by, 0..1, at times (...) in s."""
+    found: Floats | float = 1.0
+    if tacton.rhythm:
+        found = tacton.rhythm.level(t)
+    if tacton.signal and tacton.signal.role == "envelope":
+        found = found * tacton.signal.at(t)
+    return found
 
 
 def modulation_at_phases(tacton: Tacton, first: Floats, second: Floats, envelope: Floats) -> Floats:
@@ -98,6 +146,9 @@ def tones(tacton: Tacton) -> tuple[float, float, float]:
 
 
 def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
-    """p(t) of equation 1 at times (...) in s, carrier included, as a fraction of full drive."""
+    """p(t) of equation 1 at times (...) in s, carrier included, as a fraction of full drive.
+
+    Levels of a recorded path are not in it: each focus has its own.
+    """
     carrier = np.sin(2 * np.pi * CARRIER * np.asarray(t, np.float64))
-    return tacton.amplitude * carrier * modulation(tacton, t)
+    return tacton.amplitude * level(tacton, t) * carrier * modulation(tacton, t)

@@ -1,10 +1,11 @@
-"""Where the focus is: constant speed along a point, line, circle, triangle or square.
+"""Where the focus is: a named shape, any polyline at constant speed, or a path recorded in time.
 
-Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are computed from the phase of the
-drawing period, never by adding steps, and so are as exact at 10 s as at 0.
+Named shapes: Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are computed from the phase
+of the drawing period, never by adding steps, and so are as exact at 10 s as at 0.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite, pi, sqrt
 
 import numpy as np
@@ -13,10 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from simple_model.choices import choose
 
 Floats = NDArray[np.float64]
+Points = tuple[tuple[float, float], ...]
 
-SHAPES = ("point", "line", "circle", "triangle", "square")
-SWEEPS = ("there_and_back", "one_way")
+SHAPES = ("point", "line", "circle", "triangle", "square")  # which a size says all of
+BY_POINTS = ("polyline", "recorded")
+SWEEPS = ("there_and_back", "one_way", "sinusoidal")
 LARGEST = 0.060  # m, the size of a palm
+FURTHEST = 0.100  # m of a point's coordinates, which devices steer to
+MOST_POINTS = 1_000_000
+JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
 _TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
 _SQUARE = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
@@ -25,15 +31,25 @@ _LINE = np.array([[-0.5, 0.0], [0.5, 0.0]])
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """A path about the origin of the skin plane, run anticlockwise.
+    """A path in the skin plane; the named shapes are run anticlockwise about the centre.
 
     Parameters
     ----------
-    shape : one of `SHAPES`
-    size : float, metre, 0..0.06: length of the line, diameter of the circle, side of the others
-    speed : float, m/s, along the path
-    sweep : how a line is repeated: "there_and_back" (f_d = speed / 2 size) or "one_way"
-        (f_d = speed / size, then a jump back); devices differ
+    shape : one of `SHAPES` or `BY_POINTS`
+    size : float, metre, 0..0.06: length of the line, diameter of the circle, side of the others;
+        0 for "polyline" and "recorded", whose points say it
+    speed : float, m/s, along the path; 0 for "recorded", whose times say it
+    sweep : how a line or an open polyline is repeated: "there_and_back" (f_d = speed / 2 length),
+        "one_way" (f_d = speed / length, then a jump back) or "sinusoidal" (there and back as a
+        cosine of time, with `speed` on average); devices differ
+    centre : (x, y), metre, what all positions are moved by
+    points : (k, 2), metre, corners of a polyline, which runs round without end if its last is its
+        first; or the positions of a recording
+    times : (k,), s, from 0, never falling: when a recording is at its points. It ends with the
+        last and begins anew, so that its period is times[-1]; equal times are a jump
+    levels : (k,), 0..1, of the amplitude, at those times; 1 throughout if empty
+    hold : bool, whether a recording stays at a point until the next (zero-order hold, what
+        devices do), rather than going there in a straight line
 
     Raises
     ------
@@ -45,9 +61,14 @@ class Trajectory:
     size: float = 0.0
     speed: float = 0.0
     sweep: str = "there_and_back"
+    centre: tuple[float, float] = (0.0, 0.0)
+    points: Points = ()
+    times: tuple[float, ...] = ()
+    levels: tuple[float, ...] = ()
+    hold: bool = False
 
     def __post_init__(self) -> None:
-        choose("shape", self.shape, SHAPES)
+        choose("shape", self.shape, (*SHAPES, *BY_POINTS))
         choose("sweep", self.sweep, SWEEPS)
         if not (isfinite(self.size) and 0 <= self.size <= LARGEST):
             raise ValueError(
@@ -56,10 +77,16 @@ class Trajectory:
             )
         if not (isfinite(self.speed) and self.speed >= 0):
             raise ValueError(f"speed = {self.speed} m/s must be a finite number, 0 or above")
+        _check_points(self)
+        if self.shape == "recorded":
+            _check_recording(self)
 
     @property
     def length(self) -> float:
         """Path length of one period, metre."""
+        if self.shape in BY_POINTS:
+            steps = float(self._arc[-1])
+            return steps if self._runs_on else 2 * steps
         sides = {"point": 0.0, "line": 2.0, "circle": pi, "triangle": 3.0, "square": 4.0}
         one_way = self.shape == "line" and self.sweep == "one_way"
         return self.size * (1.0 if one_way else sides[self.shape])
@@ -67,12 +94,21 @@ class Trajectory:
     @property
     def drawing_frequency(self) -> float:
         """Periods per second, Hz; 0 where the focus does not move."""
+        if self.shape == "recorded":
+            return 1 / self.times[-1]
         return self.speed / self.length if self.length > 0 else 0.0
 
     @property
     def is_static(self) -> bool:
         """Whether the focus stays where it starts."""
         return self.drawing_frequency == 0
+
+    @property
+    def outline(self) -> Floats:
+        """Positions (k, 2) in metre that the path stays within the convex hull of."""
+        if self.shape in BY_POINTS:
+            return self._corners + self.centre
+        return self.at_phase(np.linspace(0, 1, 721))
 
     def phase(self, t: ArrayLike) -> Floats:
         """Fraction 0..1 of the period at times t in s, same shape as t."""
@@ -84,15 +120,113 @@ class Trajectory:
 
     def at_phase(self, phase: ArrayLike) -> Floats:
         """Position (..., 2) in metre at fractions (...) of the period, 0 to 1."""
+        around = self._about_origin(np.asarray(phase, np.float64))
+        return around + self.centre if any(self.centre) else around
+
+    def level_at_phase(self, phase: ArrayLike) -> Floats:
+        """Level (...) of the amplitude, 0..1, at fractions (...) of the period."""
         phase = np.asarray(phase, np.float64)
+        if not self.levels:
+            return np.ones_like(phase)
+        before, part = self._between(phase)
+        level = np.array(self.levels)
+        return np.asarray(level[before] + part * (level[before + 1] - level[before]))
+
+    def _about_origin(self, phase: Floats) -> Floats:
         if self.shape == "point":
             return np.zeros((*phase.shape, 2))
         if self.shape == "circle":
             angle = 2 * pi * phase
             return self.size / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        if self.shape == "recorded":
+            before, part = self._between(phase)
+            start = self._corners[before]
+            return np.asarray(start + part[..., None] * (self._corners[before + 1] - start))
+        if self.shape == "polyline":
+            return self._along(self._corners, self._arc, phase)
+        if self.shape == "line" and self.sweep == "sinusoidal":
+            return self.size * self._along(_LINE, np.array([0.0, 1.0]), phase)
         corners = {"line": _LINE, "triangle": _TRIANGLE, "square": _SQUARE}[self.shape]
         if not (self.shape == "line" and self.sweep == "one_way"):
             corners = np.vstack([corners, corners[:1]])
         knots = np.linspace(0, 1, len(corners))
         unit = [np.interp(phase, knots, corners[:, axis]) for axis in range(2)]
         return self.size * np.stack(unit, axis=-1)
+
+    def _along(self, corners: Floats, arc: Floats, phase: Floats) -> Floats:
+        """Position where the sweep has got to on the line through corners at arc lengths."""
+        if self.sweep == "sinusoidal" and not self._runs_on:
+            phase = (1 - np.cos(2 * pi * phase)) / 2
+        elif not self._runs_on:
+            phase = 1 - np.abs(1 - 2 * phase)
+        at = phase * arc[-1]
+        return np.stack([np.interp(at, arc, corners[:, axis]) for axis in range(2)], axis=-1)
+
+    @property
+    def _runs_on(self) -> bool:
+        """Whether a period is one run along the points."""
+        closed = len(self.points) > 2 and self.points[0] == self.points[-1]
+        return self.shape == "recorded" or self.sweep == "one_way" or closed
+
+    @cached_property
+    def _corners(self) -> Floats:
+        return np.array(self.points, np.float64)
+
+    @cached_property
+    def _arc(self) -> Floats:
+        """Arc length (k,) in metre up to each point."""
+        steps = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @cached_property
+    def _clock(self) -> Floats:
+        return np.array(self.times, np.float64)
+
+    def _between(self, phase: Floats) -> tuple[NDArray[np.int_], Floats]:
+        """Which point of a recording was the last, and the fraction of the way to the next."""
+        clock = self._clock
+        t = phase * clock[-1]
+        late = t + JUST_AFTER * clock[-1] / (len(clock) - 1)
+        before = np.minimum(np.searchsorted(clock, late, side="right") - 1, len(clock) - 2)
+        if self.hold:
+            return before, np.zeros_like(t)
+        step = np.maximum(clock[before + 1] - clock[before], 1e-300)
+        return before, np.clip((t - clock[before]) / step, 0.0, 1.0)
+
+
+def _check_points(path: Trajectory) -> None:
+    given = path.shape in BY_POINTS
+    if given and (path.size != 0 or len(path.points) < 2):
+        raise ValueError(
+            f"a {path.shape} path has {len(path.points)} points and size {1e3 * path.size:g} mm; "
+            "give it two points or more and no size"
+        )
+    if not given and path.points:
+        raise ValueError(f"a {path.shape} has no points; leave them out or take shape 'polyline'")
+    if len(path.points) > MOST_POINTS:
+        raise ValueError(f"{len(path.points):,} points exceed the limit of {MOST_POINTS:,}")
+    try:
+        places = np.array([path.centre, *path.points], np.float64)
+        outside = not (np.abs(places) <= FURTHEST).all()  # and where it is no number
+    except (TypeError, ValueError):
+        raise ValueError("points and centre must be pairs of numbers, such as (0.01, 0)") from None
+    if places.shape[1:] != (2,) or outside:
+        raise ValueError(
+            f"points and centre must be pairs within {1e3 * FURTHEST:g} mm of the origin, "
+            "where devices steer to; move or shrink the path"
+        )
+
+
+def _check_recording(path: Trajectory) -> None:
+    times, levels = np.array(path.times, np.float64), np.array(path.levels, np.float64)
+    if path.speed != 0:
+        raise ValueError("a recorded path has its own timing; leave speed out")
+    if len(times) != len(path.points) or len(levels) not in (0, len(times)):
+        raise ValueError(
+            f"a recorded path has {len(path.points)} points, {len(times)} times and {len(levels)} "
+            "levels; give as many of each, or no levels"
+        )
+    if not (np.isfinite(times).all() and times[0] == 0 < times[-1] and (np.diff(times) >= 0).all()):
+        raise ValueError("times of a recorded path must be finite, begin with 0 and never fall")
+    if not ((levels >= 0) & (levels <= 1)).all():
+        raise ValueError("levels of a recorded path must lie in 0..1; scale them to full drive")

@@ -73,7 +73,7 @@ class Verdict:
 def evaluate(runs: Iterable[Run]) -> list[Verdict]:
     """Every statement on every body and model for which there are runs to judge it by."""
     groups: dict[tuple[str, str], list[Run]] = {}
-    for run in runs:
+    for run in filter(_is_single, runs):
         groups.setdefault((run.body, run.model), []).append(run)
     verdicts = []
     for (body, model), group in groups.items():
@@ -90,6 +90,13 @@ def evaluate(runs: Iterable[Run]) -> list[Verdict]:
 
 
 Judgement = tuple[bool, float, float, str]
+
+
+def _is_single(run: Run) -> bool:
+    """Whether a run is of the kind that was measured: one focus, modulated evenly throughout."""
+    tacton = run.scene.tacton
+    plain = len(tacton.foci) == 1 and not tacton.is_sampled
+    return plain and tacton.trajectory.shape != "recorded"
 
 
 def _single_line(runs: list[Run]) -> Judgement:
@@ -297,6 +304,8 @@ def _peak(run: Run, line: str, reach: float = 6.0) -> float:
     f, amplitude = spectrum(run.response)
     x = amplitude[:, int(np.argmax(run.lines[line]))]
     near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= reach)
+    if not near.size:
+        return np.inf
     top = near[np.argmax(x[near])]
     if top in (near[0], near[-1]) or x[top] <= 0:
         return np.inf

@@ -6,9 +6,11 @@ from math import isfinite
 import numpy as np
 
 from meshes.tetmesh import Floats
+from simple_model import Trajectory
 from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
+from simple_model.trajectory import BY_POINTS
 from skinwave.bodies import compliance
 from skinwave.scene import Scene
 
@@ -21,7 +23,10 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     the motion's power; by exact waves of the endless body, or as the load has them.
     """
     body = scene.body
-    if body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped"):
+    if scene.tacton.trajectory.shape == "recorded":
+        lines = load_lines(scene.pressure, tolerance / 100)
+        f, a = summed(lines.frequencies, lines.strengths[:, None].astype(complex))
+    elif body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped"):
         lines = load_lines(scene.pressure, tolerance / 100)
         f, a = summed(lines.frequencies, lines.coefficients[:, None])
     else:
@@ -60,7 +65,7 @@ def waves_returned(
     body, width = scene.body, spot_width(scene.pressure.height)
     if reflected is None:
         reflected = 0.0 if body.sides == "absorbing" else 1.0
-    path, probes = scene.tacton.trajectory.at_phase(np.arange(24) / 24), scene.probe_points
+    path, probes = _along(scene.tacton.trajectory), scene.probe_points
     edge = (half - np.abs(np.vstack([path, probes])).max(axis=0)).min()
     if not reflected:
         return 0.0
@@ -85,7 +90,14 @@ def waves_returned(
     return min(1.0, reflected * float(np.sqrt(share.max())))
 
 
+def _along(path: Trajectory) -> Floats:
+    """Some positions (k, 2) in metre of the focus."""
+    if path.shape in BY_POINTS:
+        return path.outline[:: max(1, len(path.points) // 24)]
+    return path.at_phase(np.arange(24) / 24)
+
+
 def mean_gain(scene: Scene) -> float:
-    """Pa at the focus, on average over a Tacton."""
+    """Pa of all foci together, on average over a Tacton."""
     gain: Floats = scene.pressure.gain(np.arange(2000) / 2000 * scene.tacton.duration)
-    return float(abs(gain.mean()))
+    return float(abs(gain.mean())) * len(scene.tacton.foci)

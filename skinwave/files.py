@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, astuple, fields
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -59,6 +59,36 @@ def output_folder(out: Path, *, overwrite: bool = False) -> Iterator[Path]:
     except KeyboardInterrupt:
         if not any(aside.iterdir()):
             _remove(aside, above)
+        raise
+
+
+@contextmanager
+def output_file(out: Path, *, overwrite: bool = False) -> Iterator[IO[bytes]]:
+    """A file to write to, which becomes `out` when all is written; an error leaves no trace.
+
+    Raises
+    ------
+    ValueError
+        If `out` exists and may not be overwritten, or cannot be written.
+    """
+    out = Path(os.path.realpath(out))
+    if os.path.lexists(out) and (out.is_dir() or not overwrite):
+        cure = (
+            "is a folder; name a file" if out.is_dir() else "exists and is kept; pass --overwrite"
+        )
+        raise ValueError(f"{out} {cure} or choose another")
+    aside = out.with_name(out.name + ".partial")
+    try:
+        with open(aside, "wb") as file:
+            yield file
+        os.replace(aside, out)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            aside.unlink()
+        if isinstance(error, OSError) and error.strerror:
+            raise ValueError(
+                f"{out} cannot be written ({error.strerror}); make room there or choose another"
+            ) from error
         raise
 
 

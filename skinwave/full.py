@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.steady import along_path, load_lines, path_knots, summed
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.bodies import Build, operators, surface_load
 from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
@@ -19,6 +19,7 @@ from skinwave.scene import Body, Scene
 MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
 CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
+MOST_LINES, MOST_KNOTS = 1000, 10_000  # of fem-harmonic, each a factorisation or a pattern
 MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 
@@ -78,7 +79,7 @@ def transient_answer(
 
     @lru_cache(maxsize=4)
     def force(t: float) -> Floats:
-        return P @ scene.pressure(points, t)
+        return P @ scene.pressure(points, t, over=dt)
 
     with clock("march"):
         states = fem.transient(ops, force, dt, solver=solver)
@@ -130,10 +131,16 @@ def harmonic_answer(
     P, points = surface_load(build)
     S = fem.probe_operator(build.mesh, scene.probe_points)
     with clock("lines"):
-        lines = load_lines(scene.pressure, threshold)
-        spots = along_path(scene.pressure.spot(points, path_knots(scene.pressure)).T)
-        patterns = lines.coefficients[:, None] * spots.T[lines.harmonics]
-        frequencies, pressures = summed(lines.frequencies, patterns)
+        lines, knots = load_lines(scene.pressure, threshold), path_knots(scene.pressure)
+        count = len(np.unique(np.round(lines.frequencies, 9)))
+        if count > MOST_LINES or len(knots) > MOST_KNOTS:
+            raise ValueError(
+                f"this load has {count:,} lines from {len(knots):,} positions, the limits are "
+                f"{MOST_LINES:,} and {MOST_KNOTS:,}; take --model fem"
+            )
+        weights = path_weights(scene.pressure)[:, None]
+        spots = along_path((scene.pressure.spot(points, knots) * weights).T)
+        frequencies, pressures = lines.gather(spots.T)
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         total = fem.Spent()
         for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):

@@ -256,10 +256,7 @@ def _symmetry(scene: Scene) -> str:
     if scene.body.kind not in ("sheet", "slab") or scene.body.placement != FLAT:
         return ""
     path = scene.tacton.trajectory
-    if path.is_static:
-        path_points = path.at_phase(np.zeros(1))
-    else:
-        path_points = path.at_phase(np.linspace(0, 1, 25))
+    path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
     return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
 
 

@@ -9,7 +9,7 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
-from simple_model.steady import along_path, load_lines, path_knots, summed
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.bodies import Build, surface_load
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.full import assembled, energy_balance, meshed
@@ -187,8 +187,8 @@ def reduced_lines(
         low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
         near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
         forces.append(pressure.spot(points[near], part) @ load[near])
-    of_path = along_path(np.vstack(forces).T).T
-    return summed(lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics])
+    weighted = np.vstack(forces) * path_weights(pressure)[:, None]
+    return lines.gather(along_path(weighted.T).T)
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:

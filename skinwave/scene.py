@@ -260,7 +260,7 @@ class Scene:
                     f"probe ({1e3 * x:g}, {1e3 * y:g}) mm is off the body, which ends at "
                     f"{1e3 * half[0]:g} and {1e3 * half[1]:g} mm; move it inside"
                 )
-        path = self.tacton.trajectory.at_phase(np.linspace(0, 1, 721))
+        path = self.tacton.trajectory.outline
         if (reach := np.abs(path).max(axis=0) - half).max() > 1e-12:
             axis = int(np.argmax(reach))
             raise ValueError(

@@ -11,11 +11,12 @@ from typing import Any
 import tomli_w
 
 from fem.materials import Material
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory
 from simple_model.choices import choose
+from simple_model.trajectory import BY_POINTS, Points
 from skinwave.scene import BODIES, KINDS, Body, Layer, Placement, Relief, Scene
 
-LARGEST = 1_000_000  # bytes of a file
+LARGEST = 32_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 
 
 def read(path: str | Path) -> Scene:
@@ -57,7 +58,7 @@ def loads(text: str) -> Scene:
         for section, keys in SECTIONS.items()
     }
     body = _body(parts["body"] | parts["placement"])
-    tacton, path = _split(parts["tacton"], ("shape", "size", "speed", "sweep"))
+    tacton, path = _split(parts["tacton"], PATH)
     presets = {"drive": "linear", "focus": "main_lobe"} if body.kind == "none" else {}
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **presets | parts["focus"]
@@ -85,13 +86,22 @@ def dumps(scene: Scene) -> str:
         table[section] = {}
         for key, field in keys.items():
             source = next(s for s in sources[section] if hasattr(s, field.name))
-            table[section][key] = field.write(getattr(source, field.name))
+            if section != "tacton" or key not in unused(tacton):
+                table[section][key] = field.write(getattr(source, field.name))
     if body.kind == "none":
         table["body"] = {"kind": "none"}
         del table["placement"]
     for key in {key for key, kind in ONLY_OF.items() if kind != body.kind} & set(table["body"]):
         del table["body"][key]
     return tomli_w.dumps(table)
+
+
+def unused(tacton: Tacton) -> set[str]:
+    """Keys of a Tacton that mean nothing with the others it has."""
+    keys = {key for key in ("rhythm", "signal") if getattr(tacton, key) is None}
+    if tacton.trajectory.shape != "recorded":
+        keys |= {"times_s", "levels", "hold"}
+    return keys if tacton.trajectory.shape in BY_POINTS else keys | {"points_mm"}
 
 
 @dataclass(frozen=True)
@@ -136,7 +146,11 @@ def _pair(key: str, value: Any) -> tuple[float, float]:
     return _number(key, value[0]), _number(key, value[1])
 
 
-def _points(key: str, value: Any) -> tuple[tuple[float, float], ...]:
+def _place(key: str, value: Any) -> tuple[float, float]:
+    return _points(key, [value])[0]
+
+
+def _points(key: str, value: Any) -> Points:
     if not isinstance(value, list):
         raise ValueError(
             f"{key} = {_shown(value)} must be a list of pairs, such as [[0, 0], [5, 0]]"
@@ -146,6 +160,46 @@ def _points(key: str, value: Any) -> tuple[tuple[float, float], ...]:
         if not (isfinite(x) and isfinite(y)):
             raise ValueError(f"{key} has the point [{x}, {y}]; coordinates must be finite")
     return tuple((x / 1e3, y / 1e3) for x, y in points)
+
+
+def _write_points(points: Points) -> list[list[float]]:
+    return [[_in_units(x, 1e3) for x in point] for point in points]
+
+
+def _numbers(key: str, value: Any) -> tuple[float, ...]:
+    if not isinstance(value, list):
+        raise ValueError(f"{key} = {_shown(value)} must be a list of numbers")
+    return tuple(_number(key, x) for x in value)
+
+
+def _switch(key: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"{key} = {_shown(value)} must be true or false")
+    return value
+
+
+def _pulses(key: str, value: Any) -> Points:
+    if not isinstance(value, list):
+        raise ValueError(
+            f"{key} = {_shown(value)} must be a list of pulses and gaps, such as [[100, 50]]"
+        )
+    return tuple((on / 1e3, gap / 1e3) for on, gap in (_pair(key, pulse) for pulse in value))
+
+
+def _inner(cls: type, keys: dict[str, Field]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """How a table within [tacton] is read as a record, and written."""
+
+    def read(key: str, value: Any) -> Any:
+        values = _checked(f"[tacton.{key}]", _table(key, value), keys)
+        missing = [k for k in list(keys)[: REQUIRED[key]] if keys[k].name not in values]
+        if missing:
+            raise ValueError(f"[tacton.{key}] lacks {' and '.join(missing)}; give it")
+        return cls(**values)
+
+    def write(record: Any) -> dict[str, Any]:
+        return {key: field.write(getattr(record, field.name)) for key, field in keys.items()}
+
+    return read, write
 
 
 def _material(key: str, value: Any) -> str | Material:
@@ -236,6 +290,19 @@ LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
     "material": Field("material", _material, _write_material),
 }
+PULSES = {
+    "pulses_ms": Field("pulses", _pulses, _write_points),
+    "ramp_ms": _scaled("ramp", 1e3),
+}
+SIGNAL = {
+    "rate_hz": _scaled("rate"),
+    "samples": Field("samples", _numbers, list),
+    "role": _word("role"),
+}
+REQUIRED = {"rhythm": 1, "signal": 2}  # how many of the keys, from the first
+PATH = (
+    "shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold",
+)  # fmt: skip
 SECTIONS = {
     "tacton": {
         "amplitude_percent": _scaled("amplitude", 100),
@@ -248,6 +315,15 @@ SECTIONS = {
         "size_mm": _scaled("size", 1e3),
         "speed_m_per_s": _scaled("speed"),
         "sweep": _word("sweep"),
+        "centre_mm": Field("centre", _place, lambda xy: [_in_units(x, 1e3) for x in xy]),
+        "points_mm": Field("points", _points, _write_points),
+        "times_s": Field("times", _numbers, list),
+        "levels": Field("levels", _numbers, list),
+        "hold": Field("hold", _switch, bool),
+        "foci": Field("foci", _numbers, lambda phases: [float(phase) for phase in phases]),
+        "sharing": _word("sharing"),
+        "rhythm": Field("rhythm", *_inner(Rhythm, PULSES)),
+        "signal": Field("signal", *_inner(Signal, SIGNAL)),
     },
     "focus": {
         "height_mm": _scaled("height", 1e3),
@@ -279,11 +355,7 @@ SECTIONS = {
         "lift_mm": _scaled("lift", 1e3),
     },
     "probes": {
-        "points_mm": Field(
-            "probes",
-            _points,
-            lambda points: [[_in_units(x, 1e3) for x in point] for point in points],
-        ),
+        "points_mm": Field("probes", _points, _write_points),
     },
 }
 

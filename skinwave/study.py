@@ -270,9 +270,18 @@ def _caption(name: str, group: list[Run]) -> str:
     tacton = group[0].scene.tacton
     path = tacton.trajectory
     parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency else []
-    if path.drawing_frequency:
+    if path.shape == "recorded":
+        parts.append(f"a path recorded for {path.times[-1]:g} s")
+    elif path.drawing_frequency:
+        size = path.size or path.length
         parts.append(
-            f"{path.shape} of {1e3 * path.size:g} mm at {path.speed:g} m/s, "
+            f"{path.shape} of {1e3 * size:g} mm at {path.speed:g} m/s, "
             f"f_d = {path.drawing_frequency:.3f} Hz"
         )
+    if len(tacton.foci) > 1:
+        parts.append(f"{len(tacton.foci)} foci")
+    if tacton.rhythm:
+        parts.append(f"{len(tacton.rhythm.pulses)} pulses in {1e3 * tacton.rhythm.period:g} ms")
+    if tacton.signal:
+        parts.append(f"a sampled {tacton.signal.role}")
     return f"{name}: {', '.join(parts) or 'constant pressure'}. Rows are probes."

@@ -102,6 +102,35 @@ WHOLE_FILES = {
     "endless sheet": "[body]\nkind = 'sheet'\ndepth_mm = inf",
     "path off the body": "[tacton]\nshape = 'square'\nsize_mm = 60\n[body]\nwidth_mm = 59",
     "drawn too fast": "[tacton]\nshape = 'circle'\nsize_mm = 1e-300\nspeed_m_per_s = 1e300",
+    "polyline without points": "[tacton]\nshape = 'polyline'",
+    "points of a circle": "[tacton]\nshape = 'circle'\npoints_mm = [[0, 0], [1, 1]]",
+    "points in words": "[tacton]\nshape = 'polyline'\npoints_mm = [['a', 'b'], [0, 1]]",
+    "points of three": "[tacton]\nshape = 'polyline'\npoints_mm = [[0, 0, 0], [0, 1, 0]]",
+    "recorded without times": "[tacton]\nshape = 'recorded'\npoints_mm = [[0, 0], [1, 1]]",
+    "times that fall": "[tacton]\nshape = 'recorded'\npoints_mm = [[0, 0], [1, 1]]\n"
+    "times_s = [0, -1]",
+    "levels of four": "[tacton]\nshape = 'recorded'\npoints_mm = [[0, 0], [1, 1]]\n"
+    "times_s = [0, 1]\nlevels = [1, 4]",
+    "hold is a word": "[tacton]\nhold = 'yes'",
+    "centre is a number": "[tacton]\ncentre_mm = 5",
+    "centre of three": "[tacton]\ncentre_mm = [0, 0, 200]",
+    "no foci": "[tacton]\nfoci = []",
+    "foci are a number": "[tacton]\nfoci = 3",
+    "nine foci": "[tacton]\nfoci = [0, 0, 0, 0, 0, 0, 0, 0, 0]",
+    "a focus at infinity": "[tacton]\nfoci = [inf]",
+    "sharing unfairly": "[tacton]\nsharing = 'unfair'",
+    "rhythm is a number": "[tacton]\nrhythm = 3",
+    "rhythm is empty": "[tacton.rhythm]",
+    "rhythm without pulses": "[tacton.rhythm]\npulses_ms = []",
+    "pulse without gap": "[tacton.rhythm]\npulses_ms = [[10]]",
+    "pulse of no length": "[tacton.rhythm]\npulses_ms = [[0, 10]]",
+    "ramp beyond its pulse": "[tacton.rhythm]\npulses_ms = [[10, 10]]\nramp_ms = 6",
+    "rhythm in seconds": "[tacton.rhythm]\npulses_s = [[0.1, 0.1]]",
+    "signal without samples": "[tacton.signal]\nrate_hz = 100",
+    "signal of no rate": "[tacton.signal]\nrate_hz = 0\nsamples = [0, 1]",
+    "signal too loud": "[tacton.signal]\nrate_hz = 100\nsamples = [0, 2]",
+    "signal in words": "[tacton.signal]\nrate_hz = 100\nsamples = ['a', 'b']",
+    "signal of no role": "[tacton.signal]\nrate_hz = 100\nsamples = [0, 1]\nrole = 'lead'",
     "carrier as modulation": "[tacton]\nam_frequency_hz = 40000",
     "above the array": "[focus]\nheight_mm = 601",
 }
@@ -157,7 +186,7 @@ def _junk() -> dict[str, bytes]:
     found["a zero byte"] = GOOD.encode().replace(b"small", b"sm\0all")
     found["carriage returns only"] = GOOD.encode().replace(b"\n", b"\r")
     found["a PNG"] = b"\x89PNG\r\n\x1a\n" + rng.randbytes(50)
-    found["two megabytes"] = b"# " + b"x" * 2_000_000
+    found["larger than any scene"] = b"# " + b"x" * 32_000_000
     return found
 
 
@@ -222,6 +251,7 @@ def wrong_usage() -> list[list[str]]:
     found += [[*run, "--h", h] for h in ("", "abc", "1,5", "1 mm", "0x10", "--quiet")]
     found += [[*run, "--dt", "soon"], [*run, "--tolerance", "5 %"], [*run, "--out"]]
     found += [["plan", "good.toml", *o] for o in (["--out", "x"], ["--solver"], ["--h"])]
+    found += [["convert"], ["convert", "good.toml"], ["convert", "a", "b", "--rate", "fast"]]
     found += [["compare", "a", "b"], ["compare", "--tolerance", "0.1"], ["compare", "--dt", "1"]]
     return found
 

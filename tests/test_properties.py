@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 import fem
 import meshes
 from meshes import TetMesh
-from simple_model import MovingPressure, Tacton, Trajectory, flat_body
+from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, flat_body
 from simple_model.drive import DRIVES
 from simple_model.flat_body import half_space, slab, steady_lines
 from simple_model.focus import FOCI
+from simple_model.rhythm import ROLES
 from simple_model.steady import along_path, load_lines, path_knots
+from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import Body, Scene, dumps, loads
 from skinwave.plan import plan
@@ -37,6 +39,58 @@ materials = st.builds(
     viscosity=numbers(1, 10),
     loss_factor=numbers(0, 0.3),
 )
+places = st.lists(st.tuples(numbers(-0.008, 0.008), numbers(-0.008, 0.008)), min_size=2, max_size=6)
+sized = st.builds(
+    Trajectory,
+    shape=st.sampled_from(SHAPES),
+    size=st.just(0.0) | numbers(0.002, 0.012),
+    speed=st.just(0.0) | numbers(0.5, 6),
+    sweep=st.sampled_from(SWEEPS),
+    centre=st.just((0.0, 0.0)) | st.tuples(numbers(-0.002, 0.002), numbers(-0.002, 0.002)),
+)
+
+
+@st.composite
+def recordings(draw):
+    """Paths with times of their own, which may jump."""
+    points = draw(places)
+    steps = draw(
+        st.lists(
+            st.just(0.0) | numbers(1e-3, 5e-3), min_size=len(points) - 1, max_size=len(points) - 1
+        )
+    )
+    times = np.concatenate([[0.0], np.cumsum(steps) + 1e-3 * (np.arange(len(steps)) > -1)])
+    levels = draw(st.just([]) | st.lists(numbers(0, 1), min_size=len(points), max_size=len(points)))
+    return Trajectory(
+        shape="recorded", points=tuple(points), times=tuple(times.tolist()),
+        levels=tuple(levels), hold=draw(st.booleans()),
+    )  # fmt: skip
+
+
+@st.composite
+def polylines(draw):
+    """Paths through points, drawn at most 300 times a second."""
+    points = tuple(draw(places))
+    path = Trajectory(
+        shape="polyline", points=points, sweep=draw(st.sampled_from(SWEEPS)), speed=0.0
+    )
+    return replace(path, speed=draw(numbers(0, 300)) * path.length)
+
+
+rhythms = st.builds(
+    Rhythm,
+    pulses=st.lists(
+        st.tuples(numbers(2e-3, 0.02), st.just(0.0) | numbers(1e-4, 0.02)), min_size=1, max_size=3
+    ).map(tuple),
+    ramp=st.just(0.0) | numbers(0, 1e-3),
+)
+signals = st.builds(
+    Signal,
+    rate=numbers(50, 2000),
+    samples=st.lists(numbers(0, 1), min_size=2, max_size=8).map(tuple),
+    role=st.sampled_from(ROLES),
+)
+several = st.lists(numbers(0, 1), min_size=1, max_size=8).map(tuple)
 tactons = st.builds(
     Tacton,
     amplitude=numbers(0, 1),
@@ -45,14 +99,23 @@ tactons = st.builds(
     superposition=numbers(0, 1).map(lambda w: (w, 1 - w)),
     envelope_frequency=st.just(0.0) | numbers(1, 20),
     duration=numbers(0.001, 0.03),
-    trajectory=st.builds(
-        Trajectory,
-        shape=st.sampled_from(SHAPES),
-        size=st.just(0.0) | numbers(0.002, 0.012),
-        speed=st.just(0.0) | numbers(0.5, 6),
-        sweep=st.sampled_from(SWEEPS),
-    ),
+    trajectory=sized,
+    foci=st.just((0.0,)) | several,
+    sharing=st.sampled_from(SHARINGS),
 )
+every_tacton = (
+    tactons
+    | st.builds(
+        replace, tactons, rhythm=st.none() | rhythms, signal=st.none() | signals
+    )
+    | st.builds(
+        Tacton,
+        am_frequency=frequencies,
+        duration=numbers(0.001, 0.03),
+        trajectory=recordings() | polylines(),
+        foci=st.just((0.0,)) | several,
+    )
+)  # fmt: skip
 pressures = st.builds(
     MovingPressure,
     tacton=tactons,
@@ -182,6 +245,17 @@ def test_what_the_load_does_later_changes_nothing_before(model, tacton):
     assert np.abs(long[: len(short)] - short).max() <= bound * np.abs(long).max()
 
 
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem"])
+@settings(max_examples=10)
+@given(every_tacton, numbers(0.01, 100))
+def test_pulses_and_recordings_are_linear_in_the_pressure_too(model, tacton, factor):
+    once, many = (
+        simulate(small_scene(tacton, peak_pressure=p), model, 0.3, h=0.006).displacement
+        for p in (10.0, 10.0 * factor)
+    )
+    np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
+
+
 circles = st.builds(
     Tacton,
     am_frequency=frequencies,
@@ -283,8 +357,10 @@ def test_the_order_of_nodes_and_elements_does_not_matter(mesh, material, rng):
 
 
 @settings(max_examples=100)
-@given(scenes())
-def test_a_scene_comes_back_from_its_file(scene):
+@given(scenes(), st.none() | every_tacton)
+def test_a_scene_comes_back_from_its_file(scene, tacton):
+    if tacton:
+        scene = replace(scene, body=Body(), pressure=replace(scene.pressure, tacton=tacton))
     once = loads(dumps(scene))
     assert dumps(once) == dumps(scene)
     assert loads(dumps(once)) == once

@@ -3,7 +3,7 @@
 The one line of a module is its help. Whatever is slow to import is imported in `run`.
 """
 
-from skinwave.commands import compare, mesh, plan, run, tradeoff, verify
+from skinwave.commands import compare, convert, mesh, plan, run, tradeoff, verify
 
 COMMANDS = {
     "run": run,
@@ -11,5 +11,6 @@ COMMANDS = {
     "tradeoff": tradeoff,
     "plan": plan,
     "mesh": mesh,
+    "convert": convert,
     "verify": verify,
 }

@@ -1,0 +1,44 @@
+"""A pattern from one kind of file to another: scene, AdapTics, CSV, WAV, pyautd3."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import add_reporting, metre, summarise
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument("source", type=Path, metavar="IN", help=".toml .adaptics .csv .wav")
+    parser.add_argument("target", type=Path, metavar="OUT", help=".toml .adaptics .csv .wav .py")
+    parser.add_argument("--scene", type=Path, metavar="SCENE", help="what to put the pattern on")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second of CSV or WAV")
+    parser.add_argument("--height", type=float, metavar="MM", help="focus above the array, mm")
+    parser.add_argument("--hold", action="store_true", help="a focal point stays until the next")
+    parser.add_argument("--role", default="modulation", help="what a WAV is: modulation, envelope")
+    parser.add_argument("--scale", default="full", help="of a WAV's samples: full, peak or rms")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    parser.add_argument("--quiet", action="store_true", help="no summary")
+    add_reporting(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.files import output_file
+    from skinwave.patterns import Options, convert
+    from skinwave.scene_file import read
+
+    asked = Options(
+        rate=options.rate,
+        height=metre(options.height),
+        hold=options.hold,
+        role=options.role,
+        scale=options.scale,
+    )
+    base = read(options.scene) if options.scene else None
+    with output_file(options.target, overwrite=options.overwrite) as file:
+        content, notes = convert(options.source, options.target, asked, base)
+        file.write(content)
+    summary = {"out": str(options.target), "bytes": len(content), "notes": notes}
+    said = "".join(f"\n  {note}" for note in notes)
+    summarise(options, summary, f"wrote {options.target}{said}")
+    return 0

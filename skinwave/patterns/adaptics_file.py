@@ -1,0 +1,290 @@
+"""An .adaptics file as it stands: keyframes, numbers with their parameters, what it may contain.
+
+The format of the AdapTics designer and engine (CHI '24), revisions 0.0.10-alpha.1, 0.1.0-alpha.2
+and 0.1.0-alpha.3: millisecond, millimetre, Hz.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import cos, isfinite, radians, sin
+from typing import Any
+
+FORMAT = "MidAirHapticsAnimationFileFormat"
+REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
+DRAWN = 100.0  # Hz of a brush that does not say
+BRUSHES = {
+    "circle": ("radius",),
+    "line": ("length", "rotation"),
+    "lissajous": ("x_scale", "y_scale", "a", "b", "d", "rotation"),
+}
+SUMS = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Brush:
+    """What is drawn about the place of the path: its `name`, `numbers` in millimetre and as they
+    stand, frequencies in Hz.
+    """
+
+    name: str
+    numbers: tuple[float, ...]
+    am_frequency: float
+    drawing_frequency: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """One thing that keyframes set: `times` in s, `values`, and whether each is kept until the
+    next (`steps`) or goes there linearly.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[Any, ...]
+    steps: tuple[bool, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Animation:
+    """A file: its `name`; tracks of `places` (x, y, z) in millimetre above the array, `brushes` and
+    `intensities`; `duration` in s, 0 if nothing ends it; the `factor` of all intensities; `notes`.
+    """
+
+    name: str
+    places: Track
+    brushes: Track
+    intensities: Track
+    duration: float
+    factor: float
+    notes: tuple[str, ...]
+
+
+def parse(content: bytes) -> Animation:
+    """The animation in a file.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or has what depends on who plays it: jumps and random intensity.
+    """
+    try:
+        table = json.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"not valid JSON: {' '.join(str(error).split())[:80]}") from None
+    if not isinstance(table, dict) or table.get("$DATA_FORMAT") != FORMAT:
+        raise ValueError(f"not an .adaptics file: $DATA_FORMAT is not '{FORMAT}'")
+    if (revision := table.get("$REVISION")) not in REVISIONS:
+        raise ValueError(
+            f"revision {str(revision)[:40]!r} is unknown; save it as one of {', '.join(REVISIONS)}"
+        )
+    numbers = _Numbers(_get(table, "user_parameter_definitions", dict, {}))
+    try:
+        return _animation(table, numbers)
+    except RecursionError:
+        raise ValueError("a formula is nested beyond all depth; simplify it") from None
+
+
+class _Numbers:
+    """Numbers of a file, its user parameters at their defaults, which are noted when used."""
+
+    def __init__(self, definitions: Mapping[str, Any]) -> None:
+        self._definitions = definitions
+        self.used: dict[str, float] = {}
+
+    def __call__(self, value: Any, what: str) -> float:
+        if not isinstance(value, dict) or "value" not in value:
+            return _finite(value, what)
+        kind = value.get("type")
+        if kind == "f64":
+            return _finite(value["value"], what)
+        if kind in ("param", "dynamic"):
+            return self._parameter(value["value"])
+        if kind == "formula":
+            return _finite(self._formula(value["value"], what), what)
+        raise ValueError(f"{what} has the type {str(kind)[:40]!r}; use f64, param or formula")
+
+    def _parameter(self, name: Any) -> float:
+        definition = self._definitions.get(name) if isinstance(name, str) else None
+        if not isinstance(definition, dict):
+            raise ValueError(f"parameter {str(name)[:40]!r} is not defined; define its default")
+        value = _finite(definition.get("default"), f"default of parameter '{name[:40]}'")
+        for key, bound in (("min", max), ("max", min)):
+            if definition.get(key) is not None:
+                value = bound(value, _finite(definition[key], f"{key} of parameter '{name[:40]}'"))
+        self.used[name] = value
+        return value
+
+    def _formula(self, formula: Any, what: str) -> float:
+        if not isinstance(formula, dict) or "value" not in formula:
+            raise ValueError(f"{what} has a formula without type and value")
+        kind, value = str(formula.get("type")).lower(), formula["value"]
+        if kind == "constant":
+            return _finite(value, what)
+        if kind == "parameter":
+            return self._parameter(value)
+        if kind == "negate":
+            return -self._formula(value, what)
+        if kind not in SUMS or not isinstance(value, list) or len(value) != 2:
+            raise ValueError(f"{what} has a formula of type '{kind[:40]}', which is unknown")
+        try:
+            return float(SUMS[kind](*(self._formula(part, what) for part in value)))
+        except ZeroDivisionError:
+            raise ValueError(f"{what} divides by 0; give the parameter another default") from None
+
+
+def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
+    keyframes = _get(table, "keyframes", list)
+    if not keyframes:
+        raise ValueError("the file has no keyframes; give at least one")
+    transform = _get(table, "pattern_transform", dict, {})
+    speed = number(transform.get("playback_speed", 1.0), "playback_speed")
+    if speed <= 0:
+        raise ValueError(f"playback_speed = {speed:g} must be above 0")
+    frames = sorted(
+        (_finite(_object(f, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed, k, f)
+        for k, f in enumerate(keyframes)
+    )
+    if frames[0][0] < 0:
+        raise ValueError(f"a keyframe is at {1e3 * frames[0][0]:g} ms, before the start; move it")
+    places, brushes, intensities = _Builder(), _Builder(), _Builder()
+    duration = frames[-1][0]
+    for time, _, frame in frames:
+        kind = frame.get("type")
+        if kind not in ("standard", "pause", "stop"):
+            raise ValueError(
+                f"a keyframe has the type {str(kind)[:40]!r}; use standard, pause, stop"
+            )
+        _refuse_jumps(frame, time)
+        if kind == "standard":
+            at, step = _with_transition(frame, "coords")
+            places.add(time, tuple(_finite(at.get(a), f"coords {a}") for a in "xyz"), step)
+        elif places.times:
+            places.add(time, places.values[-1], places.steps[-1])
+        if kind == "stop":
+            duration = time
+            break
+        if frame.get("brush") is not None:
+            inner, step = _with_transition(frame, "brush")
+            brushes.add(time, _brush(inner, number), step)
+        if frame.get("intensity") is not None:
+            inner, step = _with_transition(frame, "intensity")
+            intensities.add(time, _intensity(inner, number), step)
+    placed = _transformed(places.values, _get(transform, "geometric_transforms", dict, {}), number)
+    notes = [f"parameter '{name}' at its default, {value:g}" for name, value in number.used.items()]
+    if speed != 1:
+        notes.append(f"played at {speed:g} times the speed, brushes drawn at their own")
+    return Animation(
+        name=str(table.get("name", ""))[:80],
+        places=Track(times=tuple(places.times), values=placed, steps=tuple(places.steps)),
+        brushes=brushes.track(),
+        intensities=intensities.track(),
+        duration=duration,
+        factor=number(transform.get("intensity_factor", 1.0), "intensity_factor"),
+        notes=tuple(notes),
+    )
+
+
+class _Builder:
+    """A track that grows."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+        self.values: list[Any] = []
+        self.steps: list[bool] = []
+
+    def add(self, time: float, value: Any, step: bool) -> None:
+        self.times.append(time)
+        self.values.append(value)
+        self.steps.append(step)
+
+    def track(self) -> Track:
+        return Track(times=tuple(self.times), values=tuple(self.values), steps=tuple(self.steps))
+
+
+def _refuse_jumps(frame: Mapping[str, Any], time: float) -> None:
+    for jump in _get(frame, "cjumps", list, []) or []:
+        condition = _get(_object(jump, "a conditional jump"), "condition", dict, {})
+        operator = condition.get("operator")
+        word = operator.get("name") if isinstance(operator, dict) else operator
+        raise ValueError(
+            f"the keyframe at {1e3 * time:g} ms has a conditional jump (cjumps: parameter "
+            f"{str(condition.get('parameter'))[:40]!r} {str(word)[:10]} "
+            f"{str(condition.get('value'))[:20]}), which depends on who plays it; take it out"
+        )
+
+
+def _with_transition(frame: Mapping[str, Any], key: str) -> tuple[Mapping[str, Any], bool]:
+    """What a keyframe sets, and whether it is kept until the next one sets it anew."""
+    outer = _get(frame, key, dict)
+    transition = _get(outer, "transition", dict, {"name": "linear"}).get("name")
+    if transition not in ("linear", "step"):
+        raise ValueError(f"{key} has the transition {str(transition)[:40]!r}; use linear or step")
+    return _get(outer, key, dict), transition == "step"
+
+
+def _brush(brush: Mapping[str, Any], number: _Numbers) -> Brush:
+    name, params = brush.get("name"), _get(brush, "params", dict)
+    if name not in BRUSHES:
+        raise ValueError(f"brush {str(name)[:40]!r} is unknown; use one of {', '.join(BRUSHES)}")
+    return Brush(
+        name=name,
+        numbers=tuple(number(params.get(key), f"{key} of a {name}") for key in BRUSHES[name]),
+        am_frequency=number(params.get("am_freq", 0.0), f"am_freq of a {name}"),
+        drawing_frequency=number(params.get("stm_freq", DRAWN), f"stm_freq of a {name}"),
+    )
+
+
+def _intensity(intensity: Mapping[str, Any], number: _Numbers) -> float:
+    name = intensity.get("name")
+    if name == "random":
+        raise ValueError("intensity 'random' is another one each time; make it constant")
+    if name != "constant":
+        raise ValueError(f"intensity {str(name)[:40]!r} is unknown; make it constant")
+    return number(_get(intensity, "params", dict).get("value"), "value of an intensity")
+
+
+def _transformed(
+    values: Iterable[tuple[float, ...]], transform: Mapping[str, Any], number: _Numbers
+) -> tuple[tuple[float, ...], ...]:
+    """Places scaled, turned and moved, in that order; brushes are not."""
+    scale, move = (_get(transform, key, dict, {}) for key in ("scale", "translate"))
+    sx, sy, sz = (number(scale.get(a, 1.0), f"scale {a}") for a in "xyz")
+    dx, dy, dz = (number(move.get(a, 200.0 * (a == "z")), f"translate {a}") for a in "xyz")
+    turn = radians(number(transform.get("rotation", 0.0), "rotation"))
+    c, s = cos(turn), sin(turn)
+    return tuple(
+        (c * sx * x - s * sy * y + dx, s * sx * x + c * sy * y + dy, sz * z + dz)
+        for x, y, z in values
+    )
+
+
+def _get(table: Mapping[str, Any], key: str, kind: type, default: Any = None) -> Any:
+    value = table.get(key, default)
+    if not isinstance(value, kind):
+        word = {"dict": "an object", "list": "a list"}[kind.__name__]
+        raise ValueError(f"{key} = {json.dumps(value)[:40]} must be {word}")
+    return value
+
+
+def _object(value: Any, what: str) -> Mapping[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"{what} is {json.dumps(value)[:40]}, which must be an object")
+    return value
+
+
+def _finite(value: Any, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
+        raise ValueError(f"{what} = {json.dumps(value)[:40]} must be a finite number")
+    return float(value)
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return isfinite(value)
+    except OverflowError:
+        return False

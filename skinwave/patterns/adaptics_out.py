@@ -1,0 +1,176 @@
+"""Tactons as AdapTics patterns: circles and cosine lines as brushes, other paths as keyframes."""
+
+import json
+from math import atan2, degrees, hypot
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import Tacton, Trajectory
+from simple_model.trajectory import BY_POINTS
+from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
+from skinwave.patterns.pattern import Options, loudness
+from skinwave.scene import Scene
+
+MOST_KEYFRAMES = 20_000
+TINY = 1e-9  # of a period
+CORNERS = {"triangle": 3, "square": 4}
+
+
+def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
+    """The .adaptics file of a scene's Tacton, in the newest revision, and notes.
+
+    Raises
+    ------
+    ValueError
+        If the format has no words for it: which part, and the cure.
+    """
+    tacton, notes = scene.tacton, []
+    _refuse(tacton)
+    if tacton.am_frequency:
+        if scene.pressure.drive != "pressure_squared" or scene.pressure.depth_of_modulation != 1:
+            raise ValueError(
+                f"the engine modulates sound pressure fully, not by drive "
+                f"'{scene.pressure.drive}' with depth {scene.pressure.depth_of_modulation:g}; take "
+                "'pressure_squared' with depth 1"
+            )
+        notes.append("AM begins at its crest there, at its mean here")
+    path, end = tacton.trajectory, tacton.duration
+    amplitude = float(loudness(scene.pressure, np.zeros(1))[0])
+    if tacton.am_frequency:
+        amplitude = tacton.amplitude
+    brush, place = _brush(tacton)
+    if brush is None:
+        brush = _circle(0.0, tacton, 0.0)
+        times, phases = _corners(path, end, tacton.foci[0])
+        places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
+        notes.append(f"{len(times)} keyframes, the path once along")
+    else:
+        times, places, levels = np.array([0.0, end]), np.array([place, place]), np.ones(2)
+    keyframes = [
+        _keyframe(t, xy, amplitude * level, brush, step=path.hold)
+        for t, xy, level in zip(times, places, levels, strict=True)
+    ]
+    keyframes.append({"type": "stop", "time": 1e3 * end})
+    table = {
+        "$DATA_FORMAT": FORMAT,
+        "$REVISION": REVISIONS[-1],
+        "name": scene.name,
+        "keyframes": keyframes,
+        "pattern_transform": _transform(scene.pressure.height),
+        "user_parameter_definitions": {},
+    }
+    return json.dumps(table, indent=1).encode(), tuple(notes)
+
+
+def _refuse(tacton: Tacton) -> None:
+    """What the format has no words for."""
+    parts = {
+        "several foci": len(tacton.foci) > 1,
+        "a second AM frequency": tacton.superposition[1] > 0 and tacton.second_am_frequency > 0,
+        "an envelope frequency": tacton.envelope_frequency > 0,
+        "a rhythm": tacton.rhythm is not None,
+        "a sampled signal": tacton.signal is not None,
+    }
+    for part, there in parts.items():
+        if there:
+            raise ValueError(f".adaptics has no words for {part}; write .csv, or leave it out")
+
+
+def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
+    """The brush that draws a path by itself, if one does, and its place in metre."""
+    path = tacton.trajectory
+    if path.shape == "circle" and tacton.foci[0] == 0:
+        return _circle(1e3 * path.size / 2, tacton, path.drawing_frequency), path.centre
+    if path.shape == "point" or (path.is_static and path.shape != "recorded"):
+        x, y = path.position(0.0).tolist()
+        return _circle(0.0, tacton, 100.0), (x, y)
+    ends = path.outline
+    straight = path.shape == "line" or (path.shape == "polyline" and len(ends) == 2)
+    if not straight or path.sweep != "sinusoidal" or tacton.foci[0] != 0:
+        return None, path.centre
+    first, last = path.at_phase([0.0, 0.5])
+    (x, y), (dx, dy) = (first + last) / 2, (first - last) / 2
+    numbers = {"length": 1e3 * hypot(dx, dy), "thickness": 1.0, "rotation": degrees(atan2(dy, dx))}
+    return _named("line", numbers, tacton, path.drawing_frequency), (float(x), float(y))
+
+
+def _corners(path: Trajectory, end: float, ahead: float) -> tuple[Floats, Floats]:
+    """Times (k,) in s and phases (k,) between which the path is straight, from start to end."""
+    if path.shape == "circle" or path.sweep == "sinusoidal":
+        raise ValueError("no brush draws this path, and it is not straight either; write .csv")
+    f_d = path.drawing_frequency
+    if path.shape == "recorded":
+        clock = np.array(path.times) * f_d
+    elif path.shape in BY_POINTS:
+        steps = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
+        arc = np.concatenate([[0.0], np.cumsum(steps)]) / path.length
+        clock = arc if arc[-1] > 0.75 else np.union1d(arc, 1 - arc)
+    else:
+        clock = np.arange(CORNERS.get(path.shape, 2) + 1) / CORNERS.get(path.shape, 2)
+        clock = clock if path.sweep == "there_and_back" or path.shape in CORNERS else clock[::2]
+    periods = int(np.ceil(end * f_d + ahead - TINY))
+    if periods * len(clock) > MOST_KEYFRAMES:
+        raise ValueError(
+            f"the path has {periods * len(clock):,} corners in {end:g} s, the limit is "
+            f"{MOST_KEYFRAMES:,} keyframes; shorten it, or write .csv"
+        )
+    # Each corner twice, just before and just after it, so that jumps stay jumps.
+    around = np.unique(np.round(np.arange(periods)[:, None] + clock, 12)) - ahead
+    sides = np.stack([around - TINY, around + TINY], axis=1).ravel()
+    inside = sides[(sides > TINY) & (sides < end * f_d - TINY)]
+    at = np.concatenate([[0.0], inside, [end * f_d - TINY]])
+    phase = np.mod(at + ahead, 1.0)
+    kept = _needed(np.column_stack([path.at_phase(phase), path.level_at_phase(phase)]))
+    return at[kept] / f_d, phase[kept]
+
+
+def _needed(values: Floats) -> np.ndarray:
+    """Which of the two sides of a corner to keep: one, where they agree."""
+    same = np.abs(np.diff(values, axis=0)).max(axis=1) < 1e-8
+    return np.concatenate([[True], ~same])
+
+
+def _keyframe(
+    t: float, place: Any, level: float, brush: dict[str, Any], *, step: bool
+) -> dict[str, Any]:
+    transition: dict[str, Any] = {"name": "step" if step else "linear", "params": {}}
+    x, y = (1e3 * float(each) for each in place)
+    return {
+        "type": "standard",
+        "time": 1e3 * float(t),
+        "brush": {"brush": brush, "transition": transition},
+        "intensity": {
+            "intensity": {"name": "constant", "params": {"value": _f64(level)}},
+            "transition": transition,
+        },
+        "coords": {"coords": {"x": x, "y": y, "z": 0.0}, "transition": transition},
+        "cjumps": [],
+    }
+
+
+def _circle(radius: float, tacton: Tacton, f_d: float) -> dict[str, Any]:
+    return _named("circle", {"radius": radius}, tacton, f_d)
+
+
+def _named(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) -> dict[str, Any]:
+    numbers = {**numbers, "am_freq": tacton.am_frequency, "stm_freq": f_d}
+    return {"name": name, "params": {key: _f64(value) for key, value in numbers.items()}}
+
+
+def _transform(height: float) -> dict[str, Any]:
+    zero, one = _f64(0.0), _f64(1.0)
+    return {
+        "geometric_transforms": {
+            "translate": {"x": zero, "y": zero, "z": _f64(1e3 * height)},
+            "rotation": zero,
+            "scale": {"x": one, "y": one, "z": one},
+        },
+        "intensity_factor": one,
+        "playback_speed": one,
+    }
+
+
+def _f64(value: float) -> dict[str, Any]:
+    return {"type": "f64", "value": float(value)}

@@ -1,0 +1,219 @@
+"""Focal points as CSV: tidy, `t_s,point,x_m,y_m,z_m,intensity`, or bare `x,y[,z]` at a rate.
+
+Intensity is the sound pressure of a point over that at full drive, 0..1; the radiation pressure is
+its square. Several points are foci on paths of their own: their paths one after the other are a
+path, on which each focus runs one part ahead of the one before.
+"""
+
+import csv
+import difflib
+import io
+from collections.abc import Iterator
+from math import isfinite
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import Tacton, Trajectory
+from simple_model.tacton import LONGEST, MOST_FOCI
+from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
+from skinwave.scene import Scene
+
+COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
+NEEDED = ("t_s", "x_m", "y_m")
+DEVICE_RATE = 40_000.0  # Hz
+MOST_ROWS = 1_000_000
+
+
+def read(content: bytes, options: Options) -> Pattern:
+    """The pattern in a focal-point CSV.
+
+    Raises
+    ------
+    ValueError
+        If it is none: the line, what is wrong with it and the cure, in one sentence.
+    """
+    rows = _rows(content)
+    tidy = not _is_number(rows[0][1][0])
+    table = _tidy(rows) if tidy else _bare(rows, options.rate)
+    notes: list[str] = []
+    points, counts = np.unique(table["point"], return_counts=True)
+    if len(points) > MOST_FOCI or (points != np.arange(len(points))).any():
+        shown = ", ".join(f"{p:g}" for p in points[:10])
+        raise ValueError(f"points are numbered {shown}; number them from 0 to {MOST_FOCI - 1}")
+    if np.ptp(counts):
+        raise ValueError("points have different numbers of samples; give each the same times")
+    order = np.lexsort((np.arange(len(table)), table["point"]))
+    table = table[order].reshape(len(points), -1)  # (point, time)
+    times = table["t_s"] - table["t_s"][0, 0]
+    if np.ptp(times, axis=0).max() > 1e-9:
+        raise ValueError("points have different times; give each the same")
+    if (np.diff(times[0]) < 0).any():
+        raise ValueError(f"times fall after t_s = {_before_fall(table['t_s'][0]):g}; sort them")
+    if not ((table["intensity"] >= 0) & (table["intensity"] <= 1)).all():
+        raise ValueError("intensity must lie in 0..1, the sound pressure over that at full drive")
+    if len(points) > 1:
+        notes.append(
+            f"{len(points)} points at a time: each pushes with 1/{len(points)} of the pressure of "
+            "one alone"
+        )
+    if not tidy:
+        notes.append(f"samples at {options.rate:g} Hz")
+    way = "stays at a sample until the next" if options.hold else "goes straight between samples"
+    notes.append(f"the focus {way}")
+    height = one_height(table["z_m"].ravel(), options, notes)
+    tacton = recorded(times[0], np.stack([table["x_m"], table["y_m"]], -1), table["intensity"],
+                      hold=options.hold)  # fmt: skip
+    return Pattern(
+        tacton=tacton, pressure={"drive": "pressure_squared", **height}, notes=tuple(notes)
+    )
+
+
+def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = False) -> Tacton:
+    """A Tacton of foci at places (n, t, 2) in metre with levels (n, t) at times (t,) in s from 0.
+
+    The last sample lasts as long as the one before it.
+    """
+    n, count = levels.shape
+    if np.ptp(places, axis=(0, 1)).max() == 0 and np.ptp(levels) == 0 and n == 1:
+        duration = times[-1] + (times[-1] - times[-2]) if count > 1 else 1.0
+        centre = (float(places[0, 0, 0]), float(places[0, 0, 1]))
+        return Tacton(
+            amplitude=float(levels[0, 0]),
+            duration=duration,
+            trajectory=Trajectory(centre=centre),
+        )
+    if count < 2:
+        times, places, levels = np.array([0.0, 1.0]), *(
+            np.repeat(x, 2, axis=1) for x in (places, levels)
+        )  # fmt: skip
+    last = times[-1] + (times[-1] - times[-2])
+    if not 0 < last <= LONGEST * (1 + 1e-9):
+        raise ValueError(f"the points last {last:g} s, outside 0..{LONGEST:g} s; cut them")
+    clock = np.concatenate([j * last + np.append(times, last) for j in range(n)])
+    held = [np.concatenate([x, x[:, -1:]], axis=1) for x in (places, levels)]
+    path = Trajectory(
+        shape="recorded",
+        points=tuple(map(tuple, held[0].reshape(-1, 2).tolist())),
+        times=tuple(clock.tolist()),
+        levels=tuple(held[1].ravel().tolist()),
+        hold=hold,
+    )
+    return Tacton(duration=min(last, LONGEST), trajectory=path, foci=tuple(j / n for j in range(n)))
+
+
+def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
+    """Tidy CSV of a scene's foci at a rate, and notes."""
+    rate = options.rate or DEVICE_RATE
+    if not (isfinite(rate) and 1 <= rate <= DEVICE_RATE):
+        raise ValueError(f"rate = {rate:g} Hz is outside 1..{DEVICE_RATE:g} Hz of devices")
+    tacton, path = scene.tacton, scene.tacton.trajectory
+    t = np.arange(max(2, round(tacton.duration * rate))) / rate
+    amplitude = loudness(scene.pressure, t)
+    height = f"{scene.pressure.height!r}"
+    columns = []
+    for ahead in tacton.foci:
+        phase = np.mod(path.phase(t) + ahead, 1.0)
+        levels = amplitude * np.sqrt(scene.pressure.weight(phase))
+        columns.append((path.at_phase(phase).tolist(), levels.tolist()))
+    file = io.StringIO()
+    file.write(",".join(COLUMNS) + "\n")
+    for k, time in enumerate(t.tolist()):
+        for point, (places, levels) in enumerate(columns):
+            x, y = places[k]
+            file.write(f"{time!r},{point},{x!r},{y!r},{height},{levels[k]!r}\n")
+    notes = (
+        f"{len(t):,} samples of {len(tacton.foci)} focal points at {rate:g} Hz",
+        "intensity is the sound pressure over that at full drive: the root of the load",
+    )
+    return file.getvalue().encode(), notes
+
+
+def _rows(content: bytes) -> list[tuple[int, list[str]]]:
+    """Line numbers and cells of what is not empty and no comment."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("not a text file; a CSV is UTF-8") from None
+    found = list(_cells(text))
+    if not found:
+        raise ValueError("no focal points; give a line each")
+    return found
+
+
+def _cells(text: str) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(io.StringIO(text))
+    try:
+        for row in reader:
+            if row and not row[0].startswith("#") and any(cell.strip() for cell in row):
+                yield reader.line_num, [cell.strip() for cell in row]
+            if reader.line_num > MOST_ROWS:
+                raise ValueError(f"more than {MOST_ROWS:,} lines; cut the pattern")
+    except csv.Error as error:
+        raise ValueError(f"line {reader.line_num} is no CSV: {error}") from None
+
+
+def _tidy(rows: list[tuple[int, list[str]]]) -> np.ndarray:
+    header = rows[0][1]
+    for name in header:
+        if name not in COLUMNS:
+            near = difflib.get_close_matches(name, COLUMNS, 1, 0.0)[0]
+            raise ValueError(f"column '{name[:40]}' is unknown; did you mean '{near}'?")
+    if len(set(header)) < len(header):
+        raise ValueError(f"a column is there twice in {','.join(header)}; leave one out")
+    if missing := [name for name in NEEDED if name not in header]:
+        raise ValueError(f"column {missing[0]} is missing; columns are {','.join(COLUMNS)}")
+    if len(rows) < 2:
+        raise ValueError("a header without focal points; give a line each")
+    table = _table(len(rows) - 1)
+    for k, (line, cells) in enumerate(rows[1:]):
+        for name, value in zip(header, _numbers(line, cells, len(header)), strict=True):
+            table[name][k] = value
+    return table
+
+
+def _bare(rows: list[tuple[int, list[str]]], rate: float | None) -> np.ndarray:
+    if rate is None:
+        raise ValueError("the file has no times; say how many samples a second with --rate HZ")
+    if not (isfinite(rate) and rate > 0):
+        raise ValueError(f"rate = {rate} Hz must be a finite number above 0")
+    width = len(rows[0][1])
+    if width not in (2, 3):
+        raise ValueError(f"line {rows[0][0]} has {width} columns; a file without header has x,y,z")
+    table = _table(len(rows))
+    table["t_s"] = np.arange(len(rows)) / rate
+    for k, (line, cells) in enumerate(rows):
+        for name, value in zip(("x_m", "y_m", "z_m"), _numbers(line, cells, width), strict=False):
+            table[name][k] = value
+    return table
+
+
+def _table(count: int) -> np.ndarray:
+    table = np.zeros(count, [(name, float) for name in COLUMNS])
+    table["intensity"] = 1.0
+    return table
+
+
+def _numbers(line: int, cells: list[str], count: int) -> list[float]:
+    if len(cells) != count:
+        raise ValueError(f"line {line} has {len(cells)} columns, the first has {count}")
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        wrong = next(cell for cell in cells if not _is_number(cell))
+        raise ValueError(f"line {line} has '{wrong[:40]}' where a number belongs") from None
+    if not all(map(isfinite, values)):
+        raise ValueError(f"line {line} has a number that is not finite; leave the line out")
+    return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _before_fall(times: Floats) -> float:
+    return float(times[int(np.argmax(np.diff(times) < 0))])

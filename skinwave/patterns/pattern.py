@@ -1,0 +1,94 @@
+"""What a pattern file says, and what a user may decide about it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure, Tacton
+from skinwave.scene import Scene
+
+NOT_A_NUMBER = "must be a finite number"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pattern:
+    """A Tacton from a file, the `pressure` keys that the file decides (height, drive), a `name` if
+    it has one, and `notes`: sentences on what the file leaves open or what was changed.
+    """
+
+    tacton: Tacton
+    pressure: Mapping[str, Any] = field(default_factory=dict)
+    name: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What a file does not say.
+
+    Parameters
+    ----------
+    rate : float, Hz, of samples: of a CSV without times when read; of CSV and WAV when written
+    height : float, metre, of the focus, in place of the file's
+    hold : bool, whether a focal point stays until the next sample, rather than going there straight
+    role : "modulation" or "envelope", what a WAV is
+    scale : "full", "peak" or "rms", how a WAV's samples are scaled: as they are, full scale 1; the
+        highest to 1; or the root mean square to that of a full sine, 0.707
+    """
+
+    rate: float | None = None
+    height: float | None = None
+    hold: bool = False
+    role: str = "modulation"
+    scale: str = "full"
+
+
+def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
+    """The base scene with the pattern in place of its Tacton."""
+    pressure = replace(base.pressure, tacton=pattern.tacton, **pattern.pressure)
+    return replace(base, name=pattern.name or name, pressure=pressure)
+
+
+def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:
+    """The pressure key for a focus at heights (k,) in metre, which must be one.
+
+    Raises
+    ------
+    ValueError
+        If it is not, and no other is given.
+    """
+    if options.height is not None:
+        return {"height": options.height}
+    if np.ptp(z) > 1e-9:
+        raise ValueError(
+            f"the focus moves from {1e3 * z.min():g} to {1e3 * z.max():g} mm above the array, "
+            "which no flat surface follows; choose one height with --height"
+        )
+    if z[0] == 0:
+        notes.append("the file says nothing of the height above the array: that of the scene")
+        return {}
+    return {"height": float(z[0])}
+
+
+def loudness(pressure: MovingPressure, t: ArrayLike) -> Floats:
+    """Sound pressure (...) of each focus at times (...) in s over that at full drive, 0..1.
+
+    The root of the radiation pressure, whatever the drive law; without a recording's levels.
+
+    Raises
+    ------
+    ValueError
+        If the load pulls, which no sound does.
+    """
+    full = replace(pressure, tacton=Tacton(foci=pressure.tacton.foci)).gain(np.zeros(1))
+    relative = pressure.gain(t) / full if full else np.zeros(np.shape(t))
+    if (relative < -1e-12).any():
+        raise ValueError(
+            f"drive '{pressure.drive}' pulls half of the time, which no device can; take drive "
+            "'pressure_squared' or 'force_corrected'"
+        )
+    return np.sqrt(np.clip(relative, 0, 1))

@@ -1,0 +1,538 @@
+"""Pattern files come in, go out and come back; what is malformed is refused in one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, lines, point_kernel
+from skinwave import Body, Scene, dumps, loads, read, simulate
+from skinwave.cli import main
+from skinwave.patterns import Options, read_pattern, write_pattern
+from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
+from skinwave.patterns.autd3 import steps
+
+LINEAR, STEP = {"name": "linear", "params": {}}, {"name": "step", "params": {}}
+ALONE = {"circle": {"radius": 10.0}, "line": {"length": 10.0, "thickness": 1.0, "rotation": 30.0}}
+
+
+def f64(value):
+    return {"type": "f64", "value": value}
+
+
+def brush(name="circle", **numbers):
+    numbers = ALONE.get(name, {}) | {"am_freq": 0.0, "stm_freq": 80.0} | numbers
+    params = {k: v if isinstance(v, dict) else f64(v) for k, v in numbers.items()}
+    return {"brush": {"name": name, "params": params}, "transition": LINEAR}
+
+
+def keyframe(time, xy=(0.0, 0.0), drawn=None, intensity=1.0, transition=LINEAR):
+    """A standard keyframe, or a pause where there is no place."""
+    constant = {"name": "constant", "params": {"value": f64(intensity)}}
+    frame = {
+        "time": time,
+        "type": "standard" if xy else "pause",
+        "brush": drawn or brush(),
+        "intensity": {"intensity": constant, "transition": transition},
+        "cjumps": [],
+    }
+    if xy:
+        place = {"x": xy[0], "y": xy[1], "z": 0.0}
+        frame["coords"] = {"coords": place, "transition": transition}
+    return frame
+
+
+def stop(time):
+    return {"time": time, "type": "stop"}
+
+
+def adaptics(*keyframes, revision=REVISIONS[-1], **transform):
+    zero, one = f64(0.0), f64(1.0)
+    simple = {
+        "translate": {"x": zero, "y": zero, "z": f64(180.0)},
+        "rotation": zero,
+        "scale": {"x": one, "y": one, "z": one},
+    }
+    return {
+        "$DATA_FORMAT": FORMAT,
+        "$REVISION": revision,
+        "name": "made",
+        "keyframes": list(keyframes),
+        "pattern_transform": {
+            "geometric_transforms": simple, "intensity_factor": one, "playback_speed": one,
+        } | transform,
+        "user_parameter_definitions": {"size": {"default": 7.0, "min": 0, "max": 6.0, "step": 1}},
+    }  # fmt: skip
+
+
+def imported(folder, content, suffix=".adaptics", **options):
+    path = folder / f"pattern{suffix}"
+    if isinstance(content, dict):
+        content = json.dumps(content)
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_pattern(path, Options(**options))
+
+
+def exported(scene, suffix, **options):
+    return write_pattern(scene, suffix, Options(**options))[0]
+
+
+def flat(tacton, **pressure):
+    return Scene(pressure=MovingPressure(tacton=tacton, **pressure), body=Body())
+
+
+@pytest.mark.parametrize("name", ["circle", "line"])
+@pytest.mark.parametrize("revision", REVISIONS)
+def test_a_brush_comes_back_on_the_same_path_at_the_same_frequency(tmp_path, name, revision):
+    drawn = brush(name, am_freq=140.0, stm_freq=190.98593171027443)
+    source = adaptics(keyframe(0, (3.0, -4.0), drawn), stop(500), revision=revision)
+    scene, _ = imported(tmp_path, source)
+    path = scene.tacton.trajectory
+    assert path.drawing_frequency == pytest.approx(190.98593171027443, rel=1e-14)
+    assert (scene.tacton.am_frequency, scene.tacton.duration) == (140.0, 0.5)
+    assert (scene.pressure.drive, scene.pressure.height) == ("pressure_squared", 0.18)
+    u = np.linspace(0, 2 * np.pi, 50, endpoint=False)
+    offset = {
+        "circle": np.stack([np.cos(u), np.sin(u)], -1),
+        "line": np.cos(u)[:, None] * [np.cos(np.pi / 6), np.sin(np.pi / 6)],
+    }[name]
+    np.testing.assert_allclose(
+        path.at_phase(u / 2 / np.pi), [0.003, -0.004] + 0.01 * offset, atol=1e-15
+    )
+    back, _ = imported(tmp_path, exported(loads(dumps(scene)), ".adaptics"))
+    t = np.linspace(0, 0.5, 5001)
+    np.testing.assert_allclose(
+        back.tacton.trajectory.position(t), path.position(t), rtol=0, atol=1e-9
+    )
+    frequency = back.tacton.trajectory.drawing_frequency
+    assert frequency == pytest.approx(path.drawing_frequency, rel=1e-12)
+    assert back.tacton.am_frequency == 140.0
+    assert back.pressure.height == pytest.approx(0.18, rel=1e-12)
+
+
+def test_an_old_brush_without_a_frequency_is_drawn_at_100_hz(tmp_path):
+    drawn = brush()
+    del drawn["brush"]["params"]["stm_freq"]
+    scene, _ = imported(tmp_path, adaptics(keyframe(0, drawn=drawn), revision=REVISIONS[0]))
+    assert scene.tacton.trajectory.drawing_frequency == pytest.approx(100.0)
+
+
+def test_parameters_and_formulas_take_their_bounded_defaults(tmp_path):
+    half = {"type": "divide", "value": [{"type": "parameter", "value": "size"},
+                                        {"type": "constant", "value": 2.0}]}  # fmt: skip
+    drawn = brush(radius={"type": "param", "value": "size"},
+                  am_freq={"type": "formula", "value": half})  # fmt: skip
+    scene, notes = imported(tmp_path, adaptics(keyframe(0, drawn=drawn)))
+    assert scene.tacton.trajectory.size == pytest.approx(0.012)  # 7 mm are cut to 6
+    assert scene.tacton.am_frequency == 3.0
+    assert "parameter 'size' at its default, 6" in notes
+
+
+def test_keyframes_move_pause_fade_and_jump(tmp_path):
+    point = brush(radius=0.0)
+    source = adaptics(
+        keyframe(0, (-10.0, 0.0), point),
+        keyframe(100, (10.0, 0.0), point),
+        keyframe(200, None, point),
+        keyframe(300, (10.0, 20.0), point, 0.0, STEP),
+        keyframe(400, (0.0, 0.0), point, 0.5),
+        stop(450),
+    )
+    scene, _ = imported(tmp_path, source)
+    path = scene.tacton.trajectory
+    assert scene.tacton.duration == pytest.approx(0.45)
+    t = np.array([0.05, 0.15, 0.25, 0.35, 0.42])
+    expected = [[0, 0], [10, 0], [10, 10], [10, 20], [0, 0]]
+    np.testing.assert_allclose(1e3 * path.position(t), expected, atol=1e-6)
+    np.testing.assert_allclose(path.level_at_phase(path.phase(t)), [1, 1, 0.5, 0, 0.5], atol=1e-6)
+
+
+def test_places_are_scaled_turned_and_moved_but_brushes_are_not(tmp_path):
+    transform = {
+        "translate": {"x": f64(5.0), "y": f64(0.0), "z": f64(200.0)},
+        "rotation": f64(90.0),
+        "scale": {"x": f64(2.0), "y": f64(1.0), "z": f64(1.0)},
+    }
+    source = adaptics(keyframe(0, (4.0, 0.0)), geometric_transforms=transform)
+    scene, _ = imported(tmp_path, source)
+    assert scene.tacton.trajectory.centre == pytest.approx((0.005, 0.008))
+    assert scene.tacton.trajectory.size == pytest.approx(0.020)
+
+
+def test_a_lissajous_is_recorded_as_the_engine_draws_it(tmp_path):
+    drawn = brush("lissajous", x_scale=10.0, y_scale=6.0, a=2.0, b=3.0, d=0.5, rotation=0.0)
+    scene, notes = imported(tmp_path, adaptics(keyframe(0, drawn=drawn), stop(100)))
+    t = np.arange(2000) / 20_000
+    u = 2 * np.pi * 80 * t
+    expected = np.stack([0.010 * np.sin(2 * u + 0.5), 0.006 * np.sin(3 * u)], -1)
+    np.testing.assert_allclose(scene.tacton.trajectory.position(t), expected, atol=1e-9)
+    assert any("recorded at 20000 Hz" in note for note in notes)
+
+
+def test_am_of_a_moving_brush_is_in_the_levels(tmp_path):
+    drawn = brush(am_freq=50.0)
+    scene, _ = imported(tmp_path, adaptics(keyframe(0, drawn=drawn), keyframe(100, (5, 0), drawn)))
+    path, t = scene.tacton.trajectory, np.arange(2000) / 20_000
+    expected = (1 + np.cos(2 * np.pi * 50 * t)) / 2
+    np.testing.assert_allclose(path.level_at_phase(path.phase(t)), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        Trajectory(shape="square", size=0.02, speed=5.0),
+        Trajectory(shape="line", size=0.02, speed=3.0, centre=(0.01, 0.0)),
+        Trajectory(shape="line", size=0.02, speed=3.0, sweep="one_way"),
+        Trajectory(shape="polyline", points=((0, 0), (0.01, 0.004), (0, 0.01)), speed=2.0),
+    ],
+    ids=lambda path: f"{path.shape} {path.sweep}",
+)
+def test_straight_paths_become_keyframes(tmp_path, path):
+    scene = flat(Tacton(trajectory=path, duration=0.1))
+    back, _ = imported(tmp_path, exported(scene, ".adaptics"))
+    t = np.arange(2000) / 20_000
+    away = np.linalg.norm(back.tacton.trajectory.position(t) - path.position(t), axis=1)
+    assert np.median(away) < 1e-8
+    assert (away < 1e-6).mean() > 0.99  # but where it jumps
+
+
+def test_what_adaptics_has_no_words_for_is_said():
+    for tacton, said in (
+        (Tacton(foci=(0.0, 0.5)), "several foci"),
+        (Tacton(envelope_frequency=3.0), "an envelope frequency"),
+        (Tacton(rhythm=Rhythm(pulses=((0.1, 0.1),))), "a rhythm"),
+        (Tacton(second_am_frequency=80.0, superposition=(0.5, 0.5)), "a second AM frequency"),
+        (
+            Tacton(trajectory=Trajectory(shape="circle", size=0.01, speed=2), foci=(0.2,)),
+            "no brush",
+        ),
+        (Tacton(trajectory=Trajectory(shape="line", size=2e-4, speed=4)), "keyframes"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            exported(flat(tacton), ".adaptics")
+    with pytest.raises(ValueError, match="take 'pressure_squared'"):
+        exported(flat(Tacton(am_frequency=80.0), drive="linear"), ".adaptics")
+
+
+CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_a_circle_in_csv_at_40_khz_has_the_lines_it_had(tmp_path, hold):
+    scene = flat(Tacton(trajectory=CIRCLE), focus="main_lobe")
+    back, _ = imported(tmp_path, exported(scene, ".csv", rate=40_000), ".csv", hold=hold)
+    times = np.arange(48_000) / 48_000  # between the samples
+    wanted = CIRCLE.drawing_frequency * np.arange(5)
+    before, after = (
+        lines(
+            point_kernel(MovingPressure(tacton=s.tacton, focus="main_lobe"), PROBES, times), wanted
+        )
+        for s in (scene, back)
+    )
+    assert np.abs(after - before).max() < 1e-3 * before.max()
+    strong = before > 0.01 * before.max()
+    np.testing.assert_allclose(after[strong], before[strong], rtol=1e-3)
+
+
+PROBES = [[0.010, 0.0], [0.015, 0.0], [0.0, 0.005]]
+
+
+@pytest.mark.parametrize(
+    ("tacton", "drive"),
+    [
+        (Tacton(am_frequency=140, trajectory=CIRCLE, duration=0.1), "pressure_squared"),
+        (Tacton(amplitude=0.6, trajectory=CIRCLE, duration=0.1), "linear"),
+        (Tacton(rhythm=Rhythm(pulses=((0.02, 0.01),)), duration=0.1), "force_corrected"),
+        (Tacton(foci=(0.0, 0.25, 0.5), trajectory=CIRCLE, duration=0.1), "pressure_squared"),
+    ],
+)
+def test_csv_carries_the_load_of_any_tacton(tmp_path, tacton, drive):
+    scene = flat(tacton, drive=drive)
+    back, _ = imported(tmp_path, exported(scene, ".csv", rate=20_000), ".csv")
+    t = np.arange(1999) / 20_000
+    before, after = (s.pressure(np.array(PROBES), t) for s in (scene, back))
+    assert np.abs(after - before).max() < 1e-9 * before.max()
+    assert len(back.tacton.foci) == len(tacton.foci)
+
+
+def test_tidy_csv_takes_its_columns_in_any_order_and_different_paths(tmp_path):
+    text = "# made by hand\nx_m,y_m,t_s,point\n" + "".join(
+        f"{0.001 * k},{0.002 * point},{0.01 * k},{point}\n" for k in range(5) for point in range(3)
+    )
+    scene, notes = imported(tmp_path, text, ".csv")
+    load = scene.pressure
+    t = np.array([0.0, 0.015, 0.03])
+    foci = [[0.0015, 0.002 * point] for point in range(3)]
+    alone = [load.spot(np.array(PROBES), np.array(focus)) for focus in foci]
+    np.testing.assert_allclose(load(np.array(PROBES), t)[1], 50 / 3 * sum(alone), rtol=1e-9)
+    assert any("1/3 of the pressure" in note for note in notes)
+
+
+def test_bare_csv_needs_a_rate(tmp_path):
+    text = "\n".join(f"{x:.6f},{y:.6f},0.15" for x, y in CIRCLE.position(np.arange(400) / 2e4))
+    scene, _ = imported(tmp_path, text, ".csv", rate=20_000)
+    assert scene.tacton.duration == pytest.approx(0.02)
+    assert scene.pressure.height == 0.15
+    with pytest.raises(ValueError, match="--rate"):
+        imported(tmp_path, text, ".csv")
+
+
+def test_a_focus_that_rises_needs_a_height(tmp_path):
+    text = "t_s,x_m,y_m,z_m\n0,0,0,0.2\n0.1,0.01,0,0.21\n"
+    with pytest.raises(ValueError, match="from 200 to 210 mm above the array"):
+        imported(tmp_path, text, ".csv")
+    assert imported(tmp_path, text, ".csv", height=0.2)[0].pressure.height == 0.2
+
+
+@pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint8, np.float32])
+def test_wav_is_a_modulation_at_any_rate(tmp_path, kind):
+    t = np.arange(4410) / 44_100
+    wave = 0.5 * np.sin(2 * np.pi * 140 * t)
+    full = {np.int16: 2**15, np.int32: 2**31, np.uint8: 2**7, np.float32: 1}[kind]
+    samples = (wave * full + (128 if kind is np.uint8 else 0)).astype(kind)
+    wavfile.write(tmp_path / "a.wav", 44_100, samples)
+    content = (tmp_path / "a.wav").read_bytes()
+    for scale, peak in (("full", 0.5), ("peak", 1.0), ("rms", 1.0)):
+        scene, notes = imported(tmp_path, content, ".wav", scale=scale)
+        signal = scene.tacton.signal
+        assert max(signal.samples) == pytest.approx(peak, abs=0.02)
+        assert scene.tacton.duration == pytest.approx(0.1)
+        assert any(f"scale '{scale}'" in note for note in notes)
+    near = np.abs(signal.at(t) - np.sin(2 * np.pi * 140 * t)).max()
+    assert near < 0.02
+
+
+def test_wav_is_an_envelope_of_the_scene_it_is_put_on(tmp_path):
+    wavfile.write(tmp_path / "a.wav", 8000, np.linspace(0, 1, 800).astype(np.float32))
+    base = flat(Tacton(am_frequency=140, trajectory=CIRCLE))
+    scene, _ = read_pattern(tmp_path / "a.wav", Options(role="envelope"), base)
+    assert scene.tacton.trajectory == CIRCLE
+    t = np.array([0.01, 0.05])
+    gain = base.pressure.gain(t) * (t / (799 / 8000)) ** 2
+    np.testing.assert_allclose(scene.pressure.gain(t), gain, rtol=1e-6)
+
+
+def test_wav_out_is_the_commanded_amplitude(tmp_path):
+    tacton = Tacton(amplitude=0.8, am_frequency=80, duration=0.05)
+    back, _ = imported(tmp_path, exported(flat(tacton), ".wav", rate=16_000), ".wav")
+    t = np.arange(800) / 16_000
+    np.testing.assert_allclose(
+        back.tacton.signal.at(t), 0.8 * np.sin(2 * np.pi * 80 * t), atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("asked", [0.5, 4.0, 80.0, 190.98593171027443, 700.0])
+@pytest.mark.parametrize("foci", [1, 3])
+def test_autd_draws_at_the_nearest_frequency_it_can(asked, foci):
+    count, division = steps(asked, foci)
+    assert count % foci == 0
+    assert count <= 8192
+    drawn = 40_000 / count / division
+    assert abs(drawn / asked - 1) < 0.6 * foci * division * asked / 40_000
+
+
+@pytest.mark.parametrize("sharing", ["simultaneous", "time_multiplexed"])
+def test_the_script_states_its_frequency_and_holds_its_foci(sharing):
+    tacton = Tacton(trajectory=CIRCLE, foci=(0.0, 0.5), am_frequency=80, sharing=sharing)
+    script, notes = write_pattern(flat(tacton), ".py", Options())
+    drawn = {"simultaneous": "191.388", "time_multiplexed": "190.476"}[sharing]
+    assert any(f"draws {drawn} Hz where 190.986 Hz" in note for note in notes)
+    tree = compile(script, "script", "exec")
+    assert "FociSTM" in tree.co_names
+    places = next(c for c in (eval_list(script, "PLACES"),))
+    radii = np.linalg.norm(np.array(places), axis=2)
+    np.testing.assert_allclose(radii, 10.0, atol=1e-3)
+    assert radii.shape[1] == (2 if sharing == "simultaneous" else 1)
+    assert max(eval_list(script, "MODULATION")) == 255
+
+
+def eval_list(script, name):
+    text = script.decode().split(f"{name} = ", 1)[1].split("\n\n")[0]
+    text = text.split("\nMODULATION")[0]
+    lines_ = [line.split("#")[0] for line in text.splitlines()]
+    return json.loads("".join(lines_).replace(",]", "]").replace(" ", "").replace(",]", "]"))
+
+
+def test_a_pull_has_no_sound():
+    with pytest.raises(ValueError, match="pulls half of the time"):
+        exported(flat(Tacton(am_frequency=80), drive="linear"), ".csv")
+
+
+def test_an_imported_pattern_runs_on_a_body(tmp_path):
+    text = "t_s,x_m,y_m\n0,0,0\n0.01,0.004,0\n0.02,0,0.004\n"
+    pattern, _ = imported(tmp_path, text, ".csv")
+    body = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
+    scene = Scene(pressure=pattern.pressure, body=body, probes=((0.0, 0.0),))
+    assert np.isfinite(simulate(scene, "auto", 0.3).displacement).all()
+
+
+def test_convert_writes_a_scene_that_runs_and_keeps_what_is_there(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("in.adaptics").write_text(json.dumps(adaptics(keyframe(0), stop(20))))
+    assert main(["convert", "in.adaptics", "out.toml"]) == 0
+    assert "wrote out.toml" in capsys.readouterr().out
+    assert read("out.toml").tacton.trajectory.shape == "circle"
+    assert main(["convert", "in.adaptics", "out.toml"]) == 2
+    assert "out.toml exists and is kept" in capsys.readouterr().err
+    assert main(["convert", "in.adaptics", "out.toml", "--overwrite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["out"] == "out.toml"
+    assert main(["convert", "out.toml", "again.csv", "--rate", "20000", "--quiet"]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["again.csv", "in.adaptics", "out.toml"]
+    assert len(Path("again.csv").read_text().splitlines()) == 401
+    model = ["--model", "point-kernel", "--quiet"]
+    assert main(["run", "out.toml", "--out", "run", *model]) == 0
+
+
+def malformed():
+    """Files that are no patterns, by what is wrong with them."""
+    good = adaptics(keyframe(0), stop(100))
+
+    def with_(**changes):
+        return json.dumps(good | changes).encode()
+
+    jump = {"condition": {"parameter": "near", "operator": {"name": "lt", "params": {}},
+                          "value": 0.5}, "jump_to": 0.0}  # fmt: skip
+    rising = keyframe(100, (0.0, 0.0))
+    rising["coords"]["coords"]["z"] = 30.0
+    random = keyframe(0)
+    random["intensity"]["intensity"] = {"name": "random", "params": {}}
+    nested = {"type": "constant", "value": 1.0}
+    for _ in range(400):
+        nested = {"type": "negate", "value": nested}
+    header = "t_s,point,x_m,y_m,z_m,intensity\n"
+    return {
+        "empty.adaptics": (b"", "not valid JSON"),
+        "cut.adaptics": (with_()[:200], "not valid JSON"),
+        "deep.adaptics": (b"[" * 100_000, "not valid JSON"),
+        "list.adaptics": (b"[]", "not an .adaptics file"),
+        "other.adaptics": (b'{"a": 1}', "not an .adaptics file"),
+        "revision.adaptics": (with_(**{"$REVISION": "2.0"}), "revision '2.0' is unknown"),
+        "none.adaptics": (with_(keyframes=[]), "no keyframes"),
+        "number.adaptics": (with_(keyframes=3), "keyframes = 3 must be a list"),
+        "text.adaptics": (with_(keyframes=["a"]), "must be an object"),
+        "kind.adaptics": (with_(keyframes=[{"time": 0, "type": "hop"}]), "type 'hop'"),
+        "time.adaptics": (with_(keyframes=[stop("now")]), "must be a finite number"),
+        "before.adaptics": (with_(keyframes=[keyframe(-5)]), "before the start"),
+        "brush.adaptics": (with_(keyframes=[keyframe(0, drawn=brush("star"))]), "brush 'star'"),
+        "radius.adaptics": (with_(keyframes=[keyframe(0, drawn=brush(radius="x"))]), "radius"),
+        "wide.adaptics": (with_(keyframes=[keyframe(0, drawn=brush(radius=90))]), "0..60 mm"),
+        "nan.adaptics": (with_().replace(b"10.0", b"NaN"), "must be a finite number"),
+        "param.adaptics": (
+            with_(keyframes=[keyframe(0, drawn=brush(radius={"type": "param", "value": "q"}))]),
+            "parameter 'q' is not defined",
+        ),
+        "formula.adaptics": (
+            with_(keyframes=[keyframe(0, drawn=brush(
+                radius={"type": "formula", "value": {"type": "power", "value": [1, 2]}}))]),
+            "type 'power'",
+        ),
+        "jump.adaptics": (
+            with_(keyframes=[keyframe(0) | {"cjumps": [jump]}, stop(9)]),
+            "conditional jump (cjumps: parameter 'near' lt 0.5)",
+        ),
+        "random.adaptics": (with_(keyframes=[random]), "intensity 'random'"),
+        "rising.adaptics": (with_(keyframes=[keyframe(0), rising]), "above the array"),
+        "long.adaptics": (with_(keyframes=[keyframe(0), stop(20_000)]), "longer than 10 s"),
+        "speed.adaptics": (
+            with_(pattern_transform={"playback_speed": f64(0.0)}), "must be above 0"
+        ),
+        "far.adaptics": (with_(keyframes=[keyframe(0, (190.0, 0.0))]), "within 100 mm"),
+        "empty.csv": (b"", "no focal points"),
+        "binary.csv": (b"\xff\xfe\x00\x01", "not a text file"),
+        "header.csv": (header.encode(), "without focal points"),
+        "column.csv": (b"t_s,x_mm,y_m\n0,0,0\n", "did you mean 'x_m'"),
+        "twice.csv": (b"t_s,x_m,x_m,y_m\n0,0,0,0\n", "twice"),
+        "missing.csv": (b"t_s,x_m\n0,0\n", "column y_m is missing"),
+        "short.csv": (header.encode() + b"0,0,0,0\n", "line 2 has 4 columns"),
+        "word.csv": (header.encode() + b"0,0,a,0,0.2,1\n", "line 2 has 'a'"),
+        "infinite.csv": (header.encode() + b"0,0,inf,0,0.2,1\n", "line 2"),
+        "loud.csv": (header.encode() + b"0,0,0,0,0.2,1.5\n", "0..1"),
+        "points.csv": (header.encode() + b"0,3,0,0,0.2,1\n", "number them from 0"),
+        "falls.csv": (header.encode() + b"0,0,0,0,0,1\n1,0,0,0,0,1\n0.5,0,0,0,0,1\n", "times fall"),
+        "uneven.csv": (header.encode() + b"0,0,0,0,0,1\n0,1,0,0,0,1\n1,1,0,0,0,1\n", "samples"),
+        "bare.csv": (b"0,0\n0.01,0\n", "--rate"),
+        "stands.csv": (header.encode() + b"0,0,0,0,0,1\n0,0,0.01,0,0,1\n", "last 0 s"),
+        "wide.csv": (header.encode() + b"0,0,0,0,0,1\n1,0,0.3,0,0,1\n", "within 100 mm"),
+        "empty.wav": (b"", "not a WAV"),
+        "text.wav": (b"RIFFxxxxWAVE" * 5, "not a WAV"),
+        "silent.wav": (wav(np.zeros(100, np.int16)), "silent"),
+        "stereo.wav": (wav(np.ones((100, 2), np.int16)), "2 channels"),
+        "long.wav": (wav(np.ones(100, np.int16), 5), "longer than 10 s"),
+        "infinite.wav": (wav(np.array([1, np.inf], np.float32)), "not finite"),
+        "loud.wav": (wav(np.array([1, 1.5], np.float32)), "beyond full drive"),
+        "what.txt": (b"", "no known kind of file"),
+    }  # fmt: skip
+
+
+def wav(samples, rate=8000):
+    import io
+
+    file = io.BytesIO()
+    wavfile.write(file, rate, samples)
+    return file.getvalue()
+
+
+MALFORMED = malformed()
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_no_pattern_is_refused_in_one_line(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    content, said = MALFORMED[name]
+    Path(name).write_bytes(content)
+    assert main(["convert", name, "out.toml"]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("skinwave: ")
+    assert printed.count("\n") == 1
+    assert f"{name}: " in printed
+    assert said in printed
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_damaged_pattern_is_read_or_refused(tmp_path, monkeypatch, capsys, seed):
+    rng = np.random.default_rng(seed)
+    suffix = (".adaptics", ".csv", ".wav")[seed % 3]
+    good = {
+        ".adaptics": json.dumps(adaptics(keyframe(0), keyframe(50, (5.0, 0.0)), stop(60))).encode(),
+        ".csv": exported(flat(Tacton(trajectory=CIRCLE, duration=0.01)), ".csv", rate=4000),
+        ".wav": exported(flat(Tacton(am_frequency=80, duration=0.01)), ".wav", rate=4000),
+    }[suffix]
+    changed = bytearray(good)
+    for at in rng.integers(0, len(changed), rng.choice((1, 2, 5))):
+        changed[at] = rng.choice((rng.integers(256), 48, 45))
+    content = bytes(changed[: len(changed) if seed % 2 else rng.integers(len(changed))])
+    (tmp_path / f"pattern{suffix}").write_bytes(content)
+    monkeypatch.chdir(tmp_path)
+    assert main(["convert", f"pattern{suffix}", "out.toml", "--quiet"]) in (0, 2)
+    assert capsys.readouterr().err.count("\n") <= 1
+
+
+WRONG_COMMANDS = [
+    (["missing.csv", "out.toml"], "cannot be read"),
+    (["good.csv", "out.mp3"], "'.mp3' is no known kind of file"),
+    (["good.csv", "nowhere/out.toml"], "cannot be written"),
+    (["good.csv", "."], "is a folder"),
+    (["good.csv", "out.toml", "--height", "900"], "outside 20..600 mm"),
+    (["good.csv", "out.csv", "--rate", "1e6"], "outside 1..40000 Hz"),
+    (["good.csv", "out.wav", "--rate", "0.5"], "choose one"),
+    (["good.csv", "out.toml", "--scene", "missing.toml"], "missing.toml: cannot be read"),
+    (["good.wav", "out.toml", "--role", "sound"], "role of a WAV 'sound' is unknown"),
+    (["good.wav", "out.toml", "--scale", "loud"], "scale 'loud' is unknown"),
+    (["good.wav", "out.toml", "--role", "envelope"], "take it as a modulation"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), WRONG_COMMANDS)
+def test_no_conversion_is_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    Path("good.csv").write_text("t_s,x_m,y_m\n0,0,0\n0.01,0.004,0\n")
+    Path("good.wav").write_bytes(wav(np.array([0.5, -0.5, 0.2], np.float32)))
+    before = sorted(tmp_path.iterdir())
+    assert main(["convert", *arguments]) == 2
+    printed = capsys.readouterr().err
+    assert said in printed
+    assert printed.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
