@@ -54,20 +54,25 @@ def common_raster(views: Sequence[View]) -> Raster:
 def sampler(view: View, raster: Raster) -> Callable[[Floats], Floats]:
     """What carries values (s,) of a view's surface onto a grid (y, x), linear between points."""
     X, Y = np.meshgrid(raster.x, raster.y)
+    return carrier(view, np.stack([X, Y], axis=-1))
+
+
+def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
+    """What carries values (s,) of a view's surface to places (..., 2), linear between points."""
     x, y = view.places.T
-    found: Any = Triangulation(x, y, view.triangles).get_trifinder()(X, Y)
-    corners = view.places[view.triangles[found]]  # (y, x, 3, 2)
+    found: Any = Triangulation(x, y, view.triangles).get_trifinder()(places[..., 0], places[..., 1])
+    corners = view.places[view.triangles[found]]  # (..., 3, 2)
     edges = corners[..., 1:, :] - corners[..., :1, :]
-    inner = np.linalg.solve(
-        edges.swapaxes(-1, -2), (np.stack([X, Y], -1) - corners[..., 0, :])[..., None]
-    )
-    weights = np.concatenate([1 - inner.sum(axis=-2), inner[..., 0]], axis=-1)
+    inside = (places - corners[..., 0, :])[..., None]
+    second_third = np.linalg.solve(edges.swapaxes(-1, -2), inside)[..., 0]
+    first = 1 - second_third.sum(axis=-1, keepdims=True)
+    weights = np.concatenate([first, second_third], axis=-1)
     weights[found < 0] = np.nan
 
-    def sampled(values: Floats) -> Floats:
+    def carried(values: Floats) -> Floats:
         return np.asarray((values[view.triangles[found]] * weights).sum(axis=-1))
 
-    return sampled
+    return carried
 
 
 def decibel(view: View) -> Floats:
