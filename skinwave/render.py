@@ -96,7 +96,9 @@ def stage(
     single view, motion in its own unit.
     """
     import pyvista as pv
+    from vtkmodules.vtkCommonCore import vtkLogger
 
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # of displays that are not asked for
     width, height = panel or style.panel
     share = [width / COLUMN] * len(views) + [1.0]
     plotter = pv.Plotter(

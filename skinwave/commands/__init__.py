@@ -3,7 +3,7 @@
 The one line of a module is its help. Whatever is slow to import is imported in `run`.
 """
 
-from skinwave.commands import compare, plan, run, tradeoff, verify
+from skinwave.commands import compare, doctor, film, plan, report, run, tradeoff, verify
 
 COMMANDS = {
     "run": run,
@@ -11,4 +11,7 @@ COMMANDS = {
     "tradeoff": tradeoff,
     "plan": plan,
     "verify": verify,
+    "report": report,
+    "film": film,
+    "doctor": doctor,
 }
