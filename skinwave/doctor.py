@@ -15,9 +15,9 @@ THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 DRAWING = ("matplotlib", "pyvista", "vtk", "imageio", "pillow")
 # module, distribution, what is missing without it
 OPTIONAL = (
-    ("mkl", "mkl", "the fastest solver: pip install 'skinwave[fast]'"),
-    ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install 'skinwave[film]'"),
-    ("trame_pyvista", "trame-pyvista", "a view that can be turned: pip install 'skinwave[web]'"),
+    ("mkl", "mkl", "the fastest solver: pip install mkl (x86-64)"),
+    ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio-ffmpeg"),
+    ("trame_pyvista", "trame-pyvista", "a view that can be turned: pip install trame-pyvista"),
 )
 
 

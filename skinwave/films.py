@@ -60,10 +60,11 @@ def check_format(path: Path) -> None:
 
 
 def seam(view: View) -> str:
-    """How a view's film ends, in words."""
+    """What part of a view's motion is shown, and whether it repeats without a seam, in words."""
+    span = f"{1e3 * view.period:.3g} ms"
     if period(view.scene.pressure) is not None:
-        return f"one period of {1e3 * view.period:.3g} ms, without a seam"
-    return f"{1e3 * view.period:.3g} ms: the load has no period of its own, and the film a seam"
+        return f"one period of {span}, which repeats without a seam"
+    return f"{span}, a period of the slowest tone; the load as a whole has none and leaves a seam"
 
 
 def _frames(

@@ -83,7 +83,10 @@ def _spatial(
     if len(own.tets):
         progress("draw cut open", 0.0)
         cut = render.picture([own], style, frame, camera="front", cut=True)
-        caption = f"{label(own.body)} cut open along y = 0: {render.shown_scale(own)}. {MARKS}"
+        caption = (
+            f"{label(own.body)} cut open along y = 0, the section below the black line: "
+            f"{render.shown_scale(own)}. {MARKS}"
+        )
         parts.append(gallery.image("cut-open", cut, caption))
     progress("draw from above", 0.0)
     above = render.picture(views, style, frame, camera="top")
@@ -93,7 +96,10 @@ def _spatial(
     if page is None:
         parts.append(report.paragraph(f"The view that can be turned is left out: {EXTRA}."))
     else:
-        caption = f"To be turned with the mouse: {label(own.body)}, {render.shown_scale(own)}."
+        caption = (
+            f"To be turned with the mouse: {label(own.body)}, {render.shown_scale(own)}; red into "
+            f"the body, blue out of it, both by up to {maps.peak_text(own)}."
+        )
         parts.append(report.inner_page(page, caption))
     return parts
 
@@ -107,13 +113,13 @@ def _flat(
     yield "rms", lambda: maps.rms_figure(views, style), RMS
     if kernel and bodies:
         yield "difference", lambda: maps.difference_figure(kernel, bodies, style), DIFFERENCE
-    yield "snapshots", lambda: maps.snapshots_figure(views, style), f"{SNAPSHOTS} {seam(views[0])}."
+    yield "snapshots", lambda: maps.snapshots_figure(views, style), SNAPSHOTS
     yield "waves", lambda: maps.waves_figure(views, style), WAVES
 
 
 def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
     """Waveforms, spectra and what is felt, for every Tacton of an album."""
-    parts = []
+    parts: list[str] = []
     for name, runs in tactons(album).items():
         progress(f"draw {name}", 0.0)
         caption = "Waveforms and spectra. Rows are probes."
@@ -173,7 +179,7 @@ DIFFERENCE = (
 )
 SNAPSHOTS = (
     "The surface through a period. Behind a focus that is faster than the surface wave, the Mach "
-    "angle asin(c/v); no clean cone forms on a circle smaller than a wavelength. Shown is"
+    "angle asin(c/v); no clean cone forms on a circle smaller than a wavelength."
 )
 WAVES = (
     "Motion over place and time in the steady state. Above: outwards along x from the path's "

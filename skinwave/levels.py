@@ -16,7 +16,7 @@ from skinwave.styles import Style
 
 LOWEST_LEVEL = -30.0  # dB re threshold, below which lines are left out
 MOST_NAMED = 9  # lines of a panel
-APART = 0.05  # of the frequency, within which two names would be drawn over each other
+APART = 0.13  # of the frequency, within which two names would be drawn over each other
 
 
 def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:

@@ -200,7 +200,7 @@ def _add(plotter: Any, panel: Panel, style: Style, limit: float, small: float, *
     view = panel.view
     actor = plotter.add_mesh(
         panel.skin, scalars="motion", cmap=SIGNED, clim=(-limit, limit), show_scalar_bar=False,
-        ambient=0.3, diffuse=0.8, specular=0.0, lighting=lit,
+        ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
     add_marks(plotter, panel, "black")
     own = colour(view.body)

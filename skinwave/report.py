@@ -76,12 +76,13 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def claims_table(verdicts: list[Verdict]) -> str:
-    """Statements down, bodies across: holds or fails, and the sentence that decides."""
+    """Statements that were judged down, bodies across: holds or fails, and what decides."""
     bodies = list(dict.fromkeys(v.body for v in verdicts))
     found = {(v.claim, v.body): v for v in verdicts}
     rows = [
         [f"{claim}: {TEXTS[claim]}", *(_verdict(found.get((claim, body))) for body in bodies)]
         for claim in TEXTS
+        if any(claim == verdict.claim for verdict in verdicts)
     ]
     return table(["statement", *map(label, bodies)], rows)
 

@@ -20,6 +20,7 @@ from skinwave.study import modelled
 from skinwave.styles import Style
 
 TABLED = 12  # lines in the table of lines
+ROUND_OFF = 1e-9  # of the strongest line
 
 
 def write_report(
@@ -118,25 +119,43 @@ def _modelled(album: Album) -> list[str]:
 
 
 def _lines(runs: Sequence[Run]) -> str:
-    """The strongest lines of each body at the probe that moves most, and how far they are felt."""
-    probe, rows = strongest_probe(runs), []
+    """Lines of each model at the probe that moves most, the strongest of any first."""
+    probe = strongest_probe(runs)
+    share = {
+        name: max(
+            run.lines[name][probe] / max(x[probe] for x in run.lines.values()) for run in runs
+        )
+        for name in runs[0].lines
+    }
+    names = sorted(share, key=lambda name: -share[name])[:TABLED]
+    felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
+    rows = [
+        [name, f"{runs[0].frequencies[name]:.2f}"]
+        + [cell for run, levels in zip(runs, felt, strict=True)
+           for cell in _amplitude(run, name, probe, levels)]
+        for name in names
+    ]  # fmt: skip
+    header = ["line", "frequency, Hz"]
     for run in runs:
-        unit, per = ("Pa", 1.0) if run.response.unit == "Pa" else ("µm", 1e6)
-        felt = felt_lines(run, probe) if unit == "µm" else {}
-        names = sorted(run.lines, key=lambda name: -run.lines[name][probe])[:TABLED]
-        rows += [
-            [label(run.body), name, f"{run.frequencies[name]:.2f}",
-             f"{per * run.lines[name][probe]:.3g} {unit}", _level(felt.get(name))]
-            for name in names if run.lines[name][probe] > 1e-3 * run.lines[names[0]][probe]
-        ]  # fmt: skip
+        pascal = run.response.unit == "Pa"
+        header += [f"{label(run.body)}, {'Pa' if pascal else 'µm'} peak"]
+        header += [] if pascal else ["dB re threshold"]
     x, y = 1e3 * runs[0].response.probes[probe]
-    return report.section(f"Lines at ({x:g}, {y:g}) mm", report.table(
-        ["model", "line", "frequency, Hz", "amplitude, peak", "dB above threshold"], rows)
-    ).replace("h2>", "h3>")  # fmt: skip
+    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + report.table(header, rows)
+
+
+def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
+    """A line's amplitude and, of a body, its level above threshold; 0 if it is round-off."""
+    strongest = max(float(x[probe]) for x in run.lines.values())
+    if run.lines[name][probe] < ROUND_OFF * strongest:
+        return ["0"] if run.response.unit == "Pa" else ["0", ""]
+    if run.response.unit == "Pa":
+        return [f"{run.lines[name][probe]:.3g}"]
+    return [f"{1e6 * run.lines[name][probe]:.3g}", _level(levels.get(name))]
 
 
 def _level(level: float | None) -> str:
-    return "" if level is None or level < -200 else f"{level:+.0f}"
+    return "" if level is None or level < -200 else f"{round(level):+d}"
 
 
 def _comparison(album: Album) -> list[str]:

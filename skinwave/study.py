@@ -223,7 +223,7 @@ OVERVIEW_CAPTION = (
 LEFT_OUT = (
     "The point kernel is drawn as published: linear drive law q = A M(t) S(D) with "
     "S = sinc^2(D/D0) and no propagation. What it predicts is a stimulation in Pa. The bodies "
-    "are linear and elastic with viscous loss, on 10-node tetrahedra, reduced to the probes. "
+    "are linear and elastic with viscous loss, on 10-node tetrahedra, with few unknowns left. "
     "Their lines at 2 f_AM and, in AM+STM, at n f_d come from their drive law as much as from "
     "waves: pressure_squared, because a device that modulates its sound pressure pushes with "
     "the square of it.",

@@ -50,6 +50,9 @@ def _export(view: View, frame: int, path: str) -> None:
     )
     add_marks(plotter, panel, "black")
     look(plotter, "tilted", [panel])
+    plotter.camera.parallel_projection = False  # which the page does not take over
+    plotter.reset_camera()
+    plotter.camera.zoom(1.3)
     asyncio.run(ready())
     plotter.trame.export_html(path)
     plotter.close()
