@@ -12,11 +12,11 @@ from skinwave.effort import versions
 from skinwave.renderer import renderer
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-DRAWING = ("matplotlib", "pyvista", "vtk", "imageio", "pillow")
+DRAWING = ("matplotlib", "pyvista", "vtk", "pillow")
 # module, distribution, what is missing without it
 OPTIONAL = (
     ("mkl", "mkl", "the fastest solver: pip install mkl (x86-64)"),
-    ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio-ffmpeg"),
+    ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio imageio-ffmpeg"),
     ("trame_pyvista", "trame-pyvista", "a view that can be turned: pip install trame-pyvista"),
 )
 

@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
     return path
 
 
-def _grid(view: View, frame: int):  # type: ignore[no-untyped-def]
+def _grid(view: View, frame: int) -> Any:
     import pyvista as pv
 
     if not len(view.tets):

@@ -16,7 +16,7 @@ from skinwave.views import View
 
 LASTS = 4.0  # s that a period lasts on the screen
 FORMATS = (".gif", ".mp4")
-ENCODER = "imageio-ffmpeg"
+ENCODER = ("imageio", "imageio_ffmpeg")
 SHADES = 240  # colours of a GIF that are found in its frames; the rest are those of the page
 
 
@@ -55,8 +55,11 @@ def check_format(path: Path) -> None:
     """
     if path.suffix not in FORMATS:
         raise ValueError(f"film '{path.name}' ends in none of {', '.join(FORMATS)}; name it .gif")
-    if path.suffix == ".mp4" and find_spec("imageio_ffmpeg") is None:
-        raise ValueError(f"MP4 needs {ENCODER}, which is not installed; install it or name it .gif")
+    if path.suffix == ".mp4" and not all(map(find_spec, ENCODER)):
+        raise ValueError(
+            "MP4 needs imageio and imageio-ffmpeg, which are not installed; install the extra "
+            "[film], or name it .gif"
+        )
 
 
 def seam(view: View) -> str:

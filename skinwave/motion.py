@@ -124,6 +124,8 @@ def from_rest(moved: Waves, times: Floats) -> Floats:
 def vibration(moved: Waves, times: Floats) -> Floats:
     """Reduced coordinates (t, r) of the steady state about its mean at times as in `from_rest`."""
     moving = moved.frequencies > 0
+    if not moving.any():
+        return np.zeros((len(times), moved.lines.shape[1]))
     rates = np.asarray(2j * np.pi * moved.frequencies[moving], np.complex128)
     return fem.exponential_sum(rates, moved.lines[moving], times)
 

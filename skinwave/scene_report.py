@@ -21,6 +21,7 @@ from skinwave.styles import Style
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
+JUDGED = 0.5  # s that a Tacton must last for statements about its lines to be judged
 
 
 def write_report(
@@ -121,12 +122,9 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    share = {
-        name: max(
-            run.lines[name][probe] / max(x[probe] for x in run.lines.values()) for run in runs
-        )
-        for name in runs[0].lines
-    }
+    if not runs[0].lines:
+        return report.paragraph("A constant pressure on a focus at rest has no line.")
+    share = {name: max(_share(run, name, probe) for run in runs) for name in runs[0].lines}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
     felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
     rows = [
@@ -144,10 +142,15 @@ def _lines(runs: Sequence[Run]) -> str:
     return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + report.table(header, rows)
 
 
+def _share(run: Run, name: str, probe: int) -> float:
+    """A line's amplitude over that of the strongest."""
+    strongest = max(float(x[probe]) for x in run.lines.values())
+    return float(run.lines[name][probe]) / strongest if strongest else 0.0
+
+
 def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
     """A line's amplitude and, of a body, its level above threshold; 0 if it is round-off."""
-    strongest = max(float(x[probe]) for x in run.lines.values())
-    if run.lines[name][probe] < ROUND_OFF * strongest:
+    if _share(run, name, probe) < ROUND_OFF:
         return ["0"] if run.response.unit == "Pa" else ["0", ""]
     if run.response.unit == "Pa":
         return [f"{run.lines[name][probe]:.3g}"]
@@ -163,7 +166,8 @@ def _comparison(album: Album) -> list[str]:
     parts = []
     if any(len(runs) > 1 for runs in groups.values()):
         parts.append(report.agreement_table(groups))
-    verdicts = evaluate(album.runs)
+    long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
+    verdicts = evaluate(long)
     if verdicts:
         parts.append(report.paragraph("What Lim, Seifi and Park state, evaluated on these runs:"))
         parts.append(report.claims_table(verdicts))

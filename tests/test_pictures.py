@@ -197,7 +197,7 @@ def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch)
     with pytest.raises(ValueError, match="ends in none of"):
         films.check_format(tmp_path / "film.avi")
     monkeypatch.setattr(films, "find_spec", lambda name: None)
-    with pytest.raises(ValueError, match="MP4 needs imageio-ffmpeg"):
+    with pytest.raises(ValueError, match="MP4 needs imageio"):
         films.check_format(tmp_path / "film.mp4")
 
 

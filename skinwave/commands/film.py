@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from skinwave.commands.common import (
     add_mesh,
@@ -10,6 +11,10 @@ from skinwave.commands.common import (
     progress_of,
     summarise,
 )
+
+if TYPE_CHECKING:
+    from skinwave.effort import Progress
+    from skinwave.views import View
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +61,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _views(options: argparse.Namespace, progress):  # type: ignore[no-untyped-def]
+def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
+    """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
     from skinwave.album import answers, open_album
     from skinwave.scene_file import read
 
