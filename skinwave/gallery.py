@@ -185,7 +185,8 @@ WAVES = (
     "Motion over place and time in the steady state. Above: outwards along x from the path's "
     "outermost point; the dashed lines x = c t are those of a surface wave far from its source in "
     "a deep or endless body. Near the path and in thin slabs the phase runs ahead of them, a "
-    "clamped sheet stands rather than runs, and in the point kernel nothing runs at all. Below: along the path; the focus runs along the black lines."
+    "clamped sheet stands rather than runs, and in the point kernel nothing runs at all. "
+    "Below: along the path; the focus runs along the black lines."
 )
 FELT = (
     "Lines of the motion at the probe that moves most, beside the threshold of detection (a focal "
