@@ -122,7 +122,7 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
-    summary = f"{tactons} Tactons took {spent:.0f} s in all, peak memory {peak:.2f} GiB. {named}"
+    summary = f"{tactons} Tacton{'s' * (tactons != 1)} took {spent:.0f} s in all, peak memory {peak:.2f} GiB. {named}"
     return table(header, rows) + paragraph(summary)
 
 

@@ -88,6 +88,15 @@ def test_a_point_moves_in_a_view_as_its_probe_does(scene):
     np.testing.assert_allclose(drawn, sampled - response.displacement[-100:, 2].mean(), atol=3e-8)
 
 
+def test_a_constant_pressure_at_rest_makes_still_pictures():
+    still = MovingPressure(tacton=Tacton(duration=0.02))
+    scene = Scene(pressure=still, body=Body(width=0.06, height=0.06))
+    view = views.body_view(scene, "slab", motion.waves(scene, h=0.015), 3)
+    assert not view.motion.any()
+    assert view.tone == 0
+    assert len(maps.snapshots_figure([view], style("print"), 2).axes) == 3
+
+
 def test_the_kernels_brightest_place_lies_on_the_path(seen):
     view = seen["none"]
     radius = view.scene.tacton.trajectory.size / 2
