@@ -7,6 +7,7 @@ from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, lines, spectrum, tacton_lines
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
+from simple_model.threshold import sensation_level, threshold
 from simple_model.trajectory import SHAPES, Trajectory
 
 __all__ = [
@@ -27,6 +28,8 @@ __all__ = [
     "modulation",
     "point_kernel",
     "relative_intensity",
+    "sensation_level",
     "spectrum",
     "tacton_lines",
+    "threshold",
 ]

@@ -150,6 +150,7 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
         style: dict[str, Any] = {"color": colour(run.body), "zorder": _depth(run)}
         ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
         lines = np.array([[run.frequencies[n], run.lines[n][p]] for n in run.frequencies])
+        lines = lines.reshape(-1, 2)  # a constant pressure has none
         height = 20 * np.log10(np.maximum(lines[:, 1] / top, 1e-12))
         seen = height > FLOOR
         ax.plot(lines[seen, 0], height[seen], ls="", marker=marker(run.body), ms=4, **style)

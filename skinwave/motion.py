@@ -1,4 +1,7 @@
-"""Motion of a whole body, for pictures."""
+"""Motion of a whole body, for pictures.
+
+u(x, t) = basis [Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)]
+"""
 
 from dataclasses import dataclass
 
@@ -28,6 +31,23 @@ class Field:
     effort: Effort
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Waves:
+    """All of a body's motion under a load, in the reduced coordinates that its nodes share.
+
+    `basis` (3 n, r) of the nodes of `mesh`; complex `lines` (f, r) at `frequencies` (f,) in Hz;
+    the free vibration that the start leaves, complex `start` (m, r) at `poles` (m,) in 1/s.
+    """
+
+    mesh: TetMesh
+    basis: Floats
+    frequencies: Floats
+    lines: fem.Complex
+    poles: fem.Complex
+    start: fem.Complex
+    effort: Effort
+
+
 def field(
     scene: Scene,
     times: Floats,
@@ -47,6 +67,20 @@ def field(
     ValueError
         If the scene has no body, a number is out of range or the tolerance is out of reach.
     """
+    moved = waves(scene, tolerance, progress, h=h, solver=solver)
+    displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
+    return Field(mesh=moved.mesh, times=times, displacement=displacement, effort=moved.effort)
+
+
+def waves(
+    scene: Scene,
+    tolerance: float = 0.02,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> Waves:
+    """What `field` is made of, for as many times as one likes; raises what `field` does."""
     check_knobs(solver, h=h)
     clock, report = Clock(), progress or silent
     build = meshed(scene.body, h, clock, report)
@@ -66,9 +100,6 @@ def field(
         lines, start = fem.line_response(poles, forces, frequencies)
         power = fem.mean_power(model.C, model.R, forces, lines, frequencies)
         imbalance, radiated = energy_balance(power)
-        rates = np.concatenate([2j * np.pi * frequencies, poles.values])
-        coordinates = fem.exponential_sum(rates, np.vstack([lines, start]), times)
-        displacement = coordinates @ model.basis.T
     effort = Effort(
         seconds=clock.seconds,
         dofs=len(operators.free),
@@ -81,5 +112,30 @@ def field(
         radiated=radiated,
         versions=versions(),
     )
-    displacement = displacement.reshape(len(times), -1, 3)
-    return Field(mesh=build.mesh, times=times, displacement=displacement, effort=effort)
+    return Waves(
+        mesh=build.mesh, basis=model.basis, frequencies=frequencies, lines=lines,
+        poles=poles.values, start=start, effort=effort,
+    )  # fmt: skip
+
+
+def from_rest(moved: Waves, times: Floats) -> Floats:
+    """Reduced coordinates (t, r) after a start from rest at equally spaced times (t,) from 0."""
+    rates = np.concatenate([2j * np.pi * moved.frequencies, moved.poles])
+    return fem.exponential_sum(rates, np.vstack([moved.lines, moved.start]), times)
+
+
+def vibration(moved: Waves, times: Floats) -> Floats:
+    """Reduced coordinates (t, r) of the steady state about its mean at times as in `from_rest`."""
+    moving = moved.frequencies > 0
+    if not moving.any():
+        return np.zeros((len(times), moved.lines.shape[1]))
+    rates = np.asarray(2j * np.pi * moved.frequencies[moving], np.complex128)
+    return fem.exponential_sum(rates, moved.lines[moving], times)
+
+
+def line_amplitudes(moved: Waves, read: sparse.csr_array) -> tuple[Floats, Floats]:
+    """Frequencies (f,) in Hz above 0 and amplitudes (f, p) in metre that an operator (p, 3 n)
+    reads.
+    """
+    moving = moved.frequencies > 0
+    return moved.frequencies[moving], np.abs(moved.lines[moving] @ (read @ moved.basis).T)

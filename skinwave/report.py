@@ -26,7 +26,11 @@ td, th { border-bottom: 1px solid #ddd; padding: 0.3em 0.6em; text-align: left;
 td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .yes { color: #00684c; font-weight: 600; } .no { color: #a33c00; font-weight: 600; }
 small { color: #555; } code { background: #f3f3f3; padding: 0 0.25em; }
-@media print { body { margin: 0; font-size: 11px; } figure, tr { break-inside: avoid; } }
+iframe { border: 1px solid #ddd; width: 100%; height: 30em; } pre { white-space: pre-wrap; }
+@page { size: A4; margin: 14mm; }
+@media print { body { margin: 0; padding: 0; max-width: none; font-size: 11px; }
+  figure, tr, pre { break-inside: avoid; } h2, h3 { break-after: avoid; } .screen { display: none; }
+  .wide { overflow: visible; } table { font-size: 9px; width: 100%; } }
 </style></head><body>
 <h1>$title</h1>
 $body
@@ -49,13 +53,19 @@ def paragraph(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
-def picture(drawn: bytes, caption: str, name: str = "") -> str:
-    """A PNG inside the page."""
+def picture(drawn: bytes, caption: str, name: str = "", kind: str = "png") -> str:
+    """A picture inside the page: PNG, or another kind that browsers know."""
     return (
         f'<figure id="{escape(name)}"><img alt="{escape(caption)}" '
-        f'src="data:image/png;base64,{b64encode(drawn).decode()}">'
+        f'src="data:image/{kind};base64,{b64encode(drawn).decode()}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
+
+
+def inner_page(page: str, caption: str) -> str:
+    """A page within the page, on screens only."""
+    frame = f'<iframe title="{escape(caption)}" srcdoc="{escape(page)}"></iframe>'
+    return f'<figure class="screen">{frame}<figcaption>{escape(caption)}</figcaption></figure>'
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -66,12 +76,13 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def claims_table(verdicts: list[Verdict]) -> str:
-    """Statements down, bodies across: holds or fails, and the sentence that decides."""
+    """Statements that were judged down, bodies across: holds or fails, and what decides."""
     bodies = list(dict.fromkeys(v.body for v in verdicts))
     found = {(v.claim, v.body): v for v in verdicts}
     rows = [
         [f"{claim}: {TEXTS[claim]}", *(_verdict(found.get((claim, body))) for body in bodies)]
         for claim in TEXTS
+        if any(claim == verdict.claim for verdict in verdicts)
     ]
     return table(["statement", *map(label, bodies)], rows)
 
@@ -111,7 +122,8 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
-    summary = f"{tactons} Tactons took {spent:.0f} s in all, peak memory {peak:.2f} GiB. {named}"
+    counted = f"{tactons} Tacton{'s' * (tactons != 1)}"
+    summary = f"{counted} took {spent:.0f} s in all, peak memory {peak:.2f} GiB. {named}"
     return table(header, rows) + paragraph(summary)
 
 

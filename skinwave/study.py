@@ -103,7 +103,7 @@ def write_single(folder: Path, run: Run) -> None:
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
     parts = [
-        report.picture(png(figure), _caption(run.tacton, [run]), "tacton"),
+        report.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *(report.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
         report.section("Effort", report.effort_table({run.body: run.response.effort}, 1)),
         report.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
@@ -151,7 +151,7 @@ def _write_page(
     for k, (name, group) in enumerate(groups.items()):
         progress("draw", k / len(groups))
         figure = tacton_figure(name, group)
-        pictures.append(_picture(folder, name, figure, _caption(name, group)))
+        pictures.append(_picture(folder, name, figure, caption(name, group)))
     shown = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
     overview = overview_figure(shown, min(2, len(runs[0].scene.probes) - 1))
     shown_first = _picture(folder, "overview", overview, OVERVIEW_CAPTION)
@@ -174,7 +174,7 @@ def _write_page(
             *map(report.paragraph, _disagreements(outcome.verdicts)),
         ),
         report.section("What was modelled, and what was left out",
-                       *map(report.paragraph, _modelled(runs))),
+                       *map(report.paragraph, modelled(runs))),
         report.section("Every Tacton", *pictures),
         report.section("How far the models agree", report.agreement_table(groups)),
         report.section("Effort", report.effort_table(efforts, len(groups), outcome.seconds)),
@@ -227,7 +227,7 @@ OVERVIEW_CAPTION = (
 LEFT_OUT = (
     "The point kernel is drawn as published: linear drive law q = A M(t) S(D) with "
     "S = sinc^2(D/D0) and no propagation. What it predicts is a stimulation in Pa. The bodies "
-    "are linear and elastic with viscous loss, on 10-node tetrahedra, reduced to the probes. "
+    "are linear and elastic with viscous loss, on 10-node tetrahedra, with few unknowns left. "
     "Their lines at 2 f_AM and, in AM+STM, at n f_d come from their drive law as much as from "
     "waves: pressure_squared, because a device that modulates its sound pressure pushes with "
     "the square of it.",
@@ -235,7 +235,7 @@ LEFT_OUT = (
 )
 
 
-def _modelled(runs: list[Run]) -> list[str]:
+def modelled(runs: list[Run]) -> list[str]:
     """What the bodies are, and what that leaves out, in sentences."""
     sentences = [LEFT_OUT[0]]
     for body in dict.fromkeys(run.body for run in runs if run.scene.body.kind != "none"):
@@ -266,7 +266,8 @@ def _body_sentence(runs: list[Run]) -> str:
     )
 
 
-def _caption(name: str, group: list[Run]) -> str:
+def caption(name: str, group: list[Run]) -> str:
+    """What a Tacton's figure shows."""
     tacton = group[0].scene.tacton
     path = tacton.trajectory
     parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency else []

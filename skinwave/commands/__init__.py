@@ -3,7 +3,18 @@
 The one line of a module is its help. Whatever is slow to import is imported in `run`.
 """
 
-from skinwave.commands import compare, convert, mesh, plan, run, tradeoff, verify
+from skinwave.commands import (
+    compare,
+    convert,
+    doctor,
+    film,
+    mesh,
+    plan,
+    report,
+    run,
+    tradeoff,
+    verify,
+)
 
 COMMANDS = {
     "run": run,
@@ -13,4 +24,7 @@ COMMANDS = {
     "mesh": mesh,
     "convert": convert,
     "verify": verify,
+    "report": report,
+    "film": film,
+    "doctor": doctor,
 }

@@ -1,0 +1,28 @@
+"""What is installed here, what draws and solves, and what is missing."""
+
+import argparse
+import json
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument("--debug", action="store_true", help="traceback of an error")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.doctor import examine
+
+    found = examine()
+    if options.json:
+        print(json.dumps([{"what": f.what, "value": f.value, "cure": f.cure} for f in found]))
+        return 0
+    width = max(len(finding.what) for finding in found)
+    for finding in found:
+        print(f"{finding.what:<{width}}  {finding.value}")
+        if finding.cure:
+            print(f"{'':<{width}}  -> {finding.cure}")
+    missing = sum(bool(finding.cure) for finding in found)
+    print(f"{missing} of {len(found)} could be better" if missing else "nothing is missing")
+    return 0

@@ -1,0 +1,80 @@
+"""A period of motion as a film, models side by side."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skinwave.commands.common import (
+    add_mesh,
+    add_reporting,
+    metre,
+    progress_of,
+    summarise,
+)
+
+if TYPE_CHECKING:
+    from skinwave.effort import Progress
+    from skinwave.views import View
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument(
+        "source", type=Path, metavar="SCENE|DIR",
+        help="scene file, or a folder that report wrote: then no model is run",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, metavar="FILE", help=".gif (default) or .mp4")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    parser.add_argument("--style", choices=("report", "talk", "print"), default="report")
+    parser.add_argument("--camera", choices=("tilted", "front", "top"), default="tilted")
+    parser.add_argument("--frames", type=int, default=40, help="of a scene; 40 if not given")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    add_mesh(parser)
+    add_reporting(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.films import check_format, film, seam
+    from skinwave.renderer import renderer
+    from skinwave.styles import style
+
+    source = options.source
+    out = options.out or Path(f"{source.resolve().stem}.gif")
+    check_format(out)
+    if out.exists() and not options.overwrite:
+        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
+    if not 2 <= options.frames <= 1000:
+        raise ValueError(f"frames = {options.frames} is outside 2..1000; a film needs a few")
+    if not renderer().found:
+        raise ValueError(f"there is nothing to draw a film with: {renderer().said}")
+    with progress_of(options) as progress:
+        views = _views(options, progress)
+        aside = out.with_name(f"{out.stem}.partial{out.suffix}")
+        try:
+            film(aside, views, style(options.style), progress, camera=options.camera)
+            aside.replace(out)
+        finally:
+            aside.unlink(missing_ok=True)
+    summary = {"out": str(out), "frames": len(views[0].times), "period_ms": 1e3 * views[0].period}
+    summarise(options, summary, f"{len(views[0].times)} frames of {seam(views[0])}; wrote {out}")
+    return 0
+
+
+def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
+    """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
+    from skinwave.album import answers, open_album
+    from skinwave.scene_file import read
+
+    if not options.source.is_dir():
+        found = answers(
+            read(options.source), progress, h=metre(options.h), solver=options.solver,
+            frames=options.frames,
+        )  # fmt: skip
+        return [view for view, _ in found]
+    if views := list(open_album(options.source).views.values()):
+        return views
+    raise ValueError(
+        f"{options.source} keeps no motion of whole bodies; give its scene.toml, or a folder "
+        "that skinwave report wrote"
+    )

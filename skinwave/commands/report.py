@@ -1,0 +1,56 @@
+"""One page of a scene or of a result folder: what was asked, modelled, found and trusted."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise
+
+STYLES, FORMATS = ("report", "talk", "print"), ("png", "svg", "pdf")
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument(
+        "source", type=Path, metavar="SCENE|DIR",
+        help="scene file, or a folder that run, compare or report wrote: then no model is run",
+    )  # fmt: skip
+    parser.add_argument("--style", choices=STYLES, default="report")
+    parser.add_argument(
+        "--format", choices=FORMATS, action="append", default=["png"],
+        help="of figures, beside PNG; may be given twice",
+    )  # fmt: skip
+    add_mesh(parser)
+    add_output(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.files import output_folder
+    from skinwave.scene_file import read
+    from skinwave.scene_report import write_report
+    from skinwave.styles import style
+
+    source, made = options.source, options.source.is_dir()
+    scene = None if made else read(source)
+    out = options.out or (source / "report" if made else Path(f"{source.stem}-report"))
+    # The report inside a result folder is this command's own, and made anew.
+    anew = options.overwrite or (made and options.out is None)
+    with (
+        output_folder(out, overwrite=anew) as folder,
+        progress_of(options) as progress,
+    ):
+        if scene is not None:
+            from skinwave.album import make
+
+            make(
+                folder, scene, progress, h=metre(options.h), solver=options.solver,
+                command=f"skinwave report {source.name}",
+            )  # fmt: skip
+        write_report(
+            folder if scene is not None else source, folder, style(options.style), progress,
+            formats=options.format,
+        )  # fmt: skip
+        size = (folder / "index.html").stat().st_size
+    summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
+    summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")
+    return 0

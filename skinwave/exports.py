@@ -1,0 +1,91 @@
+"""Results for other programs: tables, sound, and fields that ParaView opens."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simple_model import Response
+from simple_model.response import step
+from skinwave.views import View
+
+FIELD_FRAMES = 8  # of a period, written for ParaView
+FULL_SCALE = 32767
+
+
+def write_probes(stem: Path, response: Response) -> None:
+    """`stem`.csv, a column a probe with its unit and place in the header, and `stem`.npz with
+    `t` s, `probes` m and `displacement` (t, p) in m or, of the point kernel, `pressure` in Pa.
+    """
+    kind = "pressure" if response.unit == "Pa" else "displacement"
+    places = [f"({1e3 * x:g}, {1e3 * y:g}) mm" for x, y in response.probes]
+    with open(stem.with_suffix(".csv"), "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)])
+        for t, row in zip(response.times, response.displacement, strict=True):
+            writer.writerow([f"{t:.9g}", *(f"{value:.9g}" for value in row)])
+    arrays = {"t": response.times, "probes": response.probes, kind: response.displacement}
+    np.savez(stem.with_suffix(".npz"), **arrays)  # type: ignore[arg-type]
+
+
+def write_sound(folder: Path, response: Response, probe: int) -> Path:
+    """A probe's waveform about its mean as a WAV file (16 bit, mono), at its own rate of sampling.
+
+    The largest value that the format holds is that of the waveform; the name says how much it is.
+    """
+    from scipy.io import wavfile
+
+    motion = response.displacement[:, probe] - response.displacement[:, probe].mean()
+    largest = float(np.abs(motion).max())
+    unit, per = ("Pa", 1.0) if response.unit == "Pa" else ("um", 1e6)
+    x, y = 1e3 * response.probes[probe]
+    path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{per * largest:.4g}_{unit}.wav"
+    samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
+    wavfile.write(path, round(1 / step(response.times)), samples)
+    return path
+
+
+def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
+    """`body`.pvd and a file of each of `count` frames through a period; the .pvd.
+
+    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean, the point kernel a
+    surface with `pressure_pa` about its mean.
+    """
+    frames = np.unique(np.arange(count) * len(view.times) // count)
+    names = []
+    for k, frame in enumerate(frames):
+        ending = "vtu" if len(view.tets) else "vtp"
+        names.append(f"{view.body}_{k:03d}.{ending}")
+        _grid(view, int(frame)).save(folder / names[-1])
+    path = folder / f"{view.body}.pvd"
+    path.write_text(_collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
+    return path
+
+
+def _grid(view: View, frame: int) -> Any:
+    import pyvista as pv
+
+    if not len(view.tets):
+        surface = pv.PolyData.from_regular_faces(view.points, view.triangles)
+        surface["pressure_pa"] = view.pushed[frame]
+        return surface
+    kinds = {4: pv.CellType.TETRA, 10: pv.CellType.QUADRATIC_TETRA}
+    nodes = view.tets.shape[1]
+    cells = np.insert(view.tets, 0, nodes, axis=1).ravel()
+    grid = pv.UnstructuredGrid(cells, np.full(len(view.tets), kinds[nodes]), view.points)
+    grid["displacement_m"] = view.motion[frame]
+    return grid
+
+
+def _collection(names: Sequence[str], times: Sequence[float]) -> str:
+    """What ParaView needs to know which file belongs to which time, in s."""
+    rows = "".join(
+        f'<DataSet timestep="{t:.9g}" group="" part="0" file="{name}"/>\n'
+        for t, name in zip(times, names, strict=True)
+    )
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n'
+        f"<Collection>\n{rows}</Collection>\n</VTKFile>\n"
+    )

@@ -1,0 +1,52 @@
+"""How pictures are dressed for a report, a talk or a printed page."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from simple_model.choices import choose
+
+
+@dataclass(frozen=True, kw_only=True)
+class Style:
+    """Colours of `paper` and `ink`; `font` size in points of figures, `dpi`; for views in three
+    dimensions the `panel` in pixels (width, height) of one model, and how many times finer it is
+    drawn than shown, `oversampling`.
+    """
+
+    paper: str = "#ffffff"
+    ink: str = "#222222"
+    font: float = 10.0
+    dpi: int = 110
+    panel: tuple[int, int] = (480, 432)
+    oversampling: int = 1
+
+    @property
+    def rc(self) -> Any:
+        """Settings of matplotlib."""
+        inks = ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")
+        papers = ("figure.facecolor", "axes.facecolor", "savefig.facecolor")
+        return {
+            "font.size": self.font,
+            "svg.fonttype": "none",
+            "pdf.fonttype": 42,
+            **dict.fromkeys(inks, self.ink),
+            **dict.fromkeys(papers, self.paper),
+        }
+
+
+STYLES = {
+    "report": Style(),
+    "talk": Style(paper="#15181c", ink="#f2f2f2", font=14.0, dpi=150, panel=(640, 576)),
+    "print": Style(ink="#000000", font=9.0, dpi=300, panel=(480, 432), oversampling=2),
+}
+
+
+def style(name: str) -> Style:
+    """A style by its name.
+
+    Raises
+    ------
+    ValueError
+        If it is unknown.
+    """
+    return STYLES[choose("style", name, STYLES)]

@@ -1,0 +1,347 @@
+"""Pictures: that they show what their captions say."""
+
+import json
+import re
+import wave
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fem import PRESETS
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.flat_body import steady_lines
+from skinwave import album, exports, films, gallery, maps, motion, render, speeds, views
+from skinwave.bodies import compliance
+from skinwave.cli import main
+from skinwave.renderer import Renderer, renderer
+from skinwave.scene import Body, Scene
+from skinwave.scene_file import dumps
+from skinwave.styles import style
+
+ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
+CHROMIUM = "/usr/bin/chromium"
+draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
+
+
+def circling(frequency=200.0, **tacton):
+    path = Trajectory(shape="circle", size=12 / np.pi / frequency, speed=12.0)
+    return MovingPressure(tacton=Tacton(trajectory=path, duration=0.05, **tacton))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Periodic: AM at 100 Hz on a circle that is drawn 200 times a second."""
+    return Scene(name="small", pressure=circling(am_frequency=100), body=Body())
+
+
+@pytest.fixture(scope="module")
+def folder(scene, tmp_path_factory):
+    """What the report of a scene is built from, on coarse meshes."""
+    out = tmp_path_factory.mktemp("album")
+    album.make(out, scene, lambda phase, done: None, h=0.012, frames=12, command="as tested")
+    return out
+
+
+@pytest.fixture(scope="module")
+def seen(folder):
+    return album.open_album(folder).views
+
+
+@pytest.fixture(scope="module")
+def page(folder, tmp_path_factory):
+    """The report's folder, from the command line."""
+    out = tmp_path_factory.mktemp("page") / "report"
+    assert main(["report", str(folder), "--out", str(out), "--format", "svg", "--quiet"]) == 0
+    return out
+
+
+def test_models_stand_side_by_side_with_the_scenes_own_body(scene, seen):
+    assert list(seen) == ["none", "paper-sheet", "skin-slab"]
+    assert seen["skin-slab"].scene == scene
+    assert {view.unit for view in seen.values()} == {"Pa", "m"}
+
+
+def test_a_view_comes_back_from_its_file(seen, tmp_path):
+    views.save(tmp_path / "view.npz", seen["skin-slab"])
+    back = views.load(tmp_path / "view.npz")
+    np.testing.assert_array_equal(back.motion, seen["skin-slab"].motion)
+    assert back.scene == seen["skin-slab"].scene
+    (tmp_path / "view.npz").write_bytes(b"spoilt")
+    with pytest.raises(ValueError, match="make it anew"):
+        views.load(tmp_path / "view.npz")
+
+
+def test_a_point_moves_in_a_view_as_its_probe_does(scene):
+    """Late enough for the start to be forgotten, and about the mean."""
+    moved = motion.waves(scene, h=0.012)
+    view = views.body_view(scene, "skin-slab", moved, 10)
+    response = views.probe_response(scene, moved)
+    at_probe = maps.carrier(view, scene.probe_points[2:3])
+    drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.pushed])
+    sampled = response.displacement[-100:, 2].reshape(10, 10)[:, 0]
+    assert view.period == pytest.approx(0.01)
+    assert np.ptp(drawn) > 1e-7
+    np.testing.assert_allclose(drawn, sampled - response.displacement[-100:, 2].mean(), atol=3e-8)
+
+
+def test_a_constant_pressure_at_rest_makes_still_pictures():
+    still = MovingPressure(tacton=Tacton(duration=0.02))
+    scene = Scene(pressure=still, body=Body(width=0.06, height=0.06))
+    view = views.body_view(scene, "slab", motion.waves(scene, h=0.015), 3)
+    assert not view.motion.any()
+    assert view.tone == 0
+    assert len(maps.snapshots_figure([view], style("print"), 2).axes) == 3
+
+
+def test_the_kernels_brightest_place_lies_on_the_path(seen):
+    view = seen["none"]
+    radius = view.scene.tacton.trajectory.size / 2
+    step = np.ptp(view.places[:, 0]) / (views.GRID - 1)
+    brightest = view.places[view.rms.argmax()]
+    assert abs(np.hypot(*brightest) - radius) < 1.5 * step
+    for t, frame in zip(view.times, np.abs(view.pushed), strict=True):
+        if frame.max() > 0.2 * view.peak:  # where the modulation is not at its zero
+            focus = view.scene.tacton.trajectory.position(float(t))
+            assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
+
+
+def test_waves_spread_further_than_the_kernel(seen):
+    radii = {name: views.spread_radius(view, -20.0) for name, view in seen.items()}
+    assert radii["skin-slab"] > 1.5 * radii["none"]
+    assert radii["paper-sheet"] > 1.5 * radii["none"]
+    assert all(views.spread_radius(v, -6.0) <= views.spread_radius(v, -20.0) for v in seen.values())
+
+
+@pytest.mark.slow
+def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
+    """By the slope of the x-t diagram outside the path, beside Rayleigh's speed and exact waves."""
+    body = Body(width=0.12, height=0.12, material=replace(PRESETS["palm"], viscosity=2.0))
+    scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
+    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.1, h=0.0035), 4)
+    outside = (view.ray.distance > 0.005) & (view.ray.distance < 0.03)
+    distance, times = view.ray.distance[outside], view.ray.times
+    found = speeds.apparent_speed(distance, times, view.ray.motion[:, outside], 250.0)
+    frequencies, lines = steady_lines(
+        compliance(body), scene.pressure, view.ray.places[outside]
+    )  # fmt: skip
+    line = lines[np.argmin(np.abs(frequencies - 250))]
+    exact = (np.exp(2j * np.pi * 250 * times)[:, None] * line).real
+    assert found == pytest.approx(speeds.surface_speed(body, 250.0), rel=0.05)
+    assert found == pytest.approx(speeds.apparent_speed(distance, times, exact, 250.0), rel=0.05)
+    assert scene.tacton.trajectory.speed > 2 * found  # there is a wake
+
+
+def test_a_running_wave_has_the_speed_that_it_runs_at():
+    x, t = np.linspace(0, 0.04, 50), np.arange(100) / 100 / 50
+    running = np.cos(2 * np.pi * 150 * (t[:, None] - x / 3.3)) * np.exp(-x / 0.02)
+    assert speeds.apparent_speed(x, t, running, 150.0) == pytest.approx(3.3, rel=1e-3)
+
+
+def test_a_sheet_bends_at_the_speed_of_plates():
+    """80 g/m2 paper at 140 Hz."""
+    sheet = Body(kind="sheet", material="paper", depth=1e-4, base="free", sides="clamped")
+    assert speeds.surface_speed(sheet, 140.0) == pytest.approx(7.7, abs=0.1)
+    assert speeds.surface_speed(Body(material="forearm"), 200.0) == pytest.approx(3.22, abs=0.03)
+
+
+def test_a_mach_angle_is_there_only_behind_a_focus_that_is_faster():
+    assert speeds.mach_angle(4.78, 12.0) == pytest.approx(np.deg2rad(23.5), abs=1e-3)
+    assert speeds.mach_angle(4.78, 4.0) is None
+
+
+def test_a_load_has_the_period_of_all_its_tones():
+    assert speeds.period(circling(am_frequency=100)) == pytest.approx(0.01)
+    assert speeds.period(circling(200.0, am_frequency=140)) == pytest.approx(0.05)
+    assert speeds.period(circling(190.986, am_frequency=140)) is None
+    assert speeds.shown_period(circling(190.986, am_frequency=140)) == pytest.approx(1 / 140)
+
+
+@draws
+def test_a_signed_field_shows_both_signs(seen):
+    view = seen["skin-slab"]
+    frame = int(np.abs(view.pushed).max(axis=1).argmax())
+    image = render.picture([view], style("report"), frame, camera="top").astype(int)
+    inside = image[80:-60, 60:420]
+    red, _, blue = np.moveaxis(inside, -1, 0)
+    assert (red - blue > 40).sum() > 200  # pushed in
+    assert (blue - red > 15).sum() > 200  # coming out
+    assert np.ptp(image) > 200
+
+
+@draws
+def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
+    view = seen["paper-sheet"]
+    panel = render.prepared(view)
+    render.place([panel], 5, 1.0)
+    drawn = np.asarray(panel.skin.points) - 1e3 * view.points[panel.nodes]
+    moved = 1e3 * view.motion[5, panel.nodes]
+    factor = float((drawn * moved).sum() / (moved**2).sum())
+    said = re.search(r"drawn ([\d,]+) times", render.shown_scale(view))
+    assert said
+    assert factor == pytest.approx(float(said[1].replace(",", "")), rel=1e-3)
+    assert 0.015 < factor * view.peak / 0.1 <= render.SHOWN
+    assert render.shown_scale(seen["none"]) == "pressure; nothing moves"
+
+
+@draws
+def test_every_frame_of_a_film_differs_and_the_last_leads_to_the_first(seen, tmp_path):
+    films.film(tmp_path / "film.gif", [seen["skin-slab"]], style("report"), panel=(160, 144))
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == 12
+        frames = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            whole = np.asarray(film.convert("RGB"), int)
+            frames.append(whole[20:-15])  # without titles and the time stamp
+    assert len({sha256(frame.tobytes()).hexdigest() for frame in frames}) == 12
+    steps = [np.abs(a - b).mean() for a, b in zip(frames, frames[1:] + frames[:1], strict=True)]
+    assert steps[-1] < 1.5 * max(steps[:-1])
+
+
+def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch):
+    with pytest.raises(ValueError, match="ends in none of"):
+        films.check_format(tmp_path / "film.avi")
+    monkeypatch.setattr(films, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match="MP4 needs imageio"):
+        films.check_format(tmp_path / "film.mp4")
+
+
+def test_tables_have_units_and_places_in_their_headers(page):
+    rows = (page / "data/skin-slab_probes.csv").read_text().splitlines()
+    assert rows[0].startswith('"time, s","displacement at (0, 0) mm, m"')
+    values = np.loadtxt(rows[1:], delimiter=",")
+    kept = np.load(page / "data/skin-slab_probes.npz")
+    np.testing.assert_allclose(values[:, 1:], kept["displacement"], rtol=1e-7, atol=1e-18)
+    assert '"pressure at (0, 0) mm, Pa"' in (page / "data/none_probes.csv").read_text()
+
+
+def test_a_sound_has_the_scale_in_its_name(seen, page):
+    (path,) = (page / "data").glob("*.wav")
+    scale = float(re.search(r"full_scale_([\d.e-]+)_um", path.name)[1])
+    with wave.open(str(path)) as sound:
+        assert sound.getframerate() == 10_000
+        samples = np.frombuffer(sound.readframes(sound.getnframes()), np.int16)
+    motion = np.load(page / "data/skin-slab_probes.npz")["displacement"]
+    probe = np.abs(motion - motion.mean(axis=0)).max(axis=0).argmax()
+    expected = 1e6 * (motion[:, probe] - motion[:, probe].mean())
+    np.testing.assert_allclose(samples / exports.FULL_SCALE * scale, expected, atol=1e-3 * scale)
+
+
+def test_fields_are_opened_again_with_their_times(seen, page):
+    pv = pytest.importorskip("pyvista")
+    reader = pv.get_reader(str(page / "data/skin-slab.pvd"))
+    assert len(reader.time_values) == exports.FIELD_FRAMES
+    reader.set_active_time_point(3)
+    (grid,) = reader.read()
+    view = seen["skin-slab"]
+    frame = int(np.argmin(np.abs(view.times - reader.time_values[3])))
+    np.testing.assert_array_equal(grid["displacement_m"], view.motion[frame])
+    np.testing.assert_allclose(grid.points, view.points)
+
+
+def test_figures_are_vector_files_too(page):
+    for name in ("rms", "difference", "snapshots", "waves"):
+        assert (page / f"pictures/{name}.png").stat().st_size > 10_000
+        assert "<svg" in (page / f"pictures/{name}.svg").read_text()[:2000]
+
+
+def test_the_page_says_everything_and_stands_alone(page):
+    text = (page / "index.html").read_text()
+    for heading in ("What was asked", "What was modelled", "What comes out", "Effort",
+                    "How far to trust it", "Do it again"):  # fmt: skip
+        assert f"<h2>{heading}" in text
+    outside = text.split("<iframe")[0] + text.split("</iframe>")[-1]
+    for address in ('src="http', 'href="http', "url(http", "<script"):
+        assert address not in outside
+    assert "as tested" in text
+    assert "differ by" in text  # the energy balance
+    assert len(text) < 8e6
+    assert "@page { size: A4" in text
+
+
+@pytest.mark.skipif("not os.path.exists(CHROMIUM)", reason="Debian's chromium is not installed")
+def test_the_page_opens_in_a_browser_without_a_network(page):
+    playwright = pytest.importorskip("playwright.sync_api")
+    arguments = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+                 "--disable-background-networking", "--disable-component-update",
+                 "--disable-sync"]  # fmt: skip
+    said, asked = [], []
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        tab = browser.new_page(viewport={"width": 1200, "height": 900})
+        tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+        tab.on("pageerror", lambda error: said.append(str(error)))
+        tab.route(
+            re.compile("^(https?|wss?)://"), lambda r: (asked.append(r.request.url), r.abort())
+        )
+        tab.goto(f"file://{page / 'index.html'}")
+        tab.wait_for_timeout(2500)
+        broken = tab.evaluate("[...document.images].filter(i => !i.naturalWidth).length")
+        drawn = [frame.evaluate("document.querySelectorAll('canvas').length")
+                 for frame in tab.frames[1:]]  # fmt: skip
+        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        tab.screenshot(path=ARTEFACTS / "report.png", full_page=True)
+        browser.close()
+    assert broken == 0
+    assert [text for text in said if "favicon" not in text and "ERR_FAILED" not in text] == []
+    assert all("favicon" in url for url in asked), asked
+    assert all(drawn)
+
+
+NO_GL = Renderer(found=False, said="missing; apt install libegl1 libgl1-mesa-dri")
+
+
+def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, monkeypatch):
+    def run(*arguments, **options):
+        raise AssertionError("a model was run")
+
+    for name in ("waves", "plan", "simulate", "answer", "point_kernel", "kernel_view", "suite"):
+        monkeypatch.setattr(album, name, run)
+    monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
+    assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
+    text = (tmp_path / "flat/index.html").read_text()
+    assert "apt install libegl1 libgl1-mesa-dri" in text
+    assert text.count("data:image/") == 6
+    assert (tmp_path / "flat/pictures/rms.png").exists()
+    assert not (tmp_path / "flat/pictures/film.gif").exists()
+
+
+def test_a_window_that_ends_its_process_is_found_out(monkeypatch):
+    monkeypatch.setattr("skinwave.renderer.PROBE", "import os; os.abort()")
+    found = renderer.__wrapped__()
+    assert not found.found
+    assert "libegl1 libgl1-mesa-dri" in found.said
+
+
+def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    kernel = Scene(name="kernel", pressure=circling(am_frequency=100), body=Body(kind="none"))
+    Path("kernel.toml").write_text(dumps(kernel))
+    assert main(["run", "kernel.toml", "--out", "one", "--quiet"]) == 0
+    assert main(["report", "one"]) == 0
+    assert "open one/report/index.html" in capsys.readouterr().out
+    text = Path("one/report/index.html").read_text()
+    assert "skinwave report SCENE computes it" in text
+    assert main(["report", "one", "--quiet"]) == 0  # its own folder is made anew
+    assert main(["report", "one/report/pictures"]) == 2
+    assert "holds no response.npz" in capsys.readouterr().err
+    assert main(["film", "one"]) == 2
+    assert "keeps no motion of whole bodies" in capsys.readouterr().err
+
+
+def test_the_doctor_names_what_there_is_and_what_is_missing(capsys):
+    assert main(["doctor", "--json"]) == 0
+    found = {row["what"]: row for row in json.loads(capsys.readouterr().out)}
+    assert {"python", "pyvista", "solver", "renderer", "threads"} <= set(found)
+    assert bool(found["renderer"]["cure"]) != renderer().found
+    assert main(["doctor"]) == 0
+    assert "superlu" in capsys.readouterr().out
+
+
+def test_an_unknown_style_is_refused():
+    with pytest.raises(ValueError, match="did you mean 'report'"):
+        style("reports")
