@@ -12,7 +12,7 @@ from skinwave.commands import COMMANDS
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(options.command(options))
     except KeyboardInterrupt:
@@ -24,6 +24,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         said = " ".join(str(error).split()) or "not enough memory; take larger elements"
         print(f"skinwave: {said}", file=sys.stderr)
         return 2
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """The arguments with `--up -z` as one, which argparse takes for two options."""
+    found: list[str] = []
+    for argument in arguments:
+        if found[-1:] == ["--up"] and argument in ("-x", "-y", "-z"):
+            found[-1] = f"--up={argument}"
+        else:
+            found.append(argument)
+    return found
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -9,12 +9,15 @@ import fem
 import meshes
 import skinwave
 from meshes import graded_axis
+from meshes.palm import Palm, level_set, surface
 from meshes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.focus import along_axis, array_field, spot_width
-from skinwave import compare, simulate
+from skinwave import compare, hands, simulate
 from skinwave.bodies import build, has_layer, operators, surface_load
-from skinwave.scene import Body, Layer, Placement
+from skinwave.cli import main
+from skinwave.plan import plan
+from skinwave.scene import Body, Layer, Placement, Relief
 from skinwave.scene_file import dumps, loads
 
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -186,3 +189,106 @@ def test_a_probe_lands_on_a_curved_surface_where_it_was_asked_for():
         field = np.zeros_like(bowed)
         field[:, 2] = bowed[:, axis]  # which the elements carry exactly
         np.testing.assert_allclose(S @ field.ravel() / upwards, places[:, axis], atol=1e-12)
+
+
+CLAMPED = Body(width=0.06, height=0.06, sides="clamped")
+
+
+@pytest.fixture
+def slab_file(tmp_path):
+    """A slab of 60 x 60 x 15 mm that the mesher made, in a file."""
+    meshes.write(tmp_path / "slab.vtu", meshes.ready("slab"))
+    return tmp_path / "slab.vtu"
+
+
+def hand_in(file):
+    return Body(kind="mesh", file=str(file), sides="clamped")
+
+
+@pytest.mark.slow
+def test_a_slab_from_the_mesher_answers_like_a_structured_one(slab_file):
+    structured = simulate(replace(SKIN, body=CLAMPED), "fem", h=0.0025)
+    filled = simulate(replace(SKIN, body=hand_in(slab_file)), "fem", h=0.004)
+    error = compare(structured, filled).relative_l2
+    assert error[:4].max() < 0.02
+    assert (
+        error[4] < 0.03
+    )  # where little moves, and structured meshes of 4 and 2.5 mm differ by 4.6 %
+
+
+def test_a_mesh_in_a_file_is_a_body_of_a_scene(slab_file, tmp_path):
+    scene = replace(SKIN, body=replace(hand_in("slab.vtu"), base="absorbing"))
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    read = skinwave.read(tmp_path / "scene.toml")
+    assert read.body.file == str(slab_file)  # named from where the scene file is
+    made = build(read.body)
+    assert made.fixed == {"sides": "xyz"}
+    assert len(made.absorbing) == len(made.mesh.facets["bottom"])
+    assert np.allclose(made.mesh.points[made.mesh.facets["bottom"], 2], -0.015)
+    required = plan(read, 0.1)
+    assert required.model == "fem"
+    assert any("not known" in warning for warning in required.warnings)
+
+
+def test_layers_of_a_body_from_a_file_lie_below_its_top(slab_file):
+    body = replace(hand_in(slab_file), layers=(Layer(thickness=0.005, material="fat"),))
+    made = build(body, 0.004)
+    depth = -made.mesh.points[made.mesh.tets[:, :4], 2].mean(axis=1)
+    assert (made.mesh.region == (depth > 0.005)).all()
+    with pytest.raises(ValueError, match="thinner than half an element"):
+        build(replace(body, layers=(Layer(thickness=0.001, material="fat"),)), 0.004)
+
+
+def test_a_palm_without_relief_is_a_slab_with_round_edges():
+    relief = Relief(cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0)
+    palm = hands.palm_of(Body(kind="palm", relief=relief))
+    inside = np.array([[0.0, 0.0, -1e-3], [0.02, 0.01, -1e-3], [0.0, -0.02, -0.014]])
+    np.testing.assert_allclose(level_set(palm, inside), -1e-3, rtol=1e-12)
+    flat = meshes.ready("flat-palm")
+    top = flat.points[np.unique(flat.facets["top"])]
+    middle = np.linalg.norm(top[:, :2], axis=1) < 0.025
+    assert np.abs(top[middle, 2]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("kind = 'mesh'", "needs a file"),
+        ("kind = 'slab'\nfile = 'hand.stl'", "is for kind"),
+        ("kind = 'slab'\nrelief = {cup_depth_mm = 3}", "is for kind"),
+        ("kind = 'palm'\nrelief = {cup_depth_mm = -3}", "cup_depth"),
+        ("kind = 'palm'\nrelief = {cup_deep_mm = 3}", "cup_depth_mm"),
+    ],
+)
+def test_bodies_that_make_no_sense_are_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        loads(f"[body]\n{text}")
+
+
+def test_tactons_are_compared_on_the_body_of_a_file(slab_file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.05)))
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    arguments = ["compare", "scene.toml", "--body", "slab.vtu", "--unit", "m", "--out", "both"]
+    assert main(arguments) == 0
+    assert "2 of 2 runs" in capsys.readouterr().out
+    assert "mesh" in (tmp_path / "both/lines.csv").read_text()
+    assert main(["compare", "scene.toml", "--body", "slap.vtu"]) == 2
+    assert "is no file and none of" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_surface_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, monkeypatch):
+    """A palm in millimetres whose palm looks along -y, as another program may have left it."""
+    monkeypatch.chdir(tmp_path)
+    found = surface(Palm(), 0.004)
+    x, y, z = 1e3 * found.points.T
+    corners = np.column_stack([x, -z, y])
+    lines = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in corners]
+    lines += ["f {} {} {}".format(*(triangle + 1)) for triangle in found.triangles]
+    (tmp_path / "hand.obj").write_text("\n".join(lines))
+    scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.05)))
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    ask = ["compare", "scene.toml", "--body", "hand.obj", "--unit", "mm", "--up", "-y", "--h", "5"]
+    assert main([*ask, "--out", "both", "--quiet"]) == 0
+    assert (tmp_path / "both/index.html").exists()
