@@ -1,6 +1,6 @@
 """Tetrahedral bodies: what the moving pressure drives."""
 
-from meshes.structured import Grading, block, extrude, graded_axis, sheet
+from meshes.structured import Grading, block, extrude, graded_axis, middle_plane, sheet
 from meshes.tetmesh import (
     MeshError,
     TetMesh,
@@ -22,6 +22,7 @@ __all__ = [
     "facet_set",
     "graded_axis",
     "half",
+    "middle_plane",
     "quadratic",
     "sheet",
 ]

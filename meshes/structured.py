@@ -21,6 +21,7 @@ from meshes.tetmesh import (
     TetMesh,
     boundary_facets,
     corner_volumes,
+    facet_set,
     quadratic,
 )
 
@@ -98,6 +99,30 @@ def block(
             -graded_axis(depth, h, Grading(radius=0, **_beyond(grading)))[::-1],
         )
     return _with_roles(extrude(*lines, order=order), clamped="bottom", absorbing="sides")
+
+
+def middle_plane(mesh: TetMesh) -> Ints:
+    """Triangles (k, 6) half way through an extruded sheet, one below each facet of its top.
+
+    Ten-node tetrahedra have mid-side nodes there, below each node of the top.
+
+    Raises
+    ------
+    MeshError
+        If there are no such nodes.
+    """
+    top = facet_set(mesh, "top")
+    low, high = mesh.points[:, 2].min(), mesh.points[:, 2].max()
+    layer = np.flatnonzero(np.abs(mesh.points[:, 2] - (low + high) / 2) < 1e-9 * (high - low))
+    above = np.unique(top)
+    by_place = [nodes[np.lexsort(mesh.points[nodes, :2].T)] for nodes in (layer, above)]
+    if len(layer) != len(above) or (np.diff(mesh.points[by_place, :2], axis=0) != 0).any():
+        raise MeshError(
+            "the mesh has no nodes half way below those of its top; extrude it with order 2"
+        )
+    below = np.zeros(len(mesh.points), np.int64)
+    below[by_place[1]] = by_place[0]
+    return below[top]
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
