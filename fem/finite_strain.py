@@ -11,7 +11,7 @@ of a triangle, as in the linear `assembly`, whose K is the tangent at rest.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,13 +41,15 @@ LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, whi
 class Elastic:
     """A body that answers a large displacement u (n_free,) in metre of its free components.
 
-    `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, and the stored
-    `energy(u)` in J; `operators` is its linearisation at rest.
+    `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, the force `viscous(u, v)`
+    (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in J; `operators` is
+    the linearisation at rest.
     """
 
     operators: Operators
     internal: Callable[[Floats], Floats]
     tangent: Callable[[Floats], sparse.csr_array]
+    viscous: Callable[[Floats, Floats], Floats]
     energy: Callable[[Floats], float]
 
 
@@ -102,8 +104,8 @@ def finite_strain(
 ) -> Elastic:
     """A body that may be displaced far, of tetrahedra and a membrane if there is one.
 
-    Mass and damping are those of `assemble`, linear and constant: the viscous force follows the
-    velocity by the stiffness at rest.
+    Mass and damping of the tetrahedra are those of `assemble`, linear and constant, which is right
+    while they turn by little. In a membrane the viscous stress follows the rate of E.
 
     Parameters
     ----------
@@ -116,28 +118,39 @@ def finite_strain(
         `assemble`.
     """
     n = len(mesh.points)
-    parts = [solid_part(mesh, material)]
-    operators = assemble(mesh, material, fixed=fixed)
-    if membrane:
-        parts.append(part := membrane_part(mesh, membrane))
-        K = tangent(part, np.zeros((n, 3)))[operators.free][:, operators.free]
-        m = membrane.material
-        lag = rayleigh_damping(m.loss_factor, LOSS_BAND)[1] + m.viscosity / m.shear_modulus
-        operators = Operators(
-            K=operators.K + K, C=operators.C + lag * K, M=operators.M,
-            free=operators.free, n_dofs=operators.n_dofs,
-        )  # fmt: skip
+    solid, operators = solid_part(mesh, material), assemble(mesh, material, fixed=fixed)
     free = operators.free
 
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
 
-    return Elastic(
+    body = Elastic(
         operators=operators,
-        internal=lambda u: sum(internal_force(p, spread(u)) for p in parts).ravel()[free],
-        tangent=lambda u: sum(tangent(p, spread(u)) for p in parts)[free][:, free],
-        energy=lambda u: sum(stored_energy(p, spread(u)) for p in parts),
+        internal=lambda u: internal_force(solid, spread(u)).ravel()[free],
+        tangent=lambda u: tangent(solid, spread(u))[free][:, free],
+        viscous=lambda u, v: operators.C @ v,
+        energy=lambda u: stored_energy(solid, spread(u)),
     )
+    if membrane is None:
+        return body
+    part, lag = membrane_part(mesh, membrane), stress_lag(membrane.material)
+    K = tangent(part, np.zeros((n, 3)))[free][:, free]
+    at_rest = replace(operators, K=operators.K + K, C=operators.C + lag * K)
+    return Elastic(
+        operators=at_rest,
+        internal=lambda u: body.internal(u) + internal_force(part, spread(u)).ravel()[free],
+        tangent=lambda u: body.tangent(u) + tangent(part, spread(u))[free][:, free],
+        viscous=lambda u, v: (
+            body.viscous(u, v) + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
+        ),
+        energy=lambda u: body.energy(u) + stored_energy(part, spread(u)),
+    )
+
+
+def stress_lag(material: Material) -> float:
+    """Time in s by which the viscous stress multiplies the rate of strain, besides the stiffness."""
+    rate = rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
+    return rate + material.viscosity / material.shear_modulus
 
 
 def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Part:
@@ -187,6 +200,13 @@ def internal_force(part: Part, u: Floats) -> Floats:
     return spread_stress(part, stress(part, E) @ F)
 
 
+def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
+    """Nodal forces (n, 3) in N/s of the stress that the rate of E at velocity v (n, 3) makes."""
+    F = deformation(part, u)[0]
+    rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
+    return spread_stress(part, stress(part, (rate + rate.swapaxes(2, 3)) / 2) @ F)
+
+
 def stored_energy(part: Part, u: Floats) -> float:
     """Energy in J of a part at the displacement u (n, 3) in metre."""
     E = deformation(part, u)[1]
@@ -219,7 +239,7 @@ def stress(part: Part, E: Floats) -> Floats:
 
 def spread_stress(part: Part, P: Floats) -> Floats:
     """Nodal forces (n, 3) of a stress P (e, q, k, i): int G_ka P_ki dV."""
-    return part.D_transposed @ (part.volume[..., None, None] * P).reshape(-1, 3)
+    return part.D_transposed @ (part.volume[..., None, None] * P).reshape(-1, P.shape[3])
 
 
 def tangent(part: Part, u: Floats) -> sparse.csr_array:

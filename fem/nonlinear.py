@@ -1,9 +1,9 @@
-"""Large displacement at rest and in time: M u'' + C u' + f_int(u) = f(t, u).
+"""Large displacement at rest and in time: M u'' + f_int(u, u') = f(t, u).
 
 At rest by Newton's method with a line search, the load in steps if need be. In time by the
 generalized-alpha method of `transient` with the internal force weighted between the ends of a step,
 
-    M [(1 - a_m) a' + a_m a] + (1 - a_f) [C v' + f_int(u') - f'] + a_f [C v + f_int(u) - f] = 0
+    M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
 
 (Chung and Hulbert, J Appl Mech 60:371 (1993); Newton in time: Belytschko, Liu and Moran, Nonlinear
 Finite Elements (2000), section 6.3). One factorisation serves as many steps as it goes on to
@@ -114,7 +114,7 @@ def _line_search(work: Callable[[float], float]) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Now:
-    """Free components of a state, with the forces on it."""
+    """Free components of a state, with the load and the elastic and viscous force."""
 
     t: float
     u: Floats
@@ -157,8 +157,9 @@ def dynamic(
     free, start = body.operators.free, initial or at_rest(body.operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
     f, internal = force(start.time, start.displacement)[free], body.internal(u)
-    a = acceleration(body.operators, f - body.operators.C @ v - internal)
-    now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal)
+    viscous = body.viscous(u, v)
+    a = acceleration(body.operators, f - viscous - internal)
+    now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal + viscous)
     march = _March(body=body, force=force, scheme=scheme, tolerance=tolerance, solver=solver)
     factors: dict[float, Factor] = {}
     for step in count(1):
@@ -209,11 +210,10 @@ def _step(
         u = predicted + dt**2 * beta * a
         v = now.v + dt * ((1 - gamma) * now.a + gamma * a)
         f = march.force(until, body.operators.expand(u))[free]
-        internal = body.internal(u)
+        internal = body.internal(u) + body.viscous(u, v)
         load = (1 - a_f) * f + a_f * now.force
         inertia = M @ ((1 - a_m) * a + a_m * now.a)
-        r = load - inertia - C @ ((1 - a_f) * v + a_f * now.v)
-        r -= (1 - a_f) * internal + a_f * now.internal
+        r = load - inertia - (1 - a_f) * internal - a_f * now.internal
         size = max(float(np.linalg.norm(load)), float(np.linalg.norm(inertia)))
         left = float(np.linalg.norm(r)) / (size or 1.0)
         if left <= march.tolerance:
