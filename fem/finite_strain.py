@@ -41,9 +41,9 @@ LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, whi
 class Elastic:
     """A body that answers a large displacement u (n_free,) in metre of its free components.
 
-    `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, the force `viscous(u, v)`
-    (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in J; `operators` is
-    the linearisation at rest.
+    `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, `viscous(u, v)`
+    (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in J; `operators`
+    is the linearisation at rest.
     """
 
     operators: Operators
@@ -148,7 +148,7 @@ def finite_strain(
 
 
 def stress_lag(material: Material) -> float:
-    """Time in s by which the viscous stress multiplies the rate of strain, besides the stiffness."""
+    """Viscous over elastic stress in s, at a rate of strain equal to the strain per second."""
     rate = rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
     return rate + material.viscosity / material.shear_modulus
 
@@ -189,9 +189,9 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
     derivatives = shape_derivatives(barycentric, nodes.shape[1])
     G = np.einsum("ekl,qal->eqka", np.linalg.inv(edges), derivatives)
     volume = membrane.thickness * area[:, None] * weights
-    lam, mu = m.first_lame, m.shear_modulus
-    lam = 2 * lam * mu / (lam + 2 * mu)
-    return Part.of(nodes, G, volume, *np.full((2, len(nodes)), [[lam], [mu]]), len(mesh.points))
+    lam = 2 * m.first_lame * m.shear_modulus / (m.first_lame + 2 * m.shear_modulus)
+    alike = np.ones(len(nodes))
+    return Part.of(nodes, G, volume, lam * alike, m.shear_modulus * alike, len(mesh.points))
 
 
 def internal_force(part: Part, u: Floats) -> Floats:

@@ -1,6 +1,14 @@
 """Tetrahedral bodies: what the moving pressure drives."""
 
-from meshes.structured import Grading, block, extrude, graded_axis, middle_plane, sheet
+from meshes.structured import (
+    Grading,
+    block,
+    extrude,
+    extruded,
+    graded_axis,
+    middle_plane,
+    sheet,
+)
 from meshes.tetmesh import (
     MeshError,
     TetMesh,
@@ -19,6 +27,7 @@ __all__ = [
     "boundary_facets",
     "corner_volumes",
     "extrude",
+    "extruded",
     "facet_set",
     "graded_axis",
     "half",

@@ -170,23 +170,42 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
     if order not in (1, 2):
         raise MeshError(f"order = {order} is not available; use 1 or 2")
     check_size((len(line) - 1 for line in lines), order)
-    triangles, per_layer = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
-    tets = np.vstack(
-        [
-            _prism_tets(triangles + low * per_layer, per_layer)
-            for low, _ in pairwise(range(len(lines[2])))
-        ]
-    )
-    zz, yy, xx = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
-    points = np.column_stack([xx.ravel(), yy.ravel(), zz.ravel()])
-    wrong = corner_volumes(points, tets) < 0
-    tets[wrong, 2:] = tets[wrong, :1:-1]
+    triangles = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
+    yy, xx = np.meshgrid(lines[1], lines[0], indexing="ij")
+    points, tets = _layers(np.column_stack([xx.ravel(), yy.ravel()]), triangles, lines[2])
     mesh = TetMesh(points=points, tets=tets, facets=_sides(points, boundary_facets(tets)))
     return quadratic(mesh) if order == 2 else mesh
 
 
-def _rectangle_triangles(nx: int, ny: int) -> tuple[Ints, int]:
-    """Two triangles a cell with alternating diagonals, nodes ordered by parity; nodes a layer."""
+def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
+    """Tetrahedra on any triangulation of a plane, three a prism; the facet set `top`.
+
+    Parameters
+    ----------
+    plane : (n, 2) float, metre
+    triangles : (k, 3) int, nodes of the plane
+    z : increasing heights of the layers, metre
+    """
+    ranked = np.sort(np.asarray(triangles), axis=1)  # one order for all: neighbours conform
+    points, tets = _layers(np.asarray(plane), ranked, np.asarray(z))
+    facets = boundary_facets(tets)
+    top = facets[(points[facets, 2] == points[:, 2].max()).all(axis=1)]
+    mesh = TetMesh(points=points, tets=tets, facets={"top": top})
+    return quadratic(mesh) if order == 2 else mesh
+
+
+def _layers(plane: Floats, triangles: Ints, z: Floats) -> tuple[Floats, Ints]:
+    """Points and tetrahedra of a triangulated plane (n, 2) repeated at heights z."""
+    n = len(plane)
+    tets = np.vstack([_prism_tets(triangles + low * n, n) for low, _ in pairwise(range(len(z)))])
+    points = np.column_stack([np.tile(plane, (len(z), 1)), np.repeat(z, n)])
+    wrong = corner_volumes(points, tets) < 0
+    tets[wrong, 2:] = tets[wrong, :1:-1]
+    return points, tets
+
+
+def _rectangle_triangles(nx: int, ny: int) -> Ints:
+    """Two triangles a cell with alternating diagonals, nodes ordered by parity."""
     j, i = np.divmod(np.arange(nx * ny), nx)
     a, b = j * (nx + 1) + i, j * (nx + 1) + i + 1
     d, c = a + nx + 1, b + nx + 1
@@ -196,7 +215,7 @@ def _rectangle_triangles(nx: int, ny: int) -> tuple[Ints, int]:
     triangles = np.vstack([first, second])
     row, column = np.divmod(triangles, nx + 1)
     rank = np.argsort(2 * (column % 2) + row % 2, axis=1)  # the corners of a cell all differ
-    return np.take_along_axis(triangles, rank, axis=1), (nx + 1) * (ny + 1)
+    return np.take_along_axis(triangles, rank, axis=1)
 
 
 def _prism_tets(triangles: Ints, per_layer: int) -> Ints:
