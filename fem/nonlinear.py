@@ -235,7 +235,8 @@ def _step(
         sizes = (u - now.u, dt**2 * beta * a, STANDSTILL * u)
         step = max(float(np.linalg.norm(size)) for size in sizes)
         left = dt**2 * beta * float(np.linalg.norm(change)) / (step or 1.0)
-        if left <= march.tolerance:
+        shrinks = left <= max(SLOW * before, march.tolerance / 100)
+        if left <= march.tolerance and (shrinks or before <= march.tolerance):
             # One more residual would only confirm what this correction leaves: its square or, with
             # an old tangent, a small part of it. The balance of forces stands for it.
             u, v = u + dt**2 * beta * change, v + dt * gamma * change

@@ -95,10 +95,11 @@ def test_the_motion_starts_from_rest_under_the_mean_pressure(sheet):
     assert 0 < response.effort.energy_imbalance < 0.01
 
 
-def test_a_step_that_fails_is_halved(sheet):
+def test_a_step_that_fails_is_halved(sheet, monkeypatch):
+    monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", 4)
     made, body = sheet
     P = fem.load_operator(made.mesh)
-    push, asked = P @ np.full(P.shape[1], 500.0), set()
+    push, asked = P @ np.full(P.shape[1], 20.0), set()
 
     def force(t, u):
         asked.add(round(t, 9))
@@ -106,7 +107,7 @@ def test_a_step_that_fails_is_halved(sheet):
 
     states = list(islice(nonlinear.dynamic(body, force, 2e-3), 2))
     assert [s.time for s in states] == [0, 2e-3]
-    assert 1e-3 in asked
+    assert {1e-3, 2e-3} < asked
     assert np.isfinite(states[1].displacement).all()
 
 

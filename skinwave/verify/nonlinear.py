@@ -217,7 +217,7 @@ def free_energy() -> Case:
         mesh=described(mesh, f"4 by 4 by 1 cells, no loss; steps of {1e3 * dt:g} ms"),
         checks=(
             relative("released from, w / h", (S @ u)[0] / PAPER.depth, 3.0, 0.05),
-            below("largest change of energy, relative", np.abs(drift).max(), 0.05),
+            below("largest change of energy, relative", np.abs(drift).max(), 0.01),
             below("drift from the first to the last quarter", late, 0.01),
         ),
         plot=Plot(
