@@ -203,7 +203,7 @@ def free_energy() -> Case:
     u = nonlinear.static(body, P @ np.full(P.shape[1], 6.2))
     start, steps, dt = replace(fem.at_rest(mesh.n_dofs), displacement=u), 2000, 1e-4
     states = islice(
-        nonlinear.dynamic(body, lambda t, u: 0 * u, dt, initial=start, tolerance=1e-4), steps + 1
+        nonlinear.dynamic(body, lambda t, u: 0 * u, dt, initial=start, tolerance=1e-3), steps + 1
     )
     energy, centre = np.array(
         [(nonlinear.total_energy(body, s), (S @ s.displacement)[0]) for s in states]
