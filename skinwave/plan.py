@@ -229,7 +229,8 @@ def _march_errors(scene: Scene, model: str | None, dt: float | None) -> tuple[fl
 
 
 def _enough(found: Refined, tolerance: float) -> float:
-    return found.h * (AIM * tolerance / found.error) ** (1 / ORDER)
+    aim = AIM * tolerance
+    return found.h * (aim / max(aim, found.error)) ** (1 / ORDER)
 
 
 def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
