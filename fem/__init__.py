@@ -7,35 +7,49 @@ einsum in this package: e element, q quadrature point, a b element nodes, i j co
 n node, p probe, t time, f frequency, l derivative along an element edge.
 """
 
+from fem import nonlinear
 from fem.assembly import Operators, assemble
 from fem.energy import Spent, audited, imbalance, mean_power, stored
+from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
 from fem.linear_solver import Factor, available, factorise
 from fem.materials import PRESETS, Material, from_young
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
+from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
-from fem.surface import facet_normals, facet_points, load_operator, probe_operator
-from fem.transient import Diverged, State, transient
+from fem.surface import (
+    facet_normals,
+    facet_points,
+    load_operator,
+    pressure_force,
+    probe_operator,
+)
+from fem.transient import Diverged, State, at_rest, transient
 
 __all__ = [
     "PRESETS",
     "Complex",
     "Diverged",
+    "Elastic",
     "Factor",
     "Material",
+    "Membrane",
     "Operators",
     "Poles",
     "ReducedModel",
     "Spent",
     "State",
+    "StretchingModes",
     "assemble",
+    "at_rest",
     "audited",
     "available",
     "exponential_sum",
     "facet_normals",
     "facet_points",
     "factorise",
+    "finite_strain",
     "from_young",
     "harmonic",
     "imbalance",
@@ -44,12 +58,15 @@ __all__ = [
     "load_subspace",
     "mean_power",
     "modes",
+    "nonlinear",
     "poles",
+    "pressure_force",
     "probe_operator",
     "reduce",
     "respond",
     "static",
     "stored",
+    "stretching_modes",
     "transfer",
     "transient",
 ]

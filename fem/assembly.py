@@ -82,7 +82,7 @@ def assemble(
     MeshError
         If a facet set is unknown or an element is inverted.
     """
-    materials, region = _by_region(mesh, material)
+    materials, region = by_region(mesh, material)
     rho, mu, lam, lag = (
         np.array([value(m) for m in materials])[region]
         for value in (
@@ -159,13 +159,13 @@ def _volume_operators(
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
     """K, C and M on all degrees of freedom; C = mass_rate M + stiffness_lag K by element."""
     blocks, masses = element_matrices(mesh, rho, mu, lam)
-    K, M = _from_blocks(pattern, blocks), _from_masses(pattern, masses)
+    K, M = from_blocks(pattern, blocks), _from_masses(pattern, masses)
     if np.ptp(mass_rate) == 0 and np.ptp(stiffness_lag) == 0:
         C = stiffness_lag[0] * K if stiffness_lag[0] else sparse.csr_array(K.shape)
         return K, C + mass_rate[0] * M if mass_rate[0] else C, M
     blocks *= stiffness_lag[:, None, None]
     masses *= mass_rate[:, None, None]
-    return K, _from_blocks(pattern, blocks) + _from_masses(pattern, masses), M
+    return K, from_blocks(pattern, blocks) + _from_masses(pattern, masses), M
 
 
 def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
@@ -178,17 +178,17 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
     direct = lam - projected
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
     NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
-    shape_of = mesh.tets[:, :4] if _is_straight(mesh) else mesh.tets
+    shape_of = mesh.tets[:, :4] if is_straight(mesh) else mesh.tets
     for start in range(0, m, SLAB):
         slab = slice(start, start + SLAB)
         corners = mesh.points[shape_of[slab]]
-        gradients, volumes = _gradients(corners, n_nodes, 2, start)
+        slopes, volumes = gradients(corners, n_nodes, 2, start)
         e, q = volumes.shape
-        G = (np.sqrt(volumes)[:, :, None, None] * gradients).reshape(e, q, 3 * n_nodes)
+        G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
         H = np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
         l2, m2 = direct[slab, None, None], mu[slab, None, None]
         shear = m2 * np.einsum("eiaib->eab", H)
-        mean = np.einsum("eq,eqia->eia", volumes, gradients)
+        mean = np.einsum("eq,eqia->eia", volumes, slopes)
         mean *= np.sqrt(projected[slab] / volumes.sum(axis=1))[:, None, None]
         for k, (i, j) in enumerate(UPPER):
             block = blocks[k, slab]
@@ -215,7 +215,7 @@ def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
     return R
 
 
-def _is_straight(mesh: TetMesh) -> bool:
+def is_straight(mesh: TetMesh) -> bool:
     """Whether every mid-side node lies in the middle of its edge."""
     if mesh.order == 1:
         return True
@@ -225,7 +225,7 @@ def _is_straight(mesh: TetMesh) -> bool:
     return bool(bow < 1e-10 * np.abs(ends[:, :, 0] - ends[:, :, 1]).max())
 
 
-def _gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
+def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
     """Shape gradients (e, q, i, a) and quadrature volumes (e, q); `nodes` (e, a, i) give shape."""
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
     cofactors, determinants, volumes = _jacobians(nodes, degree, first)
@@ -259,14 +259,16 @@ def _jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, 
     return cofactors, determinants, determinants * weights / 6
 
 
-def _from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
+def from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
+    """Symmetric matrix (3 n, 3 n) of element blocks (k, e, a, b), components UPPER[k]."""
     data = np.empty((len(pattern.indices), 3, 3))
     mirrored = pattern.mirrored()
     for k, (i, j) in enumerate(UPPER):
         data[:, i, j] = component = pattern.sum(blocks[k])
         if i != j:
             data[:, j, i] = component[mirrored]
-    return sparse.bsr_array((data, pattern.indices, pattern.indptr)).tocsr()
+    n = 3 * (len(pattern.indptr) - 1)
+    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n)).tocsr()
 
 
 def _from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
@@ -281,7 +283,7 @@ def _from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
     return sparse.csr_array((nodal[source], 3 * pattern.indices[source] + component, indptr))
 
 
-def _by_region(
+def by_region(
     mesh: TetMesh, material: Material | Mapping[int, Material]
 ) -> tuple[list[Material], Ints]:
     """The materials that there are, and which of them each element (e,) is made of."""

@@ -54,8 +54,13 @@ def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
     )
 
 
-def triangle_rule() -> tuple[Floats, Floats]:
-    """Barycentric points (6, 3) and weights (6,) summing to 1, exact to degree 4 (Dunavant)."""
+def triangle_rule(degree: int = 4) -> tuple[Floats, Floats]:
+    """Barycentric points (q, 3) and weights (q,) summing to 1, exact to `degree` (2 or 4).
+
+    Three points and six: Dunavant, Int J Numer Methods Eng 21:1129 (1985).
+    """
+    if degree <= 2:
+        return _orbits((1 / 3, [1 / 6, 1 / 6]))
     return _orbits(
         (0.22338158967801147, [0.4459484909159649] * 2),
         (0.10995174365532187, [0.09157621350977074] * 2),

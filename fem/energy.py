@@ -76,8 +76,8 @@ def stored(operators: Operators, state: State) -> float:
 
 
 def imbalance(spent: Spent, stored: float = 0.0) -> float:
-    """Energy that is missing or too much, relative to all that went round."""
-    size = max(abs(spent.work), stored + spent.lost)
+    """Energy that is missing or too much, relative to all that went round; `stored` in J since."""
+    size = max(abs(spent.work), abs(stored) + spent.lost)
     return abs(spent.work - stored - spent.lost) / size if size > 0 else 0.0
 
 

@@ -3,6 +3,8 @@
 nodal forces = P q at the facets' quadrature points,  displacement into the body = S u
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -25,6 +27,36 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
     columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
     shape = (mesh.n_dofs, k * q)
     return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def pressure_force(
+    mesh: TetMesh, facets: str | Ints = "top", *, kind: str = "dead"
+) -> Callable[[Floats, Floats], Floats]:
+    """Nodal forces (3 n,) in N of pressures (k q,) in Pa at a displacement (3 n,) in metre.
+
+    A "dead" pressure keeps the direction and the area of the body at rest, as `load_operator`; a
+    "follower" pushes against the displaced surface: f_ai = -int N_a q (x_,1 x x_,2)_i (Belytschko,
+    Liu and Moran (2000), section 6.4.5).
+
+    Raises
+    ------
+    ValueError
+        If the kind is neither.
+    """
+    P, nodes = load_operator(mesh, facets), facet_set(mesh, facets)
+    if kind == "dead":
+        return lambda pressure, u: P @ pressure
+    if kind != "follower":
+        raise ValueError(f"pressure kind '{kind}' is unknown; use dead or follower")
+    dofs = 3 * nodes[:, :, None] + np.arange(3)
+
+    def follow(pressure: Floats, u: Floats) -> Floats:
+        N, normals = facet_areas(mesh.points[nodes] + u[dofs])
+        forces = -np.einsum("qa,eqi,eq->eai", N, normals, pressure.reshape(normals.shape[:2]))
+        total: Floats = np.bincount(dofs.ravel(), forces.ravel(), mesh.n_dofs).astype(np.float64)
+        return total
+
+    return follow
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
@@ -81,11 +113,16 @@ def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Fl
 
 def facet_geometry(mesh: TetMesh, nodes: Ints) -> tuple[Floats, Floats]:
     """Shape values (q, a) and outward normals (e, q, i) times area and quadrature weight."""
+    return facet_areas(mesh.points[nodes])
+
+
+def facet_areas(places: Floats) -> tuple[Floats, Floats]:
+    """`facet_geometry` of facets whose nodes are at places (e, a, i)."""
     barycentric, weights = triangle_rule()
-    derivatives = shape_derivatives(barycentric, nodes.shape[1])
-    tangents = np.einsum("qal,eai->eqli", derivatives, mesh.points[nodes], optimize=True)
+    derivatives = shape_derivatives(barycentric, places.shape[1])
+    tangents = np.einsum("qal,eai->eqli", derivatives, places, optimize=True)
     normals = np.cross(tangents[:, :, 0], tangents[:, :, 1]) / 2
-    return shape_functions(barycentric, nodes.shape[1]), normals * weights[:, None]
+    return shape_functions(barycentric, places.shape[1]), normals * weights[:, None]
 
 
 def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:

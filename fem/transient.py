@@ -55,22 +55,15 @@ def transient(
     Diverged
         If the displacement is not finite.
     """
-    if not (np.isfinite(dt) and dt > 0):
-        raise ValueError(f"dt = {dt} s must be a finite number above 0")
-    if not 0 <= spectral_radius <= 1:
-        raise ValueError(f"spectral_radius = {spectral_radius} is outside 0..1; 1 conserves energy")
+    a_m, a_f, beta, gamma = weights(dt, spectral_radius)
     K, C, M, free = operators.K, operators.C, operators.M, operators.free
-    a_m = (2 * spectral_radius - 1) / (spectral_radius + 1)
-    a_f = spectral_radius / (spectral_radius + 1)
-    gamma = 0.5 - a_m + a_f
-    beta = (1 - a_m + a_f) ** 2 / 4
     system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * K)
     factor = factorise(system, backend=solver)
 
-    start = initial or _at_rest(operators.n_dofs)
+    start = initial or at_rest(operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
     f = force(start.time)[free]
-    a = _acceleration(operators, f - C @ v - K @ u)
+    a = acceleration(operators, f - C @ v - K @ u)
     step = 0
     while True:
         time = start.time + step * dt
@@ -95,12 +88,30 @@ def transient(
         u, v, f = u_next + dt**2 * beta * a, v_next + dt * gamma * a, f_next
 
 
-def _at_rest(n_dofs: int) -> State:
+def weights(dt: float, spectral_radius: float) -> tuple[float, float, float, float]:
+    """a_m, a_f, beta and gamma of the method: Chung and Hulbert (1993), eqs. 17, 20 and 25.
+
+    Raises
+    ------
+    ValueError
+        If dt or the spectral radius is out of range.
+    """
+    if not (np.isfinite(dt) and dt > 0):
+        raise ValueError(f"dt = {dt} s must be a finite number above 0")
+    if not 0 <= spectral_radius <= 1:
+        raise ValueError(f"spectral_radius = {spectral_radius} is outside 0..1; 1 conserves energy")
+    a_m = (2 * spectral_radius - 1) / (spectral_radius + 1)
+    a_f = spectral_radius / (spectral_radius + 1)
+    return a_m, a_f, (1 - a_m + a_f) ** 2 / 4, 0.5 - a_m + a_f
+
+
+def at_rest(n_dofs: int) -> State:
+    """The state at time 0 of a body that has not been touched."""
     zero = np.zeros(n_dofs)
     return State(time=0.0, displacement=zero, velocity=zero, acceleration=zero)
 
 
-def _acceleration(operators: Operators, unbalanced: Floats) -> Floats:
+def acceleration(operators: Operators, unbalanced: Floats) -> Floats:
     """M^-1 r by conjugate gradients: a consistent mass matrix scaled by its diagonal is benign."""
     if not unbalanced.any():
         return np.zeros_like(unbalanced)

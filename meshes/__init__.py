@@ -7,7 +7,15 @@ from meshes.intake import body_from_file
 from meshes.palm import Palm, palm_mesh
 from meshes.quality import dihedral_angles, edge_lengths, jacobian_ratios
 from meshes.ready import ready
-from meshes.structured import Grading, block, extrude, graded_axis, sheet
+from meshes.structured import (
+    Grading,
+    block,
+    extrude,
+    extruded,
+    graded_axis,
+    middle_plane,
+    sheet,
+)
 from meshes.surface import Surface, repaired
 from meshes.surface_files import read_surface
 from meshes.tetmesh import (
@@ -35,11 +43,13 @@ __all__ = [
     "dihedral_angles",
     "edge_lengths",
     "extrude",
+    "extruded",
     "facet_set",
     "graded",
     "graded_axis",
     "half",
     "jacobian_ratios",
+    "middle_plane",
     "named",
     "palm_mesh",
     "quadratic",

@@ -21,6 +21,7 @@ from meshes.tetmesh import (
     TetMesh,
     boundary_facets,
     corner_volumes,
+    facet_set,
     quadratic,
 )
 
@@ -101,6 +102,30 @@ def block(
     return _with_roles(extrude(*lines, order=order), clamped="bottom", absorbing="sides")
 
 
+def middle_plane(mesh: TetMesh) -> Ints:
+    """Triangles (k, 6) half way through an extruded sheet, one below each facet of its top.
+
+    Ten-node tetrahedra have mid-side nodes there, below each node of the top.
+
+    Raises
+    ------
+    MeshError
+        If there are no such nodes.
+    """
+    top = facet_set(mesh, "top")
+    low, high = mesh.points[:, 2].min(), mesh.points[:, 2].max()
+    layer = np.flatnonzero(np.abs(mesh.points[:, 2] - (low + high) / 2) < 1e-9 * (high - low))
+    above = np.unique(top)
+    by_place = [nodes[np.lexsort(mesh.points[nodes, :2].T)] for nodes in (layer, above)]
+    if len(layer) != len(above) or (np.diff(mesh.points[by_place, :2], axis=0) != 0).any():
+        raise MeshError(
+            "the mesh has no nodes half way below those of its top; extrude it with order 2"
+        )
+    below = np.zeros(len(mesh.points), np.int64)
+    below[by_place[1]] = by_place[0]
+    return below[top]
+
+
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
     """Grid lines from 0 to `length`: cells of `h` up to the radius, then growing.
 
@@ -156,23 +181,42 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
     if order not in (1, 2):
         raise MeshError(f"order = {order} is not available; use 1 or 2")
     check_size((len(line) - 1 for line in lines), order)
-    triangles, per_layer = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
-    tets = np.vstack(
-        [
-            _prism_tets(triangles + low * per_layer, per_layer)
-            for low, _ in pairwise(range(len(lines[2])))
-        ]
-    )
-    zz, yy, xx = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
-    points = np.column_stack([xx.ravel(), yy.ravel(), zz.ravel()])
-    wrong = corner_volumes(points, tets) < 0
-    tets[wrong, 2:] = tets[wrong, :1:-1]
+    triangles = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
+    yy, xx = np.meshgrid(lines[1], lines[0], indexing="ij")
+    points, tets = _layers(np.column_stack([xx.ravel(), yy.ravel()]), triangles, lines[2])
     mesh = TetMesh(points=points, tets=tets, facets=_sides(points, boundary_facets(tets)))
     return quadratic(mesh) if order == 2 else mesh
 
 
-def _rectangle_triangles(nx: int, ny: int) -> tuple[Ints, int]:
-    """Two triangles a cell with alternating diagonals, nodes ordered by parity; nodes a layer."""
+def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
+    """Tetrahedra on any triangulation of a plane, three a prism; the facet set `top`.
+
+    Parameters
+    ----------
+    plane : (n, 2) float, metre
+    triangles : (k, 3) int, nodes of the plane
+    z : increasing heights of the layers, metre
+    """
+    ranked = np.sort(np.asarray(triangles), axis=1)  # one order for all: neighbours conform
+    points, tets = _layers(np.asarray(plane), ranked, np.asarray(z))
+    facets = boundary_facets(tets)
+    top = facets[(points[facets, 2] == points[:, 2].max()).all(axis=1)]
+    mesh = TetMesh(points=points, tets=tets, facets={"top": top})
+    return quadratic(mesh) if order == 2 else mesh
+
+
+def _layers(plane: Floats, triangles: Ints, z: Floats) -> tuple[Floats, Ints]:
+    """Points and tetrahedra of a triangulated plane (n, 2) repeated at heights z."""
+    n = len(plane)
+    tets = np.vstack([_prism_tets(triangles + low * n, n) for low, _ in pairwise(range(len(z)))])
+    points = np.column_stack([np.tile(plane, (len(z), 1)), np.repeat(z, n)])
+    wrong = corner_volumes(points, tets) < 0
+    tets[wrong, 2:] = tets[wrong, :1:-1]
+    return points, tets
+
+
+def _rectangle_triangles(nx: int, ny: int) -> Ints:
+    """Two triangles a cell with alternating diagonals, nodes ordered by parity."""
     j, i = np.divmod(np.arange(nx * ny), nx)
     a, b = j * (nx + 1) + i, j * (nx + 1) + i + 1
     d, c = a + nx + 1, b + nx + 1
@@ -184,7 +228,7 @@ def _rectangle_triangles(nx: int, ny: int) -> tuple[Ints, int]:
     # By parity about the middle, whose neighbours then look the same in every mesh; the corners of
     # a cell all differ.
     rank = np.argsort(2 * ((column - nx // 2) % 2) + (row - ny // 2) % 2, axis=1)
-    return np.take_along_axis(triangles, rank, axis=1), (nx + 1) * (ny + 1)
+    return np.take_along_axis(triangles, rank, axis=1)
 
 
 def _prism_tets(triangles: Ints, per_layer: int) -> Ints:

@@ -47,13 +47,17 @@ class Build:
     symmetry: str = ""
 
 
-def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
+def build(
+    body: Body, h: float | None = None, symmetry: str = "", thickness: float | None = None
+) -> Build:
     """Mesh a flat body with cells of h in metre, or as fine as the scene set needs.
 
     Parameters
     ----------
     symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
         part with positive coordinates is meshed, and slides along these planes
+    thickness : of the equivalent of a sheet in metre, `SHEET_THICKNESS` of its shorter side if not
+        given, and no less than the sheet's own
 
     Raises
     ------
@@ -62,7 +66,8 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
     """
     size, drag = _checked(body, h or default_size(body)), None
     if body.kind == "sheet":
-        thickness = max(body.depth, SHEET_THICKNESS * min(body.width, body.height))
+        thickness = thickness or SHEET_THICKNESS * min(body.width, body.height)
+        thickness = max(body.depth, thickness)
         mesh = sheet(body.width, body.height, thickness, size)
         materials: Sequence[Material] = [bending_equivalent(body.solid, body.depth / thickness)]
     else:
@@ -83,6 +88,7 @@ def build(body: Body, h: float | None = None, symmetry: str = "") -> Build:
         drag = layer_drag(body, mesh)
     mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
+    leaky = [facets for facets in leaky if len(facets)]  # a whole hand has no ends
     return Build(
         mesh=mesh,
         material=dict(enumerate(materials)),

@@ -23,6 +23,7 @@ from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
 from skinwave.refinement import AIM, ORDER, Refined, refined
 from skinwave.scene import FLAT, Body, Scene
 from skinwave.sensitivity import sensitivity
+from skinwave.stretching import expected_error, sheet_only, stretching_size
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
 KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
@@ -95,6 +96,8 @@ def plan(
         return Plan(model="point-kernel", body=scene.body, rows=(row,))
     if model == "point-kernel":
         return _kernel(scene, tolerance)
+    if model in ("fem-nonlinear", "fem-nonlinear-transient"):
+        return _nonlinear(scene, tolerance, model, h)
     spectrum = motion_lines(scene, tolerance)
     highest = highest_line(*spectrum, tolerance)
     rows = [
@@ -142,6 +145,26 @@ def _kernel(scene: Scene, tolerance: float) -> Plan:
     return Plan(
         model="point-kernel", body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning
     )
+
+
+def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> Plan:
+    """A sheet with large deflection, whose element size does not come from the linear answer: what
+    stretching stiffens has longer waves and fewer resonances than the linear sheet.
+    """
+    sheet_only(scene.body, model)
+    size = h or stretching_size(scene.body, reduced=model == "fem-nonlinear")
+    check_mesh(scene.body, size)
+    error = expected_error(scene.body, size)
+    rows = (
+        Row(what="model", value=model, reason="as asked: large deflection about a static preload"),
+        Row(
+            what="element size", value=f"{1e3 * size:.2f} mm",
+            reason="as asked" if h else "by measured convergence of the default sheet",
+        ),
+        *(row for row in _left_out(scene, 0.0) if row.what != "left out: stretching"),
+    )  # fmt: skip
+    warnings = _exceeds(f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are")
+    return Plan(model=model, body=scene.body, h=size, error=error, rows=rows, warnings=warnings)
 
 
 def _without_mesh(

@@ -13,8 +13,12 @@ from skinwave.full import harmonic_answer, transient_answer
 from skinwave.plan import plan
 from skinwave.prepared import REDUCTION_TOLERANCE, answer, prepare, sample_times
 from skinwave.scene import Scene
+from skinwave.stretching import full_answer, reduced_answer
 
-MODELS = ("auto", "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
+MODELS = (
+    "auto", "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient", "fem-nonlinear",
+    "fem-nonlinear-transient",
+)  # fmt: skip
 
 
 def simulate(
@@ -33,18 +37,22 @@ def simulate(
     ----------
     scene : Scene
     model : "point-kernel"; "flat-body", exact waves in an endless body; "fem", the reduced model;
-        "fem-harmonic", the steady state line by line; "fem-transient", every time step; or
-        "auto": what `plan` chooses
+        "fem-harmonic", the steady state line by line; "fem-transient", every time step;
+        "fem-nonlinear", a sheet that stretches as it bends, in its modes, about its rest under the
+        mean pressure; "fem-nonlinear-transient", the same with all unknowns; or "auto": what
+        `plan` chooses, which is linear
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : called with the name of the phase and the fraction done
     h : float, metre, element size; planned if not given, and with it how much of the body counts
-    dt : float, s, time step of "fem-transient"
+    dt : float, s, time step of "fem-transient" and the nonlinear models
     solver : a backend of `fem.linear_solver`
 
     Raises
     ------
     ValueError
         If the model is unknown or does not fit the scene, or a number is out of range.
+    Diverged
+        If a nonlinear model does not converge, or an answer does not account for its energy.
     """
     choose("model", model, MODELS)
     check_knobs(solver, h=h, dt=dt)
@@ -75,6 +83,10 @@ def simulate(
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-harmonic":
         return harmonic_answer(scene, times, report, h=h, solver=solver, threshold=tolerance / 50)
+    if model == "fem-nonlinear":
+        return reduced_answer(scene, times, report, h=h, dt=dt, solver=solver)
+    if model == "fem-nonlinear-transient":
+        return full_answer(scene, times, report, h=h, dt=dt, solver=solver)
     reduction = min(REDUCTION_TOLERANCE, tolerance / 50)
     prepared = prepare(
         scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction

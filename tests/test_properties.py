@@ -159,10 +159,10 @@ def small_scene(tacton, **pressure):
     return Scene(pressure=load, body=SMALL, probes=WATCHED)
 
 
-@pytest.mark.parametrize("model", [m for m in MODELS if m != "auto"])
+@pytest.mark.parametrize("model", [m for m in MODELS if m != "auto" and "nonlinear" not in m])
 @settings(max_examples=6)
 @given(tactons, numbers(0.01, 100))
-def test_every_model_is_linear_in_the_pressure(model, tacton, factor):
+def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
     knobs = {"h": 0.006, "dt": 1e-3 if tacton.duration > 2e-3 else None}
     once = simulate(small_scene(tacton, peak_pressure=10.0), model, 0.3, **knobs).displacement
     scaled = small_scene(tacton, peak_pressure=10.0 * factor)

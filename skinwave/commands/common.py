@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from skinwave.plan import Plan
     from skinwave.scene import Scene
 
-MODELS = ("point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient")
+MODELS = (
+    "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient", "fem-nonlinear",
+    "fem-nonlinear-transient",
+)  # fmt: skip
 TOLERANCE = "relative error of waveforms"
 
 
@@ -46,7 +49,7 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     """Which model answers, and how well."""
     parser.add_argument("--model", choices=("auto", *MODELS), default="auto")
     parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
-    parser.add_argument("--dt", type=float, metavar="S", help="time step of fem-transient, s")
+    parser.add_argument("--dt", type=float, metavar="S", help="time step of models that step, s")
 
 
 def required_plan(options: argparse.Namespace, scene: "Scene") -> "Plan":

@@ -10,7 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from skinwave.effort import Progress, versions
-from skinwave.verify import elements, exact, extremes, plates, sides, statics, stepping, waves
+from skinwave.verify import (
+    elements,
+    exact,
+    extremes,
+    nonlinear,
+    plates,
+    sides,
+    statics,
+    stepping,
+    waves,
+)
 from skinwave.verify import manufactured as fields
 from skinwave.verify.case import Case, Check, Entry, Result
 from skinwave.verify.page import page
@@ -20,6 +30,7 @@ def suite() -> tuple[Entry, ...]:
     """Every case, in the order of the page."""
     return (
         *_elements(), *_statics(), *_plates(), *_waves(), *_exact(), *_stepping(), *_extremes(),
+        *_nonlinear(),
     )  # fmt: skip
 
 
@@ -120,6 +131,19 @@ def _extremes() -> Iterable[Entry]:
     yield Entry(name="degenerate-paths", topic=topic, run=extremes.degenerate_paths)
     yield Entry(name="durations", topic=topic, run=extremes.durations)
     yield Entry(name="sampling", topic=topic, run=extremes.sampling)
+
+
+def _nonlinear() -> Iterable[Entry]:
+    topic = "Large deflection"
+    yield Entry(name="elastica", topic=topic, run=nonlinear.elastica)
+    yield Entry(name="clamped-disc", topic=topic, run=nonlinear.clamped_disc)
+    yield Entry(name="rigid-rotation", topic=topic, run=nonlinear.rigid_rotation)
+    yield Entry(name="tangent", topic=topic, run=nonlinear.tangent)
+    yield Entry(name="linear-limit", topic=topic, run=nonlinear.linear_limit)
+    yield Entry(name="free-energy", topic=topic, run=nonlinear.free_energy)
+    yield Entry(name="too-much", topic=topic, run=nonlinear.too_much)
+    yield Entry(name="amplitude", topic=topic, run=nonlinear.amplitude_test)
+    yield Entry(name="modes-or-all", topic=topic, run=nonlinear.reduced_against_full, slow=True)
 
 
 def run_suite(

@@ -1,0 +1,275 @@
+"""Large displacement of tetrahedra, and of a membrane stretched among their nodes.
+
+    F_ki = T_ki + G_ka u_ai,  E = (F F^T - 1) / 2,  S = lam tr(E) 1 + 2 mu E
+    f_ai = int G_ka S_kl F_li dV,  W = int (lam tr(E)^2 / 2 + mu E : E) dV
+
+Total Lagrangian with St. Venant and Kirchhoff's material: Bonet and Wood, Nonlinear Continuum
+Mechanics for Finite Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at
+rest, of which a solid has three and a horizontal membrane two, T being the first rows of the unit
+matrix; the same lines serve both. G holds shape gradients at four points of a tetrahedron and three
+of a triangle, as in the linear `assembly`, whose K is the tangent at rest.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from fem.assembly import (
+    LOSS_BAND,
+    SLAB,
+    UPPER,
+    Operators,
+    Pattern,
+    assemble,
+    by_region,
+    from_blocks,
+    gradients,
+    is_straight,
+)
+from fem.elements import shape_derivatives, triangle_rule
+from fem.materials import Material, rayleigh_damping
+from meshes import MeshError, TetMesh
+from meshes.tetmesh import Floats, Ints
+
+LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, which this one does not
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Elastic:
+    """A body that answers a large displacement u (n_free,) in metre of its free components.
+
+    `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, `viscous(u, v)`
+    (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in J; `operators`
+    is the linearisation at rest.
+    """
+
+    operators: Operators
+    internal: Callable[[Floats], Floats]
+    tangent: Callable[[Floats], sparse.csr_array]
+    viscous: Callable[[Floats, Floats], Floats]
+    energy: Callable[[Floats], float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Membrane:
+    """A horizontal sheet that stretches but neither bends nor weighs anything.
+
+    Parameters
+    ----------
+    triangles : (k, 3 or 6) int, nodes of the tetrahedral mesh, corners first
+    thickness : float, metre
+    """
+
+    triangles: Ints
+    thickness: float
+    material: Material
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """Elements of one kind: nodes (e, a), gradients G (e, q, k, a) and volumes (e, q) at the
+    quadrature points, Lame's parameters lam and mu (e,), and D (e q k, n) with D u = G_ka u_a.
+    """
+
+    nodes: Ints
+    G: Floats
+    volume: Floats
+    lam: Floats
+    mu: Floats
+    D: sparse.csr_array
+    D_transposed: sparse.csr_array
+    pattern: Pattern
+
+    @staticmethod
+    def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> "Part":
+        """The part of a mesh of n nodes."""
+        rows = np.arange(G[..., 0].size).repeat(nodes.shape[1])
+        columns = np.broadcast_to(nodes[:, None, None, :], G.shape).ravel()
+        D = sparse.csr_array((G.ravel(), (rows, columns)), shape=(G[..., 0].size, n))
+        return Part(
+            nodes=nodes, G=G, volume=volume, lam=lam, mu=mu, D=D,
+            D_transposed=D.T.tocsr(), pattern=Pattern.of(nodes, n),
+        )  # fmt: skip
+
+
+def finite_strain(
+    mesh: TetMesh,
+    material: Material | Mapping[int, Material],
+    *,
+    fixed: str | Mapping[str, str] | ArrayLike = "clamped",
+    membrane: Membrane | None = None,
+) -> Elastic:
+    """A body that may be displaced far, of tetrahedra and a membrane if there is one.
+
+    Mass and damping of the tetrahedra are those of `assemble`, linear and constant, which is right
+    while they turn by little. In a membrane the viscous stress follows the rate of E.
+
+    Parameters
+    ----------
+    mesh, material, fixed : as for `assemble`
+
+    Raises
+    ------
+    ValueError
+        If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock; else as
+        `assemble`.
+    """
+    n = len(mesh.points)
+    solid, operators = solid_part(mesh, material), assemble(mesh, material, fixed=fixed)
+    free = operators.free
+
+    def spread(u: Floats) -> Floats:
+        return operators.expand(u).reshape(n, 3)
+
+    body = Elastic(
+        operators=operators,
+        internal=lambda u: internal_force(solid, spread(u)).ravel()[free],
+        tangent=lambda u: tangent(solid, spread(u))[free][:, free],
+        viscous=lambda u, v: operators.C @ v,
+        energy=lambda u: stored_energy(solid, spread(u)),
+    )
+    if membrane is None:
+        return body
+    part, lag = membrane_part(mesh, membrane), stress_lag(membrane.material)
+    K = tangent(part, np.zeros((n, 3)))[free][:, free]
+    at_rest = replace(operators, K=operators.K + K, C=operators.C + lag * K)
+    return Elastic(
+        operators=at_rest,
+        internal=lambda u: body.internal(u) + internal_force(part, spread(u)).ravel()[free],
+        tangent=lambda u: body.tangent(u) + tangent(part, spread(u))[free][:, free],
+        viscous=lambda u, v: (
+            body.viscous(u, v) + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
+        ),
+        energy=lambda u: body.energy(u) + stored_energy(part, spread(u)),
+    )
+
+
+def stress_lag(material: Material) -> float:
+    """Viscous over elastic stress in s, at a rate of strain equal to the strain per second."""
+    rate = rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
+    return rate + material.viscosity / material.shear_modulus
+
+
+def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Part:
+    """The tetrahedra of a mesh."""
+    materials, region = by_region(mesh, material)
+    for m in materials:
+        if m.poisson > LARGEST_POISSON:
+            raise ValueError(
+                f"poisson = {m.poisson} exceeds {LARGEST_POISSON}, the limit of large "
+                "displacement, where these elements would lock; use the linear fem for it"
+            )
+    lam, mu = np.array([(m.first_lame, m.shear_modulus) for m in materials])[region].T
+    shape_of = mesh.tets[:, :4] if is_straight(mesh) else mesh.tets
+    G, volume = gradients(mesh.points[shape_of], mesh.tets.shape[1], 2, 0)
+    return Part.of(mesh.tets, G, volume, lam, mu, len(mesh.points))
+
+
+def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
+    """A membrane's triangles; lam in plane stress is 2 lam mu / (lam + 2 mu).
+
+    Raises
+    ------
+    MeshError
+        If its triangles do not lie in one horizontal plane, seen anticlockwise from above.
+    """
+    nodes, m = membrane.triangles, membrane.material
+    corners = mesh.points[nodes[:, :3]]
+    edges = corners[:, 1:, :2] - corners[:, :1, :2]  # (e, l, k)
+    area = np.linalg.det(edges) / 2
+    if np.ptp(corners[..., 2]) > 1e-9 * np.abs(edges).max() or (area <= 0).any():
+        raise MeshError(
+            "a membrane's triangles must lie in one horizontal plane, seen anticlockwise from "
+            "above; take those of meshes.middle_plane"
+        )
+    barycentric, weights = triangle_rule(2)
+    derivatives = shape_derivatives(barycentric, nodes.shape[1])
+    G = np.einsum("ekl,qal->eqka", np.linalg.inv(edges), derivatives)
+    volume = membrane.thickness * area[:, None] * weights
+    lam = 2 * m.first_lame * m.shear_modulus / (m.first_lame + 2 * m.shear_modulus)
+    alike = np.ones(len(nodes))
+    return Part.of(nodes, G, volume, lam * alike, m.shear_modulus * alike, len(mesh.points))
+
+
+def internal_force(part: Part, u: Floats) -> Floats:
+    """Nodal forces (n, 3) in N that hold a part at the displacement u (n, 3) in metre."""
+    F, E = deformation(part, u)
+    return spread_stress(part, stress(part, E) @ F)
+
+
+def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
+    """Nodal forces (n, 3) in N/s of the stress that the rate of E at velocity v (n, 3) makes."""
+    F = deformation(part, u)[0]
+    rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
+    return spread_stress(part, stress(part, (rate + rate.swapaxes(2, 3)) / 2) @ F)
+
+
+def stored_energy(part: Part, u: Floats) -> float:
+    """Energy in J of a part at the displacement u (n, 3) in metre."""
+    E = deformation(part, u)[1]
+    return float((part.volume[..., None, None] * stress(part, E) * E).sum() / 2)
+
+
+def deformation(part: Part, u: Floats) -> tuple[Floats, Floats]:
+    """F (e, q, k, i) and Green and Lagrange's strain E (e, q, k, l), exact for small u, too."""
+    H = (part.D @ u).reshape(*part.G.shape[:3], 3)
+    k = H.shape[2]
+    E = quadratic_strain(H, H)
+    E += (H[..., :k] + H[..., :k].swapaxes(2, 3)) / 2
+    return H + np.eye(3)[:k], E
+
+
+def quadratic_strain(H: Floats, other: Floats) -> Floats:
+    """sym(H other^T) / 2 (e, q, k, l): what the strain has in addition to its linear part."""
+    product = H @ other.swapaxes(2, 3)
+    return (product + product.swapaxes(2, 3)) / 4
+
+
+def stress(part: Part, E: Floats) -> Floats:
+    """Second Piola and Kirchhoff's stress (e, q, k, l) in Pa."""
+    S = 2 * part.mu[:, None, None, None] * E
+    pressure = part.lam[:, None] * np.trace(E, axis1=2, axis2=3)
+    for k in range(E.shape[2]):
+        S[..., k, k] += pressure
+    return S
+
+
+def spread_stress(part: Part, P: Floats) -> Floats:
+    """Nodal forces (n, 3) of a stress P (e, q, k, i): int G_ka P_ki dV."""
+    return part.D_transposed @ (part.volume[..., None, None] * P).reshape(-1, P.shape[3])
+
+
+def tangent(part: Part, u: Floats) -> sparse.csr_array:
+    """d internal_force / d u (3 n, 3 n) in N/m, consistent and symmetric.
+
+    K_ab,ij = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_li F_lj) + delta_ij G_ka S_kl G_lb,
+    A_ai = G_ka F_ki
+    """
+    F, E = deformation(part, u)
+    S = stress(part, E)
+    e, a = part.nodes.shape
+    blocks = np.empty((6, e, a, a))
+    for start in range(0, e, SLAB):
+        slab = slice(start, start + SLAB)
+        _tangent_blocks(part, slab, F[slab], S[slab], blocks[:, slab])
+    return from_blocks(part.pattern, blocks)
+
+
+def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats, blocks: Floats) -> None:
+    """Element blocks (6, e, a, b) of the tangent, in place."""
+    V, G = part.volume[slab, :, None, None], part.G[slab]
+    G_transposed = G.swapaxes(2, 3)
+    A = G_transposed @ F  # (e, q, a, i)
+    slopes = V * (G_transposed @ G)  # (e, q, a, b)
+    stretch = part.mu[slab, None, None, None] * (F.swapaxes(2, 3) @ F)
+    geometric = (V * (G_transposed @ (S @ G))).sum(axis=1)
+    lam, mu = part.lam[slab, None, None], part.mu[slab, None, None]
+    for block, (i, j) in zip(blocks, UPPER, strict=True):
+        across = np.einsum("eqa,eqb->eab", V[..., 0] * A[..., i], A[..., j], optimize=True)
+        block[:] = lam * across + mu * across.swapaxes(1, 2)
+        block += np.einsum("eqab,eq->eab", slopes, stretch[..., i, j])
+        if i == j:
+            block += geometric

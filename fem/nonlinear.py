@@ -1,0 +1,287 @@
+"""Large displacement at rest and in time: M u'' + f_int(u, u') = f(t, u).
+
+At rest by Newton's method with a line search, the load in steps if need be. In time by the
+generalized-alpha method of `transient` with the internal force weighted between the ends of a step,
+
+    M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
+
+(Chung and Hulbert, J Appl Mech 60:371 (1993); Newton in time: Belytschko, Liu and Moran, Nonlinear
+Finite Elements (2000), section 6.3). One factorisation serves as many steps as it goes on to
+converge for. Average acceleration keeps energy to second order in the step, not to round-off as in
+the linear case. Momentum is kept by the balance of forces, which is solved to the tolerance.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fem.energy import Spent
+from fem.finite_strain import Elastic
+from fem.linear_solver import Factor, factorise
+from fem.transient import Diverged, State, acceleration, at_rest, weights
+from meshes.tetmesh import Floats
+
+MOST_ITERATIONS = 25
+MOST_HALVINGS = 6  # of a load or time step
+SLOW = 0.3  # of a correction, beyond which the next one calls for another tangent
+STANDSTILL = 1e-6  # of the displacement: a step below it is as good as none
+
+
+class _Stuck(ArithmeticError):
+    """Newton's method did not converge; the relative residual it was left with."""
+
+
+def static(
+    body: Elastic,
+    force: Floats | Callable[[Floats], Floats],
+    *,
+    start: Floats | None = None,
+    tolerance: float = 1e-8,
+    solver: str = "auto",
+) -> Floats:
+    """Displacement (3 n,) in metre at rest under a force that is put on in as few steps as it can.
+
+    Parameters
+    ----------
+    force : (3 n,) in N; or displacement (3 n,) -> such forces, for those that follow the body
+    start : (3 n,) in metre, where to look first; at rest without load if not given
+    tolerance : residual relative to the force
+
+    Raises
+    ------
+    Diverged
+        If Newton's method does not converge even in steps of 1/64 of the load.
+    """
+    operators = body.operators
+    free = operators.free
+    follow = force if callable(force) else lambda u: force
+    u = np.zeros(len(free)) if start is None else start[free]
+    reached, part = 0.0, 1.0
+    while reached < 1:
+        target = min(1.0, reached + part)
+
+        def unbalanced(u: Floats, share: float = target) -> tuple[Floats, float]:
+            f = share * follow(operators.expand(u))[free]
+            return f - body.internal(u), float(np.linalg.norm(f))
+
+        try:
+            u = _newton(body, unbalanced, u, tolerance, solver)
+        except _Stuck as stuck:
+            part /= 2
+            if part < 0.5**MOST_HALVINGS:
+                raise Diverged(
+                    f"the body found no rest at {100 * target:.3g} % of its load: a residual of "
+                    f"{stuck.args[0]:.2g} of it is left, above {tolerance:g}, after load steps of "
+                    f"1/{2**MOST_HALVINGS}; lower the load, or refine the mesh where it bends most"
+                ) from None
+        else:
+            reached, part = target, 2 * part
+    return operators.expand(u)
+
+
+def _newton(
+    body: Elastic,
+    unbalanced: Callable[[Floats], tuple[Floats, float]],
+    u: Floats,
+    tolerance: float,
+    solver: str,
+) -> Floats:
+    left = np.inf
+    for _ in range(MOST_ITERATIONS):
+        r, size = unbalanced(u)
+        left = float(np.linalg.norm(r)) / (size or 1.0)
+        if not np.isfinite(left):
+            break
+        if left <= tolerance:
+            return u
+        try:
+            step = factorise(body.tangent(u), backend=solver).solve(r)
+        except ValueError:  # no longer positive definite: too far from the solution
+            break
+        u = u + _line_search(unbalanced, u, step) * step
+    raise _Stuck(left)
+
+
+def _line_search(
+    unbalanced: Callable[[Floats], tuple[Floats, float]], u: Floats, step: Floats
+) -> float:
+    """How much of a step to take: until the residual does no more work along it."""
+
+    def work(part: float) -> float:
+        return float(step @ unbalanced(u + part * step)[0])
+
+    start, end = work(0.0), work(1.0)
+    if end >= -0.5 * start or not np.isfinite(end):
+        return 1.0
+    return float(brentq(work, 0.0, 1.0, xtol=0.02, rtol=0.02))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Now:
+    """Free components of a state, with the load and the elastic and viscous force."""
+
+    t: float
+    u: Floats
+    v: Floats
+    a: Floats
+    force: Floats
+    internal: Floats
+
+
+def dynamic(
+    body: Elastic,
+    force: Callable[[float, Floats], Floats],
+    dt: float,
+    *,
+    spectral_radius: float = 1.0,
+    initial: State | None = None,
+    tolerance: float = 1e-3,
+    solver: str = "auto",
+) -> Iterator[State]:
+    """States at 0, dt, 2 dt, ... without end: take what you need.
+
+    A step for which Newton's method does not converge is made of two halves, and so on.
+
+    Parameters
+    ----------
+    force : time in s and displacement (3 n,) in metre -> nodal forces (3 n,) in N
+    dt : float, s
+    spectral_radius : 0 to 1, amplitude kept per step by motion far beyond the time step
+    initial : displacement and velocity to start from; at rest at time 0 if not given
+    tolerance : the last correction of a step's displacement, relative to that displacement
+
+    Raises
+    ------
+    ValueError
+        If dt or the spectral radius is out of range.
+    Diverged
+        If Newton's method does not converge even in 64 parts of a step.
+    """
+    scheme = weights(dt, spectral_radius)
+    free, start = body.operators.free, initial or at_rest(body.operators.n_dofs)
+    u, v = start.displacement[free], start.velocity[free]
+    f, internal = force(start.time, start.displacement)[free], body.internal(u)
+    viscous = body.viscous(u, v)
+    a = acceleration(body.operators, f - viscous - internal)
+    now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal + viscous)
+    march = _March(body=body, force=force, scheme=scheme, tolerance=tolerance, solver=solver)
+    factors: dict[float, Factor] = {}
+    for step in count(1):
+        yield _state(body, now)
+        try:
+            now = _advance(march, now, start.time + step * dt, factors, 0)
+        except _Stuck as stuck:
+            raise Diverged(
+                f"step {step} of dt = {dt:g} s, to t = {start.time + step * dt:g} s, did not "
+                f"converge even in {2**MOST_HALVINGS} parts: a residual of {stuck.args[0]:.2g} of "
+                f"the load is left, with corrections above {tolerance:g} of a part; shorten dt or "
+                "lower the load"
+            ) from None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _March:
+    """What stays the same from step to step."""
+
+    body: Elastic
+    force: Callable[[float, Floats], Floats]
+    scheme: tuple[float, float, float, float]
+    tolerance: float
+    solver: str
+
+
+def _advance(
+    march: _March, now: _Now, until: float, factors: dict[float, Factor], halvings: int
+) -> _Now:
+    try:
+        return _step(march, now, until, factors, halvings)
+    except _Stuck:
+        factors.pop(halvings, None)
+        if halvings == MOST_HALVINGS:
+            raise
+    middle = _advance(march, now, (now.t + until) / 2, factors, halvings + 1)
+    return _advance(march, middle, until, factors, halvings + 1)
+
+
+def _step(
+    march: _March, now: _Now, until: float, factors: dict[float, Factor], halvings: int
+) -> _Now:
+    """One step by Newton's method, with the factorisation kept for `halvings` if it converges."""
+    body, (a_m, a_f, beta, gamma) = march.body, march.scheme
+    C, M, free = body.operators.C, body.operators.M, body.operators.free
+    dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
+    predicted = now.u + dt * now.v + dt**2 * (0.5 - beta) * now.a
+    for _ in range(MOST_ITERATIONS):
+        u = predicted + dt**2 * beta * a
+        v = now.v + dt * ((1 - gamma) * now.a + gamma * a)
+        f = march.force(until, body.operators.expand(u))[free]
+        internal = body.internal(u) + body.viscous(u, v)
+        load = (1 - a_f) * f + a_f * now.force
+        r = load - M @ ((1 - a_m) * a + a_m * now.a) - (1 - a_f) * internal - a_f * now.internal
+        residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
+        if not np.isfinite(residual):
+            break
+        if halvings not in factors:
+            system = (1 - a_m) * M + (1 - a_f) * dt * (gamma * C + beta * dt * body.tangent(u))
+            try:
+                factors[halvings] = factorise(system, backend=march.solver)
+            except ValueError:
+                break
+        change = factors[halvings].solve(r)
+        a = a + change
+        sizes = (u - now.u, dt**2 * beta * a, STANDSTILL * u)
+        step = max(float(np.linalg.norm(size)) for size in sizes)
+        left = dt**2 * beta * float(np.linalg.norm(change)) / (step or 1.0)
+        shrinks = left <= max(SLOW * before, march.tolerance / 100)
+        if left <= march.tolerance and (shrinks or before <= march.tolerance):
+            # One more residual would only confirm what this correction leaves: its square or, with
+            # an old tangent, a small part of it. The balance of forces stands for it.
+            u, v = u + dt**2 * beta * change, v + dt * gamma * change
+            internal = (load - M @ ((1 - a_m) * a + a_m * now.a) - a_f * now.internal) / (1 - a_f)
+            return _Now(t=until, u=u, v=v, a=a, force=f, internal=internal)
+        if left > SLOW * before:
+            factors.pop(halvings)
+        before = left
+    raise _Stuck(residual)
+
+
+def _state(body: Elastic, now: _Now) -> State:
+    expand = body.operators.expand
+    return State(
+        time=now.t, displacement=expand(now.u), velocity=expand(now.v), acceleration=expand(now.a)
+    )
+
+
+def total_energy(body: Elastic, state: State) -> float:
+    """Kinetic and stored energy of a state in J."""
+    free = body.operators.free
+    v = state.velocity[free]
+    return float(v @ (body.operators.M @ v)) / 2 + body.energy(state.displacement[free])
+
+
+def audited(
+    body: Elastic, states: Iterator[State], force: Callable[[float], Floats]
+) -> Iterator[tuple[State, Spent]]:
+    """States, each with what was spent since the first, as `fem.audited` of a linear body.
+
+    Parameters
+    ----------
+    force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
+    """
+    free = body.operators.free
+    before, spent = next(states), Spent()
+    f = force(before.time)[free]
+    yield before, spent
+    for state in states:
+        f_next, dt = force(state.time)[free], state.time - before.time
+        moved = (state.displacement - before.displacement)[free]
+        middle = (state.displacement + before.displacement)[free] / 2
+        spent = Spent(
+            work=spent.work + float(moved @ (f + f_next)) / 2,
+            dissipated=spent.dissipated + float(moved @ body.viscous(middle, moved)) / dt,
+        )
+        yield state, spent
+        before, f = state, f_next

@@ -1,0 +1,180 @@
+"""A flat sheet of large deflection in the coordinates z of its bending modes.
+
+    w = shapes z,  M = 1,  energy = z^T K z / 2 + sum_k y_k^2 / 2,  y_k = z^T H_k z / 2
+
+What bending stretches, e(w, w) = grad w grad w^T / 2, the sheet evens out within its plane at
+once, its waves there being some hundred times faster. The strain that is left is compatible with
+no motion in the plane; it is expanded in states of stress s_k that are orthonormal in energy and in
+balance by themselves, and H_k is the stiffness that the stress s_k adds to bending. They are found
+from the finite elements: pairs of modes are enforced, the plane is solved for, and what is left is
+decomposed, the most energetic states first (implicit condensation: Hollkamp and Gordon, J Sound Vib
+318:1139 (2008); the equations are von Karman's with Airy's function, Thomas and Bilbao, J Sound
+Vib 315:569 (2008)).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from fem.assembly import Operators
+from fem.finite_strain import (
+    Elastic,
+    Membrane,
+    Part,
+    membrane_part,
+    spread_stress,
+    stress,
+    stress_lag,
+    tangent,
+)
+from fem.linear_solver import factorise
+from fem.static import modes
+from meshes import TetMesh
+from meshes.tetmesh import Floats, Ints
+
+PAIRS = 200  # of modes that are enforced
+RESONANT = 2 * np.pi * 200.0  # rad/s below which modes are taken to move equally far
+SMALLEST_STATE = 1e-2  # of the energy norm of the largest
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StretchingModes:
+    """A sheet in modal coordinates z (r,) in kg^1/2 m.
+
+    `basis` (3 n, r) in kg^-1/2, `hz` (r,) natural frequencies, `H` (k, r, r), the share `left_out`
+    of the states of stress, and `elastic` for `nonlinear.static` and `nonlinear.dynamic`.
+    """
+
+    basis: Floats
+    hz: Floats
+    H: Floats
+    left_out: float
+    elastic: Elastic
+
+
+def stretching_modes(
+    mesh: TetMesh,
+    operators: Operators,
+    membrane: Membrane,
+    n: int,
+    *,
+    solver: str = "auto",
+    progress: Callable[[float], None] | None = None,
+) -> StretchingModes:
+    """Reduce a sheet to its n lowest bending modes.
+
+    Parameters
+    ----------
+    operators : the sheet's linear operators, from `assemble`
+    membrane : all that resists stretching, among the nodes of the mesh
+    """
+    hz, shapes = modes(operators, n, solver=solver)
+    part = membrane_part(mesh, membrane)
+    w = shapes.reshape(-1, 3, n)[:, 2]
+    slopes = (part.D @ w).reshape(*part.G.shape[:3], n)  # (e, q, k, m)
+    fixed = np.ones(mesh.n_dofs, bool)
+    fixed[operators.free] = False
+    states, left_out = _states_of_stress(part, fixed, slopes, hz, solver)
+    H = np.empty((len(states), n, n))
+    weighted = slopes * part.volume[..., None, None]
+    for k, s in enumerate(states):
+        H[k] = weighted.reshape(-1, n).T @ (stress(part, s) @ slopes).reshape(-1, n)
+        if progress:
+            progress(k / len(states))
+    modal = Operators(
+        K=sparse.diags_array((2 * np.pi * hz) ** 2).tocsr(),
+        C=sparse.csr_array(shapes[operators.free].T @ (operators.C @ shapes[operators.free])),
+        M=sparse.eye_array(n).tocsr(), R=sparse.csr_array((n, n)), free=np.arange(n), n_dofs=n,
+    )  # fmt: skip
+    return StretchingModes(
+        basis=shapes, hz=hz, H=H, left_out=left_out,
+        elastic=modal_elastic(modal, H, stress_lag(membrane.material)),
+    )  # fmt: skip
+
+
+def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
+    """The sheet's energy and its derivatives with respect to z; `lag` in s as in `stress_lag`."""
+    squares, n = modal.K.diagonal(), len(modal.free)
+    stacked = H.reshape(-1, n)
+
+    @lru_cache(maxsize=2)
+    def product(z: bytes) -> Floats:
+        return (stacked @ np.frombuffer(z)).reshape(-1, n)
+
+    def internal(z: Floats) -> Floats:
+        Hz = product(z.tobytes())
+        return squares * z + (Hz @ z / 2) @ Hz
+
+    def stiffness(z: Floats) -> sparse.csr_array:
+        Hz = product(z.tobytes())
+        return sparse.csr_array(np.diag(squares) + np.tensordot(Hz @ z / 2, H, axes=1) + Hz.T @ Hz)
+
+    def viscous(z: Floats, rate: Floats) -> Floats:
+        Hz = product(z.tobytes())
+        return modal.C @ rate + lag * (Hz @ rate) @ Hz
+
+    def energy(z: Floats) -> float:
+        y = product(z.tobytes()) @ z / 2
+        return float(squares @ z**2 + y @ y) / 2
+
+    return Elastic(
+        operators=modal, internal=internal, tangent=stiffness, viscous=viscous, energy=energy
+    )
+
+
+def _states_of_stress(
+    part: Part, fixed: NDArray[np.bool_], slopes: Floats, hz: Floats, solver: str
+) -> tuple[Floats, float]:
+    """Strains (k, e, q, k, l) of states of stress, orthonormal in energy; what is left out."""
+    reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
+    i, j = _strongest_pairs(reach)
+    weight = reach[i] * reach[j] * np.where(i == j, 1, 2)
+    left = []
+    plane = _Plane.of(part, fixed, solver)
+    for first, second, scale in zip(i, j, weight, strict=True):
+        e = slopes[..., :, None, first] * slopes[..., None, :, second] * scale / 2
+        left.append(plane.incompatible((e + e.swapaxes(2, 3)) / 2))
+    strains = np.array(left)
+    stresses = np.array([stress(part, s) * part.volume[..., None, None] for s in left])
+    gram = strains.reshape(len(i), -1) @ stresses.reshape(len(i), -1).T
+    squares, vectors = np.linalg.eigh((gram + gram.T) / 2)
+    kept = squares > SMALLEST_STATE**2 * squares.max()
+    states = np.tensordot((vectors[:, kept] / np.sqrt(squares[kept])).T[::-1], strains, axes=1)
+    return states, float(np.sqrt(squares[~kept].clip(0).sum() / squares.sum()))
+
+
+def _strongest_pairs(reach: Floats) -> tuple[Ints, Ints]:
+    i, j = np.triu_indices(len(reach))
+    order = np.argsort(-reach[i] * reach[j], kind="stable")[:PAIRS]
+    return i[order], j[order]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Plane:
+    """Motion within the plane of a membrane."""
+
+    part: Part
+    moving: Ints  # of the 3 n components
+    solve: Callable[[Floats], Floats]
+
+    @staticmethod
+    def of(part: Part, fixed: NDArray[np.bool_], solver: str) -> "_Plane":
+        n = part.D.shape[1]
+        horizontal = np.zeros((n, 3), bool)
+        horizontal[np.unique(part.nodes), :2] = True
+        moving = np.flatnonzero(horizontal.ravel() & ~fixed)
+        K = tangent(part, np.zeros((n, 3)))[moving][:, moving]
+        return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
+
+    def incompatible(self, e: Floats) -> Floats:
+        """A strain (e, q, k, l) less that of the motion which evens it out."""
+        f = np.zeros((self.part.D.shape[1], 3))
+        f[:, :2] = spread_stress(self.part, stress(self.part, e))
+        v = np.zeros(f.size)
+        v[self.moving] = self.solve(f.ravel()[self.moving])
+        slope = (self.part.D @ v.reshape(-1, 3)[:, :2]).reshape(e.shape)
+        return e - (slope + slope.swapaxes(2, 3)) / 2

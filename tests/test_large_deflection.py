@@ -1,0 +1,153 @@
+"""What large displacement does beyond the cases of the verification suite, and what it refuses."""
+
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+from fem import nonlinear
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.plan import plan
+from skinwave.scene import BODIES, Body, Scene
+from skinwave.simulation import simulate
+from skinwave.stretching import mean_pressure, membrane, meshed_sheet, stretching_body
+
+PAPER = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+CIRCLING = MovingPressure(
+    tacton=Tacton(
+        am_frequency=140, duration=0.02, trajectory=Trajectory(shape="circle", size=0.02, speed=12)
+    ),
+    drive="pressure_squared",
+)
+SCENE = Scene(pressure=CIRCLING, body=PAPER, probes=((0.0, 0.0), (0.01, 0.005)))
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    made = meshed_sheet(PAPER, 0.01)
+    return made, stretching_body(PAPER, made)
+
+
+def test_a_follower_presses_against_the_displaced_surface():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
+    closed = meshes.boundary_facets(mesh.tets)
+    dead, follower = (fem.pressure_force(mesh, closed, kind=k) for k in ("dead", "follower"))
+    q = np.ones(6 * len(closed))
+    np.testing.assert_allclose(follower(q, np.zeros(mesh.n_dofs)), dead(q, q), atol=1e-18)
+    turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    turned = (mesh.points @ turn.T - mesh.points).ravel()
+    expected = dead(q, q).reshape(-1, 3) @ turn.T
+    np.testing.assert_allclose(follower(q, turned).reshape(-1, 3), expected, atol=1e-18)
+    bent = 1e-3 * np.random.default_rng(0).standard_normal(mesh.n_dofs)
+    assert np.abs(follower(q, bent).reshape(-1, 3).sum(axis=0)).max() < 1e-18
+    with pytest.raises(ValueError, match="use dead or follower"):
+        fem.pressure_force(mesh, kind="live")
+
+
+def test_a_sheet_rests_under_a_follower_almost_as_under_a_dead_pressure(sheet):
+    made, body = sheet
+    S = fem.probe_operator(made.mesh, [[0, 0]])
+    q = np.full(6 * len(made.mesh.facets["top"]), 5.0)
+    rest = []
+    for kind in ("dead", "follower"):
+        push = fem.pressure_force(made.mesh, kind=kind)
+        rest.append(S @ nonlinear.static(body, lambda u, push=push: push(q, u)))
+    assert rest[0] > 0.5 * PAPER.depth
+    assert rest[0] == pytest.approx(rest[1], rel=1e-3)
+    assert rest[0] != rest[1]
+
+
+def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(sheet):
+    made, _ = sheet
+    x = made.mesh.points
+    stretched = np.zeros_like(x)
+    stretched[:, :2] = 1e-4 * x[:, :2]
+    stretched[:, 2] = -2 * 0.3 / 0.7 * 1e-4 * (x[:, 2] - x[:, 2].mean())
+    free = fem.finite_strain(
+        made.mesh, made.material, fixed=np.zeros(x.shape, bool), membrane=membrane(PAPER, made)
+    )
+    solid = PAPER.solid
+    exact = solid.young / (1 - 0.3) * (1e-4) ** 2 * PAPER.depth * PAPER.width * PAPER.height
+    assert free.energy(stretched.ravel()) == pytest.approx(exact, rel=1e-3)
+
+
+def test_mean_pressure_is_the_average_over_time():
+    points = np.array([[0.0, 0.0], [0.01, 0.0], [-0.004, 0.009]])
+    times = np.linspace(0, 0.5, 1500, endpoint=False)
+    bell = np.sin(2 * np.pi * times) ** 2  # lets no line leak into the mean
+    average = bell @ np.array([CIRCLING(points, t) for t in times]) / bell.sum()
+    np.testing.assert_allclose(mean_pressure(CIRCLING, points), average, rtol=1e-3)
+
+
+def test_the_motion_starts_from_rest_under_the_mean_pressure(sheet):
+    response = simulate(SCENE, "fem-nonlinear", h=0.01)
+    made, body = sheet
+    P, points = fem.load_operator(made.mesh), fem.facet_points(made.mesh)[:, :2]
+    rest = nonlinear.static(body, P @ mean_pressure(CIRCLING, points))
+    S = fem.probe_operator(made.mesh, SCENE.probe_points)
+    np.testing.assert_allclose(response.displacement[0], S @ rest, rtol=0.01)
+    assert response.model == "fem-nonlinear"
+    assert response.effort.reduced_dofs == 40
+    assert response.effort.steps == 398
+    assert 0 < response.effort.energy_imbalance < 0.01
+
+
+def test_a_step_that_fails_is_halved(sheet, monkeypatch):
+    monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", 4)
+    made, body = sheet
+    P = fem.load_operator(made.mesh)
+    push, asked = P @ np.full(P.shape[1], 20.0), set()
+
+    def force(t, u):
+        asked.add(round(t, 9))
+        return push
+
+    states = list(islice(nonlinear.dynamic(body, force, 2e-3), 2))
+    assert [s.time for s in states] == [0, 2e-3]
+    assert {1e-3, 2e-3} < asked
+    assert np.isfinite(states[1].displacement).all()
+
+
+def test_states_before_a_failure_are_kept(sheet):
+    made, body = sheet
+    P = fem.load_operator(made.mesh)
+    push = P @ np.ones(P.shape[1])
+    states = nonlinear.dynamic(body, lambda t, u: push * (np.nan if t > 2.5e-4 else 1), 1e-4)
+    kept = [next(states) for _ in range(3)]
+    with pytest.raises(fem.Diverged, match=r"step 3 of dt = 0.0001 s.*residual.*shorten dt"):
+        next(states)
+    assert [s.time for s in kept] == pytest.approx([0, 1e-4, 2e-4])
+
+
+def test_what_it_does_not_answer_is_refused():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
+    with pytest.raises(ValueError, match=r"poisson = 0.49 exceeds 0.45.*use the linear fem"):
+        fem.finite_strain(mesh, fem.Material(density=1, shear_modulus=1, poisson=0.49))
+    with pytest.raises(meshes.MeshError, match="extrude it with order 2"):
+        meshes.middle_plane(meshes.block((0.02, 0.02, 0.01), 0.01, order=1))
+    layer = fem.Membrane(
+        triangles=mesh.facets["left"], thickness=1e-3, material=fem.PRESETS["paper"]
+    )
+    with pytest.raises(meshes.MeshError, match="one horizontal plane"):
+        fem.finite_strain(mesh, fem.PRESETS["paper"], membrane=layer)
+
+
+@pytest.mark.parametrize("model", ["fem-nonlinear", "fem-nonlinear-transient"])
+@pytest.mark.parametrize(
+    ("body", "got"),
+    [(Body(), "not a slab with absorbing sides"), (replace(PAPER, sides="absorbing"), "a sheet")],
+)
+def test_nonlinear_models_are_for_sheets_that_are_held(model, body, got):
+    for h in (None, 0.01):
+        with pytest.raises(ValueError, match=f"{got}.*--model fem"):
+            simulate(replace(SCENE, body=body), model, h=h)
+
+
+def test_the_plan_of_a_nonlinear_sheet_says_what_is_wrong_with_large_elements():
+    assert not plan(SCENE, model="fem-nonlinear").warnings
+    coarse = plan(SCENE, model="fem-nonlinear-transient", h=0.01)
+    assert "elements of 10 mm will be wrong" in coarse.warnings[0]
+    assert not any("stretching" in row.what for row in coarse.rows)
