@@ -181,7 +181,7 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
     if order not in (1, 2):
         raise MeshError(f"order = {order} is not available; use 1 or 2")
     check_size((len(line) - 1 for line in lines), order)
-    triangles = _rectangle_triangles(len(lines[0]) - 1, len(lines[1]) - 1)
+    triangles = _rectangle_triangles(*lines[:2])
     yy, xx = np.meshgrid(lines[1], lines[0], indexing="ij")
     points, tets = _layers(np.column_stack([xx.ravel(), yy.ravel()]), triangles, lines[2])
     mesh = TetMesh(points=points, tets=tets, facets=_sides(points, boundary_facets(tets)))
@@ -215,8 +215,9 @@ def _layers(plane: Floats, triangles: Ints, z: Floats) -> tuple[Floats, Ints]:
     return points, tets
 
 
-def _rectangle_triangles(nx: int, ny: int) -> Ints:
+def _rectangle_triangles(x: Floats, y: Floats) -> Ints:
     """Two triangles a cell with alternating diagonals, nodes ordered by parity."""
+    nx, ny = len(x) - 1, len(y) - 1
     j, i = np.divmod(np.arange(nx * ny), nx)
     a, b = j * (nx + 1) + i, j * (nx + 1) + i + 1
     d, c = a + nx + 1, b + nx + 1
@@ -225,9 +226,10 @@ def _rectangle_triangles(nx: int, ny: int) -> Ints:
     second = np.where(even, np.column_stack([a, c, d]), np.column_stack([b, c, d]))
     triangles = np.vstack([first, second])
     row, column = np.divmod(triangles, nx + 1)
-    # By parity about the middle, whose neighbours then look the same in every mesh; the corners of
-    # a cell all differ.
-    rank = np.argsort(2 * ((column - nx // 2) % 2) + (row - ny // 2) % 2, axis=1)
+    # By parity about the origin, under the focus, whose elements then look the same in every mesh,
+    # whole or part, and in the better of two ways; the corners of a cell all differ.
+    column, row = column - np.argmin(np.abs(x)), row - np.argmin(np.abs(y))
+    rank = np.argsort(2 * (column % 2) + row % 2, axis=1)
     return np.take_along_axis(triangles, rank, axis=1)
 
 

@@ -303,7 +303,7 @@ def bodies(draw):
     """A shaken block, straight or bowed, in four- or ten-node tetrahedra."""
     rng, order = draw(seeds), draw(st.sampled_from((1, 2)))
     mesh = meshes.block((0.03, 0.02, 0.01), 0.006, order=order)
-    shaken = mesh.points + rng.uniform(-4e-4, 4e-4, mesh.points.shape)
+    shaken = mesh.points + rng.uniform(-3e-4, 3e-4, mesh.points.shape)
     return TetMesh(points=shaken, tets=mesh.tets, facets=mesh.facets)
 
 

@@ -305,7 +305,7 @@ def test_every_element_answer_accounts_for_its_energy(model):
     )
     found = simulate(scene, model, h=0.008)
     assert 0 < found.effort.energy_imbalance < 1e-9
-    assert 0.02 < found.effort.radiated < 0.5  # through the sides; the rest in the skin
+    assert 0.003 < found.effort.radiated < 0.5  # through the sides; the rest in the skin
     closed = replace(scene, body=replace(scene.body, sides="clamped"))
     assert simulate(closed, model, h=0.008).effort.radiated == 0
 
