@@ -1,0 +1,34 @@
+"""What each assumption of the published model changes on a scene, and what dropping it costs."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import add_output, add_scene, metre, progress_of, summarise
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    add_scene(parser)
+    parser.add_argument("--h", type=float, metavar="MM", help="element size of all rungs, mm")
+    add_output(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.files import output_folder
+    from skinwave.relax import climb, sentence, write
+    from skinwave.scene_file import read
+    from skinwave.simulation import check_knobs
+
+    scene, h = read(options.scene), metre(options.h)
+    check_knobs("auto", h=h)
+    out = options.out or Path(f"{options.scene.stem}-relaxed")
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        with progress_of(options) as progress:
+            found = climb(scene, progress, h=h)
+        write(folder, found)
+    sentences = [sentence(effect) for effect in found.effects()]
+    failed = [f"'{rung.name}' failed: {rung.error}" for rung in found.rungs if rung.error]
+    summary = {"out": str(out), "sentences": sentences, "failed": failed}
+    summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
+    return 0

@@ -1,0 +1,132 @@
+"""The published model's assumptions, dropped one by one."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import skinwave
+from simple_model import MovingPressure, Tacton, Trajectory, lines, point_kernel
+from skinwave.assumptions import DEVICE_RATE, as_one, held, ladder, relaxed
+from skinwave.cli import main
+from skinwave.relax import climb, line_changes
+from skinwave.scene import BODIES, Body, Layer
+from skinwave.scene_file import dumps
+
+PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
+SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.04, height=0.04), probes=((0.01, 0.0),))
+PAPER = replace(SKIN, body=replace(BODIES["paper-sheet"], width=0.05, height=0.05))
+
+
+def test_a_slab_and_a_sheet_have_their_own_ladders():
+    assert ladder(SKIN) == (
+        "linear drive", "no propagation", "little loss", "endless", "main lobe only",
+        "continuous path", "one material", "flat",
+    )  # fmt: skip
+    assert ladder(PAPER) == (
+        "linear drive", "no propagation", "endless", "vacuum", "main lobe only",
+        "continuous path", "small deflection",
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="keeps every assumption"):
+        ladder(replace(SKIN, body=BODIES["none"]))
+
+
+def test_nothing_dropped_is_the_published_model():
+    scene, model = relaxed(SKIN, ())
+    assert model == "point-kernel"
+    assert scene.body.kind == "none"
+    assert (scene.pressure.drive, scene.pressure.focus) == ("linear", "main_lobe")
+
+
+def test_all_dropped_is_the_richest():
+    scene, model = relaxed(SKIN, ladder(SKIN))
+    assert model == "fem"
+    assert scene.body.kind == "palm"
+    assert (scene.pressure.drive, scene.pressure.focus) == ("pressure_squared", "array")
+    assert scene.tacton.trajectory.hold
+    assert len(scene.body.layers) == 1
+    sheet, model = relaxed(PAPER, ladder(PAPER))
+    assert model == "fem-nonlinear"
+    assert sheet.body.solid.density > 1.15 * PAPER.body.solid.density  # the air's part
+
+
+def test_a_device_holds_its_focus_at_a_whole_number_of_points():
+    path = held(PATH)
+    assert path.hold
+    assert path.drawing_frequency == pytest.approx(PATH.drawing_frequency)
+    assert len(path.points) - 1 == round(DEVICE_RATE / PATH.drawing_frequency)
+    assert np.hypot(*np.array(path.points).T) == pytest.approx(0.01)
+
+
+def test_the_square_of_a_sine_makes_its_second_harmonic_and_no_third():
+    """q = ((1 + sin) / 2)^2 has 2f at a quarter of f, and nothing at 3f."""
+    times = np.arange(10_000) / 10_000
+    still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory(), duration=1.0))
+    felt = point_kernel(still, np.array([[0.0, 0.0]]), times)
+    f, twice, thrice = lines(felt, [140.0, 280.0, 420.0])[:, 0]
+    assert twice / f == pytest.approx(0.25, rel=1e-9)
+    assert thrice / f < 1e-5  # -100 dB
+
+
+def test_layers_as_one_keep_their_mass_and_mean_stiffness():
+    one = as_one((Layer(thickness=1e-3, material="dermis"), Layer(thickness=3e-3, material="fat")))
+    assert one.thickness == pytest.approx(4e-3)
+    assert one.material.young == pytest.approx((80e3 + 3 * 34e3) / 4, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scene = replace(SKIN, body=replace(SKIN.body, depth=0.004))  # too thin for layers
+    monkeypatch.setattr(
+        "skinwave.relax.ladder",
+        lambda scene: tuple(n for n in ladder(scene) if n not in ("flat", "one material")),
+    )
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    assert main(["relax", "scene.toml", "--h", "8", "--quiet"]) == 0
+    record = json.loads((tmp_path / "scene-relaxed/relax.json").read_text())
+    effects = {effect["name"]: effect for effect in record["effects"]}
+    assert [e["waveform"] for e in record["effects"]] == sorted(
+        (e["waveform"] for e in record["effects"]), reverse=True
+    )
+    assert set(effects) == {
+        "linear drive", "no propagation", "little loss", "endless", "main lobe only",
+        "continuous path",
+    }  # fmt: skip
+    # with a mean in the load its lines at multiples of f_d come from nothing
+    assert effects["linear drive"]["decibel"]["f_d"] > 40
+    assert effects["continuous path"]["waveform"] < 0.1 < effects["no propagation"]["waveform"]
+    assert all(rung["seconds"] > 0 for rung in record["rungs"])
+    with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
+        assert {"t", "probes", "as published", "endless"} <= set(kept.files)
+    with open(tmp_path / "scene-relaxed/relax.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["line"] for row in rows} >= {"f_AM", "2f_AM", "f_d"}
+    page = (tmp_path / "scene-relaxed/index.html").read_text()
+    assert "What each assumption changes" in page
+
+
+def test_a_rung_that_fails_leaves_the_others(monkeypatch):
+    monkeypatch.setattr("skinwave.relax.ladder", lambda scene: ("linear drive", "one material"))
+    monkeypatch.setattr(
+        "skinwave.relax.relaxed",
+        lambda scene, dropped: (
+            replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
+        ) if not dropped else (scene, "no such model"),
+    )  # fmt: skip
+    found = climb(SKIN, lambda phase, done: None)
+    assert found.rungs[0].response is not None
+    assert all("no such model" in rung.error for rung in found.rungs[1:])
+    assert found.effects() == []
+
+
+def test_line_changes_are_of_lines_that_count():
+    times = np.arange(1000) / 10_000
+    loud = np.sin(2 * np.pi * 140 * times)[:, None]
+    first = skinwave.simulate(replace(SKIN, body=BODIES["none"]), "point-kernel")
+    before, after = (replace(first, displacement=a * loud, unit="m") for a in (1.0, 2.0))
+    changes = line_changes(SKIN, before, after)
+    assert changes["f_AM"] == pytest.approx(6.02, abs=0.01)
