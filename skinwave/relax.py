@@ -249,10 +249,10 @@ def figure(effects: list[Effect]) -> Figure:
     axes = drawn.add_subplot()
     for e in effects:
         axes.plot(max(e.seconds, 0.01), 100 * e.waveform, "o", color="#0072B2")
-    low = min([100 * e.waveform for e in effects], default=1.0)
+    changes = [100 * e.waveform for e in effects] or [1.0]
     axes.set(xscale="log", yscale="log", xlabel="cost of dropping it, s (0.01 or less at the left)",
              ylabel="change of the worst probe's waveform, %")  # fmt: skip
-    axes.set_ylim(bottom=max(low / 3, 1e-6))
+    axes.set_ylim(max(min(changes) / 2, 1e-6), 2 * max(changes))
     axes.margins(x=0.35)
     for e in effects:
         axes.annotate(e.name, (max(e.seconds, 0.01), 100 * e.waveform), (6, 5),
