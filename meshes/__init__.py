@@ -25,6 +25,7 @@ from meshes.tetmesh import (
     corner_volumes,
     facet_set,
     half,
+    part,
     quadratic,
 )
 from meshes.tetrahedralise import graded, tetrahedralise
@@ -52,6 +53,7 @@ __all__ = [
     "middle_plane",
     "named",
     "palm_mesh",
+    "part",
     "quadratic",
     "read",
     "read_surface",

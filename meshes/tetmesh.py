@@ -166,22 +166,36 @@ def half(mesh: TetMesh, axis: str) -> TetMesh:
     inside = side.max(axis=1) > 0
     if not inside.any():
         raise MeshError(f"no tetrahedron has a positive {axis}; there is nothing to keep")
-    kept, tets = np.unique(mesh.tets[inside], return_inverse=True)
-    number = np.full(len(mesh.points), -1)
-    number[kept] = np.arange(len(kept))
+    kept, nodes = part(mesh, inside)
+    outer = boundary_facets(kept.tets)
+    cut = outer[(away[nodes][outer] == 0).all(axis=1)]
+    return replace(kept, facets={**kept.facets, f"mirror_{axis}": cut})
+
+
+def part(mesh: TetMesh, inside: NDArray[np.bool_]) -> tuple[TetMesh, Ints]:
+    """The tetrahedra (m,) that are inside, with their share of the facet sets, and the numbers (k,)
+    that their nodes had.
+    """
+    nodes, tets = np.unique(mesh.tets[inside], return_inverse=True)
     tets = tets.reshape(-1, mesh.tets.shape[1])
-    facets = {
-        name: number[nodes[(away[nodes].max(axis=1) > 0) & (away[nodes].min(axis=1) >= 0)]]
-        for name, nodes in mesh.facets.items()
-    }
-    outer = boundary_facets(tets)
-    cut = outer[(away[kept][outer] == 0).all(axis=1)]
-    return TetMesh(
-        points=mesh.points[kept],
-        tets=tets,
-        region=mesh.region[inside],
-        facets=facets | {f"mirror_{axis}": cut},
-    )
+    number = np.full(len(mesh.points), -1)
+    number[nodes] = np.arange(len(nodes))
+    outer = _corner_keys(boundary_facets(tets), len(nodes))
+
+    def of_it(facets: Ints) -> Ints:
+        kept = number[facets]
+        kept = kept[(kept >= 0).all(axis=1)]
+        return kept[np.isin(_corner_keys(kept, len(nodes)), outer)]
+
+    facets = {name: of_it(each) for name, each in mesh.facets.items()}
+    found = TetMesh(points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets)
+    return found, nodes
+
+
+def _corner_keys(facets: Ints, n: int) -> Ints:
+    """A number for each facet (k,) by its corners, whatever their order."""
+    low, middle, high = np.sort(facets[:, :3], axis=1).T
+    return (low * n + middle) * n + high
 
 
 def _whole(name: str, values: ArrayLike) -> Ints:

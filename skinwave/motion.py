@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from meshes import TetMesh
+from meshes import TetMesh, part
 from meshes.tetmesh import Floats
 from simple_model import Effort
 from simple_model.steady import path_knots
@@ -112,8 +112,12 @@ def waves(
         radiated=radiated,
         versions=versions(),
     )
+    mesh, basis = build.mesh, model.basis
+    if build.drag is not None:  # the layer around a body is none of it
+        mesh, nodes = part(mesh, build.drag == 0)
+        basis = basis.reshape(-1, 3, basis.shape[1])[nodes].reshape(3 * len(nodes), -1)
     return Waves(
-        mesh=build.mesh, basis=model.basis, frequencies=frequencies, lines=lines,
+        mesh=mesh, basis=basis, frequencies=frequencies, lines=lines,
         poles=poles.values, start=start, effort=effort,
     )  # fmt: skip
 

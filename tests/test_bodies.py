@@ -292,3 +292,15 @@ def test_a_surface_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, m
     ask = ["compare", "scene.toml", "--body", "hand.obj", "--unit", "mm", "--up", "-y", "--h", "5"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
     assert (tmp_path / "both/index.html").exists()
+
+
+def test_what_is_seen_of_a_body_is_not_the_layer_around_it():
+    times = np.arange(20) / 1000
+    seen = skinwave.field(SKIN, times, 0.2, h=0.01)
+    assert np.abs(seen.mesh.points[:, :2]).max() == pytest.approx(0.03)
+    assert seen.displacement.shape == (20, len(seen.mesh.points), 3)
+    top = seen.mesh.facets["top"]
+    corners = seen.mesh.points[top[:, :3], :2]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
+    assert area == pytest.approx(0.06**2)
