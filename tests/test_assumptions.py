@@ -11,6 +11,7 @@ import skinwave
 from simple_model import MovingPressure, Tacton, Trajectory, lines, point_kernel
 from skinwave.assumptions import DEVICE_RATE, as_one, held, ladder, relaxed
 from skinwave.cli import main
+from skinwave.mechanisms import paper_vs_skin, signatures, write
 from skinwave.relax import climb, line_changes
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.scene_file import dumps
@@ -130,3 +131,39 @@ def test_line_changes_are_of_lines_that_count():
     before, after = (replace(first, displacement=a * loud, unit="m") for a in (1.0, 2.0))
     changes = line_changes(SKIN, before, after)
     assert changes["f_AM"] == pytest.approx(6.02, abs=0.01)
+
+
+def test_patterns_of_loads_are_those_of_their_fourier_series():
+    found = signatures()
+    expected = {
+        "square of the sound's amplitude": (0.25, 0, 0),
+        "contact on one side only": (0.424, 0, 0.085),
+        "clipped sound, squared": (0.589, 0.2, 0),
+        "square root of the command": (0.2, 0.086, 0.048),
+    }
+    for name, ratios in expected.items():
+        assert found[name] == pytest.approx(ratios, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_not(tmp_path):
+    bodies = {
+        "paper-sheet": replace(BODIES["paper-sheet"], width=0.06, height=0.06),
+        "skin-slab": Body(width=0.042, height=0.042),
+    }
+    still = [("am140", Tacton(am_frequency=140, trajectory=Trajectory()))]
+    found = paper_vs_skin(lambda phase, done: None, h=0.0075, chosen=still, bodies=bodies)
+    ratio = {(r.body, r.mechanism, r.amplitude): r.ratio for r in found.ratios}
+    for body in bodies:
+        assert ratio[body, "linear load", 1.0] < 1e-5
+        quiet, loud = (ratio[body, "squared load", a] for a in (0.25, 1.0))
+        assert quiet == pytest.approx(loud, rel=1e-3)
+    quiet, loud = (ratio["paper-sheet", "squared load, stretching", a] for a in (0.25, 1.0))
+    assert abs(loud / quiet - 1) > 0.05
+    write(tmp_path, found)
+    assert "a line of the sheet" in (tmp_path / "index.html").read_text()
+    with open(tmp_path / "lines.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["mechanism"] for row in rows} == {
+        "linear load", "squared load", "squared load, stretching",
+    }  # fmt: skip

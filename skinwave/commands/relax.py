@@ -3,12 +3,15 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, add_scene, metre, progress_of, summarise
+from skinwave.commands.common import add_output, metre, progress_of, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """What a user may ask of it."""
-    add_scene(parser)
+    parser.add_argument(
+        "scene", metavar="SCENE", help="scene file, or paper-vs-skin: which mechanism makes which "
+        "line of the 15 Tactons",
+    )  # fmt: skip
     parser.add_argument("--h", type=float, metavar="MM", help="element size of all rungs, mm")
     add_output(parser)
 
@@ -20,9 +23,12 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
 
-    scene, h = read(options.scene), metre(options.h)
+    h = metre(options.h)
     check_knobs("auto", h=h)
-    out = options.out or Path(f"{options.scene.stem}-relaxed")
+    if options.scene == "paper-vs-skin":
+        return _mechanisms(options, h)
+    scene = read(options.scene)
+    out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
     with output_folder(out, overwrite=options.overwrite) as folder:
         with progress_of(options) as progress:
             found = climb(scene, progress, h=h)
@@ -31,4 +37,19 @@ def run(options: argparse.Namespace) -> int:
     failed = [f"'{rung.name}' failed: {rung.error}" for rung in found.rungs if rung.error]
     summary = {"out": str(out), "sentences": sentences, "failed": failed}
     summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
+    return 0
+
+
+def _mechanisms(options: argparse.Namespace, h: float | None) -> int:
+    from skinwave.files import output_folder
+    from skinwave.mechanisms import paper_vs_skin, sentences, write
+
+    out = options.out or Path("paper-vs-skin")
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        with progress_of(options) as progress:
+            found = paper_vs_skin(progress, h=h)
+        write(folder, found)
+    said = [*sentences(found), *found.failed]
+    summary = {"out": str(out), "sentences": said, "failed": list(found.failed)}
+    summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
     return 0
