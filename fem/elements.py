@@ -43,7 +43,8 @@ def shape_derivatives(barycentric: Floats, n_nodes: int) -> Floats:
 def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
     """Barycentric points (q, 4) and weights (q,) summing to 1, exact to `degree` (2 or 5).
 
-    Degree 5 is the 14-point rule of Walkington (2000), all of whose weights are positive.
+    Degree 5 is the 14-point rule of Walkington, Quadrature on Simplices of Arbitrary Dimension
+    (Carnegie Mellon University, 2000), all of whose weights are positive.
     """
     if degree <= 2:
         return _orbits((0.25, [(5 - 5**0.5) / 20] * 3))

@@ -3,8 +3,8 @@
     work = kinetic + elastic + dissipated + radiated,  dissipated + radiated = int v^T C v dt
 
 C holds the loss in the material as well as R, what absorbing ends take out of the body. Average
-acceleration keeps this balance to round-off (Hughes, The Finite Element Method, 1987, section
-9.1), whatever the time step, so that an imbalance is a mistake in the solution and not in the step.
+acceleration keeps this balance to round-off (Hughes, The Finite Element Method, 1987, chapter
+9), whatever the time step, so that an imbalance is a mistake in the solution and not in the step.
 """
 
 from collections.abc import Callable, Iterator

@@ -105,8 +105,9 @@ def dissect(A: sparse.csr_array) -> NDArray[np.int64]:
     """Fill-reducing ordering (n,) of a symmetric matrix by nested dissection of its graph.
 
     METIS orders it where pymetis is installed; else halves are split off along the middle
-    level of a breadth-first search from a peripheral vertex (George and Liu 1978). Unknowns
-    with the same neighbours, as the components of one node, are ordered as one.
+    level of a breadth-first search from a peripheral vertex (George and Liu, SIAM J Numer Anal
+    15:1053, 1978). Unknowns with the same neighbours, as the components of one node, are ordered
+    as one.
     """
     n = A.shape[0]
     marks = np.random.default_rng(0).random(n)

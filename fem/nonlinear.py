@@ -6,9 +6,10 @@ generalized-alpha method of `transient` with the internal force weighted between
     M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
 
 (Chung and Hulbert, J Appl Mech 60:371 (1993); Newton in time: Belytschko, Liu and Moran, Nonlinear
-Finite Elements (2000), section 6.3). One factorisation serves as many steps as it goes on to
-converge for. Average acceleration keeps energy to second order in the step, not to round-off as in
-the linear case. Momentum is kept by the balance of forces, which is solved to the tolerance.
+Finite Elements for Continua and Structures (2000), chapter 6). One factorisation serves as many
+steps as it goes on to converge for. Average acceleration keeps energy to second order in the step,
+not to round-off as in the linear case. Momentum is kept by the balance of forces, which is solved
+to the tolerance.
 """
 
 from collections.abc import Callable, Iterator

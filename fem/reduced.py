@@ -3,8 +3,8 @@
 By reciprocity the response of probe p to a load f is f^T y_p with (K + s C + s^2 M) y_p = s_p.
 Those y_p(s) are approximated by Galerkin projection onto the second-order Krylov space of the
 probe vectors at one real shift, which costs one real factorisation. The space is built by the
-two-level Arnoldi method (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016): with
-proportional damping the plain recurrence loses all accuracy after a few dozen moments.
+two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016):
+with proportional damping the plain recurrence loses all accuracy after a few dozen moments.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
 
 The error estimate needs no solution of the full system: it is the residual of the smaller model

@@ -36,7 +36,7 @@ def pressure_force(
 
     A "dead" pressure keeps the direction and the area of the body at rest, as `load_operator`; a
     "follower" pushes against the displaced surface: f_ai = -int N_a q (x_,1 x x_,2)_i (Belytschko,
-    Liu and Moran (2000), section 6.4.5).
+    Liu and Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6).
 
     Raises
     ------

@@ -89,7 +89,7 @@ def transient(
 
 
 def weights(dt: float, spectral_radius: float) -> tuple[float, float, float, float]:
-    """a_m, a_f, beta and gamma of the method: Chung and Hulbert (1993), eqs. 17, 20 and 25.
+    """a_m, a_f, beta and gamma of the method of Chung and Hulbert (1993).
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Tetrahedra made more even without changing which nodes they join.
 
 Each inner node goes to the mean of the centroids of its elements, weighted by how large they are
-compared to what is asked for: the smoothing of Chen and Xu (2004, doi 10.1016/j.cam.2003.09.012)
-for optimal Delaunay meshes, with the volume in place of the circumcentre's share.
+compared to what is asked for: the centroidal patches of Chen and Holst, Comput Methods Appl Mech
+Eng 200:967 (2011), doi 10.1016/j.cma.2010.11.007.
 """
 
 from collections.abc import Callable

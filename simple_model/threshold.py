@@ -24,8 +24,8 @@ BAND = 5.0  # dB, between people and between laboratories
 LOWEST, HIGHEST = 10.0, 1000.0  # Hz
 AREAS = {"focal_spot": 7.0, "large_contactor": 0.0}  # dB added in the Pacinian channel
 # Pa at the focus that is just felt with AM at 200 Hz: 556.9 Pa of sound pressure (Howard et al.,
-# IEEE World Haptics 2019, as quoted by Lim et al., CHI 2024; whether rms or peak is not stated)
-# pushes with 2 p^2 / (rho c^2).
+# IEEE World Haptics 2019, as quoted by Lim, Park and Seifi, CHI 2024, arXiv 2405.02800; whether
+# rms or peak is not stated) pushes with 2 p^2 / (rho c^2).
 PRESSURE = 4.4
 
 

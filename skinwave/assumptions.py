@@ -140,7 +140,7 @@ def _air_mass(scene: Scene) -> float:
     """Mass of the air that moves with a sheet, kg/m2: 2 rho / k at the strongest moving line.
 
     By wavenumber it differs from line to line (Junger and Feit, Sound, Structures, and Their
-    Interaction, 1986, section 8.2); elements have one mass for all.
+    Interaction, 1986, section 5.11); elements have one mass for all.
     """
     frequencies, shares = motion_lines(scene, 0.05)
     moving = frequencies > 0

@@ -224,7 +224,7 @@ def _march_errors(scene: Scene, model: str | None, dt: float | None) -> tuple[fl
     if model not in ("fem-transient", "fem-harmonic"):
         return 0.0, 0.0
     known = sensitivity(scene)
-    # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, section 9.1).
+    # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
     step = known.value * (2 * np.pi * known.frequency * (dt or 1 / TRANSIENT_RATE)) ** 2 / 12
     return (min(1.0, step), 0.0) if model == "fem-transient" else (0.0, known.start)
 

@@ -14,7 +14,7 @@ from skinwave.verify.references import Floats
 
 DIRECTION = np.array([1.0, 2.0, 3.0])
 CURL = np.cross(np.eye(3), DIRECTION).T  # CURL @ grad = grad x DIRECTION
-MANUFACTURED = "Roache, Verification and Validation (1998), chapter 3"
+MANUFACTURED = "Roache, Verification and Validation in Computational Science and Engineering (1998)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,8 @@ def no_locking() -> Case:
     at = [1 / (1 - 2 * poisson) for poisson in ladder]
     return Case(
         title="No locking: pressure and shear of like size, nu = 0.3 to 0.49999",
-        source=f"{MANUFACTURED}; Brenner and Sung, Math Comp 59:321 (1992): uniform in lambda",
+        source=f"{MANUFACTURED}; Brenner and Sung, Math Comp 59:321 (1992): uniform in lambda "
+        "(linear elements in the plane)",
         mesh="unit cube, 12 cells a side, six tetrahedra a cell",
         checks=(
             below("relative error in L2, worst", values.max(), 3e-3),
@@ -114,7 +115,8 @@ def manufactured(
     kind = "divergence-free" if field is divergence_free else "dilating"
     return Case(
         title=f"Manufactured {kind} field, nu = {poisson:g}",
-        source=f"{MANUFACTURED}; orders: Ciarlet, The Finite Element Method (1978), section 3.2",
+        source=f"{MANUFACTURED}; orders: Ciarlet, The Finite Element Method for Elliptic "
+        "Problems (1978), section 3.2",
         mesh=f"unit cube, {', '.join(map(str, cells))} cells a side, six tetrahedra a cell",
         checks=tuple(checks),
         plot=Plot(

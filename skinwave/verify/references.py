@@ -17,7 +17,7 @@ Complex = NDArray[Any]  # complex128
 def boussinesq_disc(r: float, *, radius: float, young: float, poisson: float) -> float:
     """Deflection under a disc of 1 Pa on a half-space, r <= radius; 4 (1 - nu^2) a E(r/a) / pi E.
 
-    K L Johnson, Contact Mechanics (1985), eq. 3.29a.
+    K L Johnson, Contact Mechanics (1985), section 3.4.
     """
     return float(4 * (1 - poisson**2) * radius * ellipe((r / radius) ** 2) / np.pi / young)
 
@@ -34,7 +34,7 @@ def gaussian_at_rest(r: Floats, *, width: float, shear_modulus: float, poisson: 
 def gaussian_mean_pressure(r: Floats, depth: Floats, *, width: float, poisson: float) -> Floats:
     """Minus a third of the trace of stress below the same push; harmonic, 2 (1 + nu) / 3 at top.
 
-    Johnson (1985), eqs. 3.18: the trace under a point force is -(1 + nu) F z / (pi R^3).
+    Johnson (1985), section 3.2: the trace under a point force is -(1 + nu) F z / (pi R^3).
     """
     k = np.linspace(0, 8 / width, 801)
     kernel = np.exp(-((k * width) ** 2) / 2 - depth[:, None] * k) * jv(0, r[:, None] * k) * k
@@ -60,7 +60,7 @@ def gaussian_on_bonded_layer(
 def half_space_kernel(
     k: Floats, w: float, *, density: float, mu: complex, poisson: float
 ) -> Complex:
-    """Deflection per pressure of wavenumber k: Lamb, Phil Trans R Soc A 203:1 (1904), eq. 36.
+    """Deflection per pressure of wavenumber k: Lamb, Phil Trans R Soc A 203:1 (1904).
 
     -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, with a complex modulus.
     """
@@ -70,7 +70,7 @@ def half_space_kernel(
 
 
 def plate_kernel(k: Floats, w: float, *, stiffness: complex, mass: float, air: float) -> Complex:
-    """1 / [D k^4 - (m + 2 air / k) w^2]: Cremer, Heckl, Petersson, Structure-Borne Sound, 6.6."""
+    """1 / [D k^4 - (m + 2 air / k) w^2]: Cremer, Heckl, Petersson, Structure-Borne Sound (2005)."""
     return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
 
 
@@ -86,7 +86,7 @@ def gaussian_response(
 
     On a circle of radius R, harmonic n of the turning push moves radius r by
     int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk (Graf's addition theorem,
-    Abramowitz and Stegun 9.1.79). Sneddon, Fourier Transforms (1951), section 56.
+    Abramowitz and Stegun 9.1.79). Sneddon, Fourier Transforms (1951).
     """
     k = np.geomspace(1e-6, 8, 200_001) / width
     common = width**2 * np.exp(-((k * width) ** 2) / 2) * kernel(k) * jv(harmonic, k * circle) * k
@@ -96,7 +96,8 @@ def gaussian_response(
 def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisson: float) -> float:
     """Deflection of the loaded face of a free strip, plane strain, under 1 Pa times sin(k x).
 
-    Filon, Phil Trans R Soc A 201:63 (1903); Timoshenko and Goodier (1970), article 24.
+    Filon, Phil Trans R Soc A 201:63 (1903); Timoshenko and Goodier, Theory of Elasticity
+    (1970), chapter 3.
     """
     x = k * thickness
     bending = (np.cosh(x) + 1) / (np.sinh(x) - x) if x > 1e-2 else 12 / x**3 * (1 + x**2 / 5)
@@ -107,7 +108,8 @@ def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisso
 def rayleigh_ratio(poisson: float) -> float:
     """c_R / c_s: x^6 - 8 x^4 + (24 - 16 g) x^2 - 16 (1 - g) = 0, g = (c_s / c_p)^2.
 
-    Rayleigh, Proc London Math Soc 17:4 (1885); Achenbach, Wave Propagation (1973), eq. 5.98.
+    Rayleigh, Proc London Math Soc 17:4 (1885); Achenbach, Wave Propagation in Elastic
+    Solids (1973), chapter 5.
     """
     g = (1 - 2 * poisson) / (2 - 2 * poisson)
     roots = np.roots([1, -8, 24 - 16 * g, -16 * (1 - g)])
@@ -118,7 +120,7 @@ def rayleigh_ratio(poisson: float) -> float:
 def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool = False) -> float:
     """w / c_s in 1/m of the lowest wave of a free plate, bending (A0) or stretching (S0).
 
-    Rayleigh (1888), Lamb, Proc R Soc A 93:114 (1917); Achenbach (1973), eqs. 6.68 and 6.69.
+    Rayleigh (1888), Lamb, Proc R Soc A 93:114 (1917); Achenbach (1973), chapter 6.
     """
     half, g = thickness / 2, (1 - 2 * poisson) / (2 - 2 * poisson)
 
@@ -140,7 +142,7 @@ def clamped_plate() -> tuple[Floats, float]:
     """w a^2 sqrt(m / D) (ascending) and central deflection D w / q a^4 of a clamped square plate.
 
     Ritz's method with the polynomials (1 - x^2)^2 x^n; Young, J Appl Mech 17:448 (1950) has
-    35.99 and 73.41 with six beam functions, Timoshenko (1959), table 35, 0.00126.
+    35.99 and 73.41 with beam functions, Timoshenko (1959), table 35, 0.00126.
     """
     x, weight = np.polynomial.legendre.leggauss(40)
     shapes = [np.polynomial.Legendre.basis(n) for n in range(14)]
@@ -159,7 +161,7 @@ def clamped_plate() -> tuple[Floats, float]:
 def moving_force_on_beam(t: Floats, *, speed: float, critical: float, period: float) -> Floats:
     """Mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported beam.
 
-    Fryba, Vibration of Solids and Structures under Moving Loads (1972), eq. 1.31: a sum over
+    Fryba, Vibration of Solids and Structures under Moving Loads (1972), 1.3.2: a sum over
     modes n; `speed` over `critical` is alpha, `period` that of the first mode.
     """
     w1, alpha, total = 2 * np.pi / period, speed / critical, np.zeros_like(t)
@@ -176,7 +178,7 @@ def circling_force_on_plate(
 ) -> Floats:  # fmt: skip
     """Deflection of a simply supported square plate under a Gaussian push of 1 Pa, from rest.
 
-    Navier's modal sum (Leissa, Vibration of Plates (1969), section 4.1), each mode's Duhamel
+    Navier's modal sum (Leissa, Vibration of Plates (1969), chapter 4), each mode's Duhamel
     integral exact for a load that is linear between the times t (equally spaced from 0); modal
     damping w^2 lag / 2. The push circles the centre of the plate, beginning on the x axis.
     """
@@ -204,7 +206,7 @@ def layered_column(
 ) -> Complex:
     """Top displacement per top stress of a column of layers, from the base, which is held.
 
-    Meirovitch, Principles and Techniques of Vibrations (1997), section 7.6: tan(k L) / (k M) of
+    Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7: tan(k L) / (k M) of
     one layer, joined by the addition theorem of the tangent; M complex with loss.
     """
     below = np.zeros_like(w, np.complex128)
@@ -249,7 +251,7 @@ def lamb_pulse(
 def horizontal_shear_reflection(angle: Floats) -> Floats:
     """(cos a - 1) / (cos a + 1): a viscous boundary under SH waves.
 
-    Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969); Achenbach (1973), section 5.5.
+    Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969), for plane waves.
     """
     return (np.cos(angle) - 1) / (np.cos(angle) + 1)
 
@@ -278,7 +280,7 @@ def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Complex
 def generalized_alpha_step(wdt: float, radius: float) -> Floats:
     """Map (3, 3) of (u, dt v, dt^2 a) over one step of the undamped oscillator.
 
-    Chung and Hulbert, J Appl Mech 60:371 (1993), eqs. 2 to 7 with the parameters of eq. 25.
+    Chung and Hulbert, J Appl Mech 60:371 (1993).
     """
     am, af = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
     gamma, beta = 0.5 - am + af, (1 - am + af) ** 2 / 4
@@ -290,7 +292,7 @@ def generalized_alpha_step(wdt: float, radius: float) -> Floats:
 def driven_oscillator(t: float, *, damping: float, drive: float) -> float:
     """u'' + damping u' + u = sin(drive t) from rest: particular and free solution.
 
-    Meirovitch (1997), sections 3.2 and 3.3.
+    Meirovitch (1997), sections 3.1 and 3.2.
     """
     s, G = np.roots([1, damping, 1]), 1 / (1 - drive**2 + 1j * damping * drive)
     start = [-G.imag, -(1j * drive * G).imag]

@@ -59,7 +59,7 @@ def disc_on_half_space() -> Case:
     ]
     return Case(
         title="Boussinesq: uniform pressure on a disc, nu = 0.3",
-        source="Boussinesq (1885); Johnson, Contact Mechanics (1985), eq. 3.29a",
+        source="Boussinesq (1885); Johnson, Contact Mechanics (1985), section 3.4",
         mesh=described(mesh, "a quarter; 8 cells a radius, sides at 400 radii"),
         checks=tuple(
             relative(f"deflection at {name}, 1 Pa", 1e6 * u, 1e6 * w, 0.02, "um")
@@ -82,7 +82,7 @@ def focus_at_rest_on_half_space(poisson: float) -> Case:
     pressure, checkerboard = _pressure_errors(mesh, u, material)
     return Case(
         title=f"Gaussian focus at rest on a half-space, nu = {poisson:g}",
-        source="Boussinesq's kernel; Gradshteyn and Ryzhik, 6.618.1; Johnson (1985), eqs. 3.18",
+        source="Boussinesq's kernel; Gradshteyn and Ryzhik, 6.618.1; Johnson (1985), section 3.2",
         mesh=described(mesh, "a quarter; 2.5 mm at the focus, sides at 4 m"),
         checks=(
             relative(
@@ -154,7 +154,7 @@ def column_of_two_layers() -> Case:
     found = fem.harmonic(ops, force, hz) @ read
     return Case(
         title="Column of two layers, stiffness ratio 1e6",
-        source="Meirovitch, Principles and Techniques of Vibrations (1997), section 7.6",
+        source="Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7",
         mesh=described(mesh, "40 cells high, one across"),
         checks=(
             relative("deflection at rest, 1 Pa", 1e6 * (read @ fem.static(ops, force)), 1e6 * rest,

@@ -58,8 +58,8 @@ def _elements() -> Iterable[Entry]:
 DILATING = (
     "Orders 3 and 2 need pressure to be linear in an element. Here, with nu above 0.45, the "
     "larger part is constant: 2 and 1 are all that theory promises (Boffi, Brezzi and Fortin, "
-    "Mixed Finite Element Methods (2013), chapter 8) for a field whose pressure is many times its "
-    "shear."
+    "Mixed Finite Element Methods and Applications (2013), chapter 8) for a field whose pressure "
+    "is many times its shear."
 )
 
 
