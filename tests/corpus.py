@@ -247,7 +247,7 @@ def wrong_usage() -> list[list[str]]:
     run = ["run", "good.toml"]
     found: list[list[str]] = [[], ["fly"], ["run"], ["plan"], ["tradeoff"], ["run", "a", "b"]]
     found += [["--version-of-what"], ["run", "--quick", "good.toml"], ["verify", "good.toml"]]
-    found += [[*run, "--model", m] for m in ("magic", "", "FEM", "fem-nonlinear")]
+    found += [[*run, "--model", m] for m in ("magic", "", "FEM", "fem-static")]
     found += [[*run, "--h", h] for h in ("", "abc", "1,5", "1 mm", "0x10", "--quiet")]
     found += [[*run, "--dt", "soon"], [*run, "--tolerance", "5 %"], [*run, "--out"]]
     found += [["plan", "good.toml", *o] for o in (["--out", "x"], ["--solver"], ["--h"])]
