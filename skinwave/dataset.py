@@ -100,7 +100,9 @@ def _table(out: Path, columns: list[str] | None) -> Any:
 
     parts = sorted((out / ROWS).glob("part-*.parquet"))
     try:
-        tables = [pq.read_table(pa.BufferReader(part.read_bytes()), columns=columns) for part in parts]
+        tables = [
+            pq.read_table(pa.BufferReader(part.read_bytes()), columns=columns) for part in parts
+        ]
         return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
     except (OSError, pa.ArrowException) as error:
         raise ValueError(f"{out} cannot be read ({' '.join(str(error).split())})") from None

@@ -19,8 +19,6 @@ LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker
 CONNECTED = 10  # s that a scheduler may take to answer
 
-Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
-
 
 def check(scheduler: str) -> None:
     """Refuse, before any work, what is not installed.
@@ -91,7 +89,7 @@ def run_all(
 
 
 @contextmanager
-def mapped_on(address: str) -> Iterator[Map]:
+def mapped_on(address: str) -> Iterator[Callable[..., Iterable[Any]]]:
     """A function like the built-in `map` whose calls are spread over the workers of a scheduler."""
     with _client(address) as client:
 
@@ -165,7 +163,7 @@ def _run_on_cluster(
 
     with _client(address) as client:
         futures = {client.submit(work, item, pure=False): k for k, item in enumerate(items)}
-        for future in as_completed(list(futures)):
+        for future in as_completed(list(futures), loop=client.loop):
             with suppress(KilledWorker):
                 done(futures[future], future.result())
             future.release()

@@ -1,11 +1,13 @@
 """One row of a sweep: what was commanded, what came out of it, and what that cost."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from simple_model import Response, point_kernel, sensation_level, tacton_lines
+from meshes.tetmesh import Floats
+from simple_model import Response, lines, point_kernel, sensation_level, tacton_lines
 from skinwave.claims import Run
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.prepared import sample_times
@@ -66,21 +68,25 @@ def commanded(case: Case) -> dict[str, Any]:
 
 def measured(scene: Scene, response: Response) -> dict[str, Any]:
     """The part of a row that an answer gives: what it is, beside the point kernel, and its cost."""
-    run = Run(tacton=scene.name, body=scene.body.kind, scene=scene, response=response)
     kernel = response
     if response.unit == "m":
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
-    published = Run(tacton=run.tacton, body="none", scene=scene, response=kernel)
-    names = list(run.frequencies)
-    agreement = compare(kernel, response, tuple(run.frequencies.values()))
+    frequencies = Run(
+        tacton=scene.name, body=scene.body.kind, scene=scene, response=response
+    ).frequencies
+    agreement = compare(kernel, response)
     row: dict[str, Any] = {"status": "done", "model": response.model}
-    for k, name in enumerate(names):
-        row[f"{name}_hz"] = run.frequencies[name]
-        row[f"{name}_kernel_pa"] = published.lines[name]
-        row[f"{name}_ratio"] = agreement.line_ratios[k]
+    # Both at once: the fit of the lines costs more than what it is applied to.
+    both = replace(response, displacement=np.hstack([kernel.displacement, response.displacement]))
+    published, found = np.split(lines(both, list(frequencies.values())), 2, axis=1)
+    for k, (name, frequency) in enumerate(frequencies.items()):
+        row[f"{name}_hz"] = frequency
+        row[f"{name}_kernel_pa"] = published[k]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            row[f"{name}_ratio"] = abs(agreement.scale) * found[k] / published[k]
     row |= _kernel(kernel, agreement) | _effort(response)
     if response.unit == "m":
-        row |= _motion(run, agreement)
+        row |= _motion(response, agreement) | _felt(frequencies, found)
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 
@@ -96,23 +102,29 @@ def _kernel(kernel: Response, agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _motion(run: Run, agreement: Agreement) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "peak_um": 1e6 * _peak(run.response),
-        "rms_um": 1e6 * moving_rms(run.response),
+def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
+    return {
+        "peak_um": 1e6 * _peak(response),
+        "rms_um": 1e6 * moving_rms(response),
         "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
         "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
     }
-    levels = {n: sensation_level(run.lines[n], f) for n, f in run.frequencies.items()}
-    for name, level in levels.items():
-        row[f"{name}_um"], row[f"{name}_db"] = 1e6 * run.lines[name], level
+
+
+def _felt(frequencies: Mapping[str, float], amplitudes: Floats) -> dict[str, Any]:
+    """Lines in micrometre and above threshold, and the one that is felt most."""
+    row: dict[str, Any] = {}
+    levels = {n: sensation_level(a, f) for (n, f), a in zip(frequencies.items(), amplitudes,
+                                                            strict=True)}  # fmt: skip
+    for (name, level), amplitude in zip(levels.items(), amplitudes, strict=True):
+        row[f"{name}_um"], row[f"{name}_db"] = 1e6 * amplitude, level
     if levels:
         row["level_db"] = np.max(list(levels.values()), axis=0)
         row["felt_line"] = max(levels, key=lambda name: levels[name].max())
     return row
 
 
-def _effort(response: Response) -> Mapping[str, Any]:
+def _effort(response: Response) -> dict[str, Any]:
     effort = response.effort
     return {
         "dofs": effort.dofs,

@@ -250,9 +250,7 @@ def _row(case: Case, knobs: Knobs, mesh: Mesh | None) -> dict[str, Any]:
     try:
         if mesh is None:
             model = model_of(case.scene, knobs.model)
-            response = simulate(
-                case.scene, model, knobs.tolerance, h=knobs.h, solver=knobs.solver
-            )
+            response = simulate(case.scene, model, knobs.tolerance, h=knobs.h, solver=knobs.solver)
         else:
             response, of_mesh = _on_mesh(case.scene, knobs, mesh)
             row |= of_mesh

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.threshold import BAND
 from skinwave.styles import Style
@@ -18,13 +17,13 @@ Row = Mapping[str, Any]
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
 UNITS = {  # by the end of a column's name
-    "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB re threshold", "_hz": "Hz",
+    "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
     "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB",
     "_kg_m3": "kg/m³", "_pa_s": "Pa s", "seconds": "s", "_ratio": "µm/Pa, scaled",
 }  # fmt: skip
 NAMES = {
     "peak_um": "largest displacement", "rms_um": "RMS displacement about its mean",
-    "level_db": "sensation level of the strongest line", "tacton.speed_m_per_s": "drawing speed",
+    "level_db": "sensation level", "tacton.speed_m_per_s": "drawing speed",
     "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
     "body.depth_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
     "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
@@ -105,8 +104,8 @@ def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
         axes = figure.subplots(2, 1, sharex=True)
         for ax, column in zip(axes, ("peak_um", "level_db"), strict=True):
             curves(ax, rows, column, SPEED, by)
-            waves = {row.get("rayleigh_speed_m_per_s") for row in rows} - {None}
-            for k, wave in enumerate(sorted(waves)):
+            waves = {value(row, "rayleigh_speed_m_per_s") for row in rows}
+            for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
                 said = "Rayleigh speed $c_R$ without loss" if k == 0 else None
                 ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
             ax.set_ylabel(axis_label(column))
@@ -201,6 +200,6 @@ def _ticks(ax: Axes, across: Sequence[Any], up: Sequence[Any]) -> None:
     """Names in the middle of cells, as many as there is room for."""
     for axis, levels, most in ((ax.xaxis, across, 10), (ax.yaxis, up, 14)):
         step = -(-len(levels) // most)
-        shown: Floats = np.arange(0, len(levels), step) + 0.5
+        shown = np.arange(0, len(levels), step) + 0.5
         names = [f"{x:g}" if isinstance(x, float) else str(x) for x in levels[::step]]
         axis.set_ticks(shown, names)

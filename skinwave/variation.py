@@ -131,7 +131,7 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[Case]:
     Raises
     ------
     ValueError
-        If the file is no scene, no combination makes one, or a word is refused by all that it is in.
+        If the file is no scene, no combination makes one, or a word is refused by each it is in.
     """
     base = read(path)
     table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
@@ -143,9 +143,7 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[Case]:
     return list(found.values())
 
 
-def _hypercube(
-    variations: Sequence[Variation], samples: int, seed: int
-) -> list[dict[str, Any]]:
+def _hypercube(variations: Sequence[Variation], samples: int, seed: int) -> list[dict[str, Any]]:
     from scipy.stats import qmc
 
     _check_count(samples)
@@ -267,7 +265,7 @@ def _presets() -> Sequence[str]:
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:
     """Keys with their section, and values that fit one cell of a table."""
-    found = {}
+    found: dict[str, float | str] = {}
     for section, values in table.items():
         if isinstance(values, dict):
             found |= {f"{section}.{key}": _plain(value) for key, value in values.items()}

@@ -55,12 +55,12 @@ def run(options: argparse.Namespace) -> int:
         figures["speed"] = speed_figure(rows, by, chosen)
     for column in options.column or ([] if figures else ["peak_um"]):
         name = folder_name(f"{column} over {x}" + (f" and {by}" if by else ""))
-        if options.heat and by is None:
-            raise ValueError("a map needs two varied keys; leave out --heat or give --by")
-        if options.heat:
+        if not options.heat:
+            figures[name] = line_figure(rows, column, x, by, chosen)
+        elif by:
             figures[f"{name} map"] = heat_figure(rows, column, x, by, chosen)
         else:
-            figures[name] = line_figure(rows, column, x, by, chosen)
+            raise ValueError("a map needs two varied keys; leave out --heat or give --by")
     out = options.out or options.folder / "figures"
     out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"{name.replace(' ', '-')}.{options.format}" for name in figures]
