@@ -1,7 +1,7 @@
 """What a sweep saves: `python -m bench.sweep`: 200 runs on one body beside calls of skinwave run.
 
-4 speeds x 5 sizes x 10 AM frequencies on the skin slab, by the reduced model on one mesh. The calls
-share the bodies that are kept on disk, and again with none kept.
+4 speeds x 5 sizes x 10 AM frequencies, the reduced model of the skin slab on one mesh. Both begin
+with no body kept on disk, and keep those that they prepare.
 """
 
 import itertools
@@ -50,18 +50,16 @@ def main() -> None:
                       cache=name + "/a")  # fmt: skip
         print(f"sweep of {len(every)} runs: {cold:.1f} s, {warm:.1f} s with the body kept",
               f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)  # fmt: skip
-        for kept, counted in (("/b", COUNTED), ("", 2)):
-            cache = name + kept if kept else ""
-            seconds = []
-            for k, (speed, size, tone) in enumerate(every[:: len(every) // COUNTED][:counted]):
-                (folder / "one.toml").write_text(SCENE.format(tone=tone, size=size, speed=speed))
-                seconds.append(called(folder, "run", "one.toml", "--out", f"{kept[1:]}one-{k}",
-                                      cache=cache))  # fmt: skip
-            rest = sum(seconds[1:]) / (len(seconds) - 1)
-            total = (seconds[0] + (len(every) - 1) * rest) if kept else len(every) * rest
-            print(f"skinwave run, bodies {'kept' if kept else 'not kept'}: first {seconds[0]:.1f} "
-                  f"s, then {rest:.1f} s each (of {len(seconds)}); {len(every)}: {total:.0f} s, "
-                  f"{total / cold:.0f} times the sweep", flush=True)  # fmt: skip
+        seconds = []
+        for k, (speed, size, tone) in enumerate(every[:: len(every) // COUNTED][:COUNTED]):
+            (folder / "one.toml").write_text(SCENE.format(tone=tone, size=size, speed=speed))
+            seconds.append(
+                called(folder, "run", "one.toml", "--out", f"one-{k}", cache=name + "/b")
+            )
+        rest = sum(seconds[1:]) / (COUNTED - 1)
+        total = seconds[0] + (len(every) - 1) * rest
+        print(f"skinwave run: first {seconds[0]:.1f} s, then {rest:.1f} s each; {len(every)}: "
+              f"{total:.0f} s, {total / cold:.0f} times the sweep")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -110,11 +110,11 @@ def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
                 ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
             ax.set_ylabel(axis_label(column))
         axes[0].set_ylim(bottom=0)
-        axes[1].axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0,
-                        label=f"threshold, ±{BAND:g} dB between people")  # fmt: skip
+        axes[0].legend(fontsize="small", frameon=False)
+        band = axes[1].axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0)
+        said = f"threshold, ±{BAND:g} dB between people"
+        axes[1].legend([band], [said], fontsize="small", frameon=False)
         axes[1].set_xlabel(axis_label(SPEED))
-        for ax in axes:
-            ax.legend(fontsize="small", frameon=False)
     return figure
 
 
