@@ -1,10 +1,13 @@
 """Answers without reduction: every time step, every line, and exact waves of endless bodies."""
 
-from functools import lru_cache
+from collections.abc import Callable, Iterable
+from functools import lru_cache, partial
 from itertools import islice
 from math import ceil
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 import fem
@@ -15,6 +18,8 @@ from skinwave.bodies import Build, operators, surface_load
 from skinwave.bodies import build as build_body
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.scene import Body, Scene
+
+Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 
 MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
 CHECKED_EACH = 50  # steps of a transient
@@ -123,8 +128,12 @@ def harmonic_answer(
     h: float | None = None,
     solver: str = "auto",
     threshold: float = 1e-3,
+    mapped: Map = map,
 ) -> Response:
-    """The steady state: one factorisation for each line of the load above the threshold."""
+    """The steady state: one factorisation for each line of the load above the threshold.
+
+    `mapped` is shaped like the built-in `map`; it may spread the lines over other machines.
+    """
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)
@@ -143,15 +152,11 @@ def harmonic_answer(
         frequencies, pressures = lines.gather(spots.T)
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         total = fem.Spent()
-        for k, (f, pressure) in enumerate(zip(frequencies, pressures, strict=True)):
-            report("lines", k / len(frequencies))
-            force = P @ pressure
-            u = fem.harmonic(ops, force, f, solver=solver)
-            amplitudes[k] = S @ u[0]
-            free = ops.free
-            line = force[None, free], u[:, free], np.array([f])
-            power = fem.mean_power(ops.C, ops.R, *line)
-            energy_balance(power, when=f" at {f:g} Hz")
+        report("lines", 0.0)
+        answers = mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
+        for k, (amplitudes[k], power) in enumerate(answers):
+            report("lines", (k + 1) / len(frequencies))
+            energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
     energy = energy_balance(total)
     waves = np.exp(2j * np.pi * times[:, None] * frequencies)
@@ -159,6 +164,21 @@ def harmonic_answer(
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
     return _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
+
+
+def _line(
+    ops: fem.Operators,
+    P: sparse.csr_array,
+    S: sparse.csr_array,
+    solver: str,
+    frequency: float,
+    pressure: fem.Complex,
+) -> tuple[fem.Complex, fem.Spent]:
+    """Motion (p,) in metre of the probes at one line, and what becomes of its power."""
+    force, free = P @ pressure, ops.free
+    u = fem.harmonic(ops, force, frequency, solver=solver)
+    line = force[None, free], u[:, free], np.array([frequency])
+    return S @ u[0], fem.mean_power(ops.C, ops.R, *line)
 
 
 def _response(

@@ -68,12 +68,17 @@ def refined(
         if coarse.effort.dofs == fine.effort.dofs:  # two sizes beyond the body's own: one mesh
             error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
         else:
-            error = _change(coarse, fine) / ((before / size) ** ORDER - 1)
+            error = error_left(coarse, fine, before / size)
         if h or error <= tolerance or size <= least:
             return Refined(h=size, error=error, coarser=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
         before, coarse = size, fine
         size = max(least, min(size / RATIO, max(wanted, size / 2)))
+
+
+def error_left(coarse: Response, fine: Response, ratio: float) -> float:
+    """The expected relative error of the finer of two answers, whose sizes have this ratio."""
+    return _change(coarse, fine) / (ratio**ORDER - 1)
 
 
 def _change(coarse: Response, fine: Response) -> float:

@@ -9,7 +9,7 @@ from simple_model import Response, flat_body, point_kernel
 from simple_model.choices import choose
 from skinwave.bodies import compliance
 from skinwave.effort import Progress, silent
-from skinwave.full import harmonic_answer, transient_answer
+from skinwave.full import Map, harmonic_answer, transient_answer
 from skinwave.plan import plan
 from skinwave.prepared import REDUCTION_TOLERANCE, answer, prepare, sample_times
 from skinwave.scene import Scene
@@ -30,6 +30,7 @@ def simulate(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
+    mapped: Map = map,
 ) -> Response:
     """Motion of a scene's probes.
 
@@ -46,6 +47,8 @@ def simulate(
     h : float, metre, element size; planned if not given, and with it how much of the body counts
     dt : float, s, time step of "fem-transient" and the nonlinear models
     solver : a backend of `fem.linear_solver`
+    mapped : shaped like the built-in `map`, for the lines of "fem-harmonic", which are solved one
+        by one; `engine.mapped_on` spreads them over the workers of a Dask scheduler
 
     Raises
     ------
@@ -65,8 +68,9 @@ def simulate(
             return _warned(answer(required.prepared, scene, progress), required.warnings)
         scene = replace(scene, body=required.body)
         found = simulate(
-            scene, required.model, tolerance, progress, h=required.h or h, dt=dt, solver=solver
-        )
+            scene, required.model, tolerance, progress,
+            h=required.h or h, dt=dt, solver=solver, mapped=mapped,
+        )  # fmt: skip
         return _warned(found, required.warnings)
     times = sample_times(scene)
     if model == "point-kernel":
@@ -82,7 +86,9 @@ def simulate(
     if model == "fem-transient":
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-harmonic":
-        return harmonic_answer(scene, times, report, h=h, solver=solver, threshold=tolerance / 50)
+        return harmonic_answer(
+            scene, times, report, h=h, solver=solver, threshold=tolerance / 50, mapped=mapped
+        )
     if model == "fem-nonlinear":
         return reduced_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-nonlinear-transient":

@@ -1,7 +1,9 @@
 """One scene, one model."""
 
 import argparse
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from typing import Any
 
 from skinwave.commands.common import (
     add_mesh,
@@ -21,6 +23,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_model(parser)
     add_mesh(parser)
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of Dask workers that share fem-harmonic's lines"
+    )
     add_output(parser)
 
 
@@ -39,10 +44,10 @@ def run(options: argparse.Namespace) -> int:
     with output_folder(out, overwrite=options.overwrite) as folder:
         if options.h or options.model in ("point-kernel", "flat-body"):  # runs without a plan
             required_plan(options, scene)
-        with progress_of(options) as progress:
+        with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             response = simulate(
                 scene, options.model, options.tolerance, progress,
-                h=metre(options.h), dt=options.dt, solver=options.solver,
+                h=metre(options.h), dt=options.dt, solver=options.solver, mapped=mapped,
             )  # fmt: skip
         run = Run(
             tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
@@ -58,3 +63,13 @@ def run(options: argparse.Namespace) -> int:
     }
     summarise(options, summary, f"{response.model}: wrote {out}/index.html")
     return 0
+
+
+def _mapped(scheduler: str | None) -> AbstractContextManager[Any]:
+    """What maps a function over lines: here, or on the workers of a scheduler."""
+    if scheduler is None:
+        return nullcontext(map)
+    from skinwave import engine
+
+    engine.check(scheduler)
+    return engine.mapped_on(scheduler)

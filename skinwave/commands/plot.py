@@ -1,0 +1,72 @@
+"""Pictures of a sweep: any column over one or two varied keys."""
+
+import argparse
+from pathlib import Path
+
+from skinwave.commands.common import add_reporting, summarise
+
+FORMATS = ("png", "svg", "pdf")
+PRESETS = ("speed",)
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a sweep")
+    parser.add_argument(
+        "--column", action="append", metavar="NAME",
+        help="such as peak_um (default), level_db, f_AM_um[2] at one probe; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--x", metavar="KEY", help="along the axis (default: most values)")
+    parser.add_argument("--by", metavar="KEY", help="a curve for each value (default: the next)")
+    parser.add_argument("--heat", action="store_true", help="a map over --x and --by instead")
+    parser.add_argument("--preset", choices=PRESETS, help="speed: what is felt over drawing speed")
+    parser.add_argument("--format", choices=FORMATS, default="png")
+    parser.add_argument("--style", default="report", help="report, talk or print")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="default: DIR/figures")
+    parser.add_argument("--quiet", action="store_true", help="no summary")
+    add_reporting(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave import dataset, engine
+
+    engine.check("threads")
+    from skinwave.files import folder_name, output_file
+    from skinwave.styles import style
+    from skinwave.sweep_figures import (
+        SPEED,
+        finished,
+        heat_figure,
+        line_figure,
+        speed_figure,
+        varied,
+    )
+
+    chosen = style(options.style)
+    rows = finished(dataset.read(options.folder))
+    keys = varied(rows)
+    x = options.x or (SPEED if options.preset == "speed" else next(iter(keys), None))
+    if x is None:
+        raise ValueError(f"{options.folder} varies no key; name a column with --x")
+    by = options.by or next((key for key in keys if key != x), None)
+    figures = {}
+    if options.preset == "speed":
+        figures["speed"] = speed_figure(rows, by, chosen)
+    for column in options.column or ([] if figures else ["peak_um"]):
+        name = folder_name(f"{column} over {x}" + (f" and {by}" if by else ""))
+        if not options.heat:
+            figures[name] = line_figure(rows, column, x, by, chosen)
+        elif by:
+            figures[f"{name} map"] = heat_figure(rows, column, x, by, chosen)
+        else:
+            raise ValueError("a map needs two varied keys; leave out --heat or give --by")
+    out = options.out or options.folder / "figures"
+    out.mkdir(parents=True, exist_ok=True)
+    paths = [out / f"{name.replace(' ', '-')}.{options.format}" for name in figures]
+    for path, figure in zip(paths, figures.values(), strict=True):
+        with output_file(path, overwrite=True) as file:
+            figure.savefig(file, format=options.format, dpi=chosen.dpi)
+    said = "\n".join(f"wrote {path}" for path in paths)
+    summarise(options, {"figures": [str(path) for path in paths], "runs": len(rows)}, said)
+    return 0

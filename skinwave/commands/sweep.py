@@ -1,0 +1,119 @@
+"""Many scenes in one table, on all cores or a cluster; goes on where it ended."""
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skinwave.commands.common import (
+    MODELS,
+    TOLERANCE,
+    add_mesh,
+    add_reporting,
+    add_scene,
+    metre,
+    progress_of,
+    summarise,
+)
+
+if TYPE_CHECKING:
+    from skinwave.effort import Progress
+
+SAID_EACH = 5.0  # s between two lines of progress on a pipe
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    add_scene(parser)
+    parser.add_argument(
+        "--vary", action="extend", nargs="+", metavar="KEY=VALUES", required=True,
+        help="tacton.speed_m_per_s=1:12:12, body.depth_mm=10,15, body=skin-slab,palm; "
+        "start:stop of lhs",
+    )  # fmt: skip
+    parser.add_argument("--design", default="factorial", help="factorial (default), zip or lhs")
+    parser.add_argument("--samples", type=int, metavar="N", help="runs of a Latin hypercube")
+    parser.add_argument("--seed", type=int, default=0, help="of a Latin hypercube")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the table")
+    parser.add_argument(
+        "--scheduler", default="processes", metavar="WHERE",
+        help="processes (default), threads, or the address of a Dask scheduler",
+    )  # fmt: skip
+    parser.add_argument("--workers", type=int, metavar="N", help="runs at a time on this machine")
+    parser.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
+    add_mesh(parser)
+    parser.add_argument("--csv", action="store_true", help="write rows.csv, too")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    add_reporting(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave import dataset, engine
+
+    engine.check(options.scheduler)
+    from skinwave.sweep import Knobs, sweep
+    from skinwave.variation import cases, combinations, parse
+
+    if options.seed < 0:
+        raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
+    variations = [parse(text) for text in options.vary]
+    combined = combinations(variations, options.design, options.samples, options.seed)
+    wanted = cases(options.scene, combined)
+    knobs = Knobs(
+        model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
+    )
+    out = options.out or Path(f"{options.scene.stem}-sweep")
+    with _progress(options, len(wanted)) as progress:
+        found = sweep(
+            wanted, out, knobs, progress, scheduler=options.scheduler, workers=options.workers
+        )
+    if options.csv and found.planned > found.missing:
+        dataset.write_csv(out, dataset.read(out))
+    summary = {
+        "out": str(out),
+        "planned": found.planned,
+        "there_before": found.found,
+        "done": found.done,
+        "failed": found.failed,
+        "missing": found.missing,
+        "seconds": round(found.seconds, 1),
+    }
+    sentence = (
+        f"{found.done} of {found.planned} runs done in {found.seconds:.0f} s, {found.failed} "
+        f"failed, {found.found} were there; {out}/{dataset.ROWS} is the table"
+    )
+    summarise(options, summary, sentence)
+    if found.missing:
+        why = "interrupted" if found.interrupted else "workers were killed"
+        print(f"skinwave: {why}; {found.missing} runs are missing, the same command goes on with "
+              "them", file=sys.stderr)  # fmt: skip
+    return 1 if found.missing else 0
+
+
+@contextmanager
+def _progress(options: argparse.Namespace, runs: int) -> "Iterator[Progress]":
+    """A bar; on a pipe a line now and then, with the time left."""
+    if options.quiet or options.json or sys.stderr.isatty():
+        with progress_of(options) as progress:
+            yield progress
+        return
+    begun: dict[str, tuple[float, float]] = {}
+    said = [-SAID_EACH]
+
+    def log(phase: str, fraction: float) -> None:
+        now = time.perf_counter()
+        started, at = begun.setdefault(phase, (now, fraction))
+        if now - said[0] < SAID_EACH and fraction < 1:
+            return
+        said[0] = now
+        left = ""
+        if at < fraction < 1:
+            left = f", {(now - started) * (1 - fraction) / (fraction - at):.0f} s left"
+        told = f"{round(fraction * runs)} of {runs} runs" if phase == "run" else phase
+        print(told + left, file=sys.stderr, flush=True)
+
+    yield log

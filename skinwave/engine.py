@@ -1,0 +1,189 @@
+"""Many runs at once, by Dask: in threads, in processes, or on the workers of a scheduler.
+
+Nothing but Dask is imported here: a worker process sets its threads before numpy is loaded.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from functools import partial
+from importlib.util import find_spec
+from multiprocessing import active_children, get_context, parent_process
+from typing import Any
+
+LOCAL = ("processes", "threads")
+ATTEMPTS = 4  # to finish what was lost with a killed worker
+CONNECTED = 10  # s that a scheduler may take to answer
+
+
+def check(scheduler: str) -> None:
+    """Refuse, before any work, what is not installed.
+
+    Raises
+    ------
+    ValueError
+        If Dask or pyarrow or, for an address, distributed is missing.
+    """
+    extra, needed = "sweep", ["dask", "pyarrow"]
+    if scheduler not in LOCAL:
+        extra, needed = "cluster", [*needed, "distributed"]
+        if ":" not in scheduler:
+            raise ValueError(
+                f"scheduler '{scheduler}' is none of {', '.join(LOCAL)} and no address; "
+                "write one such as tcp://host:8786"
+            )
+    if missing := [name for name in needed if find_spec(name) is None]:
+        raise ValueError(
+            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed; "
+            f"pip install 'skinwave[{extra}]'"
+        )
+
+
+def workers(scheduler: str, asked: int | None = None) -> int:
+    """How many runs go on at a time.
+
+    Raises
+    ------
+    ValueError
+        If fewer than one is asked for, or a scheduler does not answer.
+    """
+    if asked is not None and asked < 1:
+        raise ValueError(f"--workers = {asked} is below 1; give one at least")
+    if scheduler in LOCAL:
+        return asked or _cores()
+    with _client(scheduler) as client:
+        return max(1, sum(client.nthreads().values()))
+
+
+def run_all(
+    work: Callable[[Any], Any],
+    items: Sequence[Any],
+    scheduler: str,
+    count: int,
+    done: Callable[[int, Any], None],
+) -> None:
+    """Call `done` here with the index and the result of each item as soon as its work is finished.
+
+    What a killed worker was at is done again by another; what kills every worker is left out.
+    """
+    if not items:
+        return
+    if scheduler not in LOCAL:
+        _run_on_cluster(work, items, scheduler, done)
+        return
+    left = set(range(len(items)))
+
+    def finished(key: Any, result: Any, *_: Any) -> None:
+        done(key, result)
+        left.discard(key)
+
+    for _ in range(ATTEMPTS):
+        with suppress(BrokenProcessPool):
+            _run_here(work, {k: items[k] for k in sorted(left)}, scheduler, count, finished)
+        if not left:
+            return
+
+
+@contextmanager
+def mapped_on(address: str) -> Iterator[Callable[..., Iterable[Any]]]:
+    """A function like the built-in `map` whose calls are spread over the workers of a scheduler."""
+    with _client(address) as client:
+
+        def mapped(work: Callable[..., Any], *items: Iterable[Any]) -> Iterator[Any]:
+            # What the function holds, such as a body's matrices, goes to each worker once.
+            sent = client.scatter(work, broadcast=True)
+            futures = [
+                client.submit(_call, sent, *each, pure=False) for each in zip(*items, strict=True)
+            ]
+            return (future.result() for future in futures)
+
+        yield mapped
+
+
+def _call(work: Callable[..., Any], *arguments: Any) -> Any:
+    return work(*arguments)
+
+
+def _run_here(
+    work: Callable[[Any], Any],
+    items: Mapping[int, Any],
+    scheduler: str,
+    count: int,
+    finished: Callable[..., None],
+) -> None:
+    """Dask's own loop over threads or over processes that end with this one."""
+    from dask import multiprocessing, threaded
+    from dask.callbacks import Callback
+
+    graph = {k: (partial(work, item),) for k, item in items.items()}
+    get = threaded.get if scheduler == "threads" else multiprocessing.get
+    others = set(active_children())
+    pool: Executor
+    if scheduler == "threads":
+        pool = ThreadPoolExecutor(count)
+    else:
+        pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_as_worker)
+    try:
+        with Callback(posttask=finished):
+            get(graph, list(graph), pool=pool, num_workers=count, chunksize=1)
+        pool.shutdown()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(active_children()) - others:
+            child.terminate()
+        raise
+
+
+def _as_worker() -> None:
+    """Interrupts are the parent's; one thread each; none outlives a parent that is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+    def watch() -> None:
+        parent = parent_process()
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _run_on_cluster(
+    work: Callable[[Any], Any],
+    items: Sequence[Any],
+    address: str,
+    done: Callable[[int, Any], None],
+) -> None:
+    from distributed import KilledWorker, as_completed
+
+    with _client(address) as client:
+        futures = {client.submit(work, item, pure=False): k for k, item in enumerate(items)}
+        for future in as_completed(list(futures), loop=client.loop):
+            with suppress(KilledWorker):
+                done(futures[future], future.result())
+            future.release()
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=CONNECTED, set_as_default=False)
+    except (OSError, ValueError) as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(
+            f"no scheduler answers at {address} ({said}); start one with dask scheduler"
+        ) from None
+    with client:
+        yield client
+
+
+def _cores() -> int:
+    counted = getattr(os, "sched_getaffinity", None)
+    return len(counted(0)) if counted else os.cpu_count() or 1

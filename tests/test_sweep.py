@@ -1,0 +1,372 @@
+"""Sweeps: which runs, each once, in one table, whatever runs them and whatever is killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from skinwave import dataset, engine, sweep_figures
+from skinwave import sweep as sweeping
+from skinwave.cli import main
+from skinwave.measures import COSTS
+from skinwave.scene_file import read
+from skinwave.simulation import simulate
+from skinwave.styles import style
+from skinwave.variation import cases, combinations, parse
+
+SMALL = """
+name = "short"
+[tacton]
+am_frequency_hz = 200
+duration_s = 0.05
+shape = "circle"
+size_mm = 10
+speed_m_per_s = 6
+[body]
+width_mm = 60
+height_mm = 60
+[probes]
+points_mm = [[0, 0], [10, 0]]
+"""
+THREADS = ["--scheduler", "threads", "--quiet"]
+FOREARM = Path(__file__).parent.parent / "examples/speed-on-forearm.toml"
+not_on_windows = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "short.toml"
+    path.write_text(SMALL)
+    return path
+
+
+def varied(*texts):
+    return [parse(text) for text in texts]
+
+
+def swept(*arguments):
+    assert main(["sweep", "short.toml", *map(str, arguments), *THREADS]) == 0
+    return dataset.read(Path("short-sweep"))
+
+
+def refused(capsys, *arguments):
+    """The one sentence with which a call is refused."""
+    assert main([str(argument) for argument in arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "Traceback" not in said
+    return said
+
+
+def test_a_factorial_is_every_value_with_every_other():
+    met = combinations(varied("tacton.speed_m_per_s=1:12:12", "body.depth_mm=10,15"))
+    assert len(met) == 24
+    assert met[0] == {"tacton.speed_m_per_s": 1.0, "body.depth_mm": 10}
+    assert met[-1] == {"tacton.speed_m_per_s": 12.0, "body.depth_mm": 15}
+
+
+def test_zipped_values_meet_in_turn_and_must_be_as_many():
+    met = combinations(varied("tacton.size_mm=5:15:3", "body.depth_mm=9,10,11"), "zip")
+    assert [tuple(each.values()) for each in met] == [(5, 9), (10, 10), (15, 11)]
+    with pytest.raises(ValueError, match="lists of one length, not of 3, 2"):
+        combinations(varied("tacton.size_mm=5:15:3", "body.depth_mm=9,10"), "zip")
+
+
+def test_a_latin_hypercube_meets_every_stratum_once_and_is_the_same_again():
+    asked = varied("tacton.speed_m_per_s=2:12", "body.material=palm,forearm")
+    met = combinations(asked, "lhs", 20)
+    speeds = np.array([each["tacton.speed_m_per_s"] for each in met])
+    np.testing.assert_array_equal(np.sort(((speeds - 2) / 0.5).astype(int)), np.arange(20))
+    assert sorted(each["body.material"] for each in met) == 10 * ["forearm"] + 10 * ["palm"]
+    assert met == combinations(asked, "lhs", 20)
+    assert met != combinations(asked, "lhs", 20, seed=1)
+
+
+def test_any_key_of_a_scene_can_be_varied(scene):
+    texts = (
+        "body.material.viscosity_pa_s=2,4",
+        "probes.points_mm=[[0, 0]],[[1, 0], [2, 0]]",
+        "tacton.sweep=one_way",
+    )
+    found = cases(scene, combinations(varied(*texts)))
+    assert [case.scene.body.solid.viscosity for case in found] == [2, 2, 4, 4]
+    assert found[0].scene.body.solid.shear_modulus == read(scene).body.solid.shear_modulus
+    assert [len(case.scene.probes) for case in found] == [1, 2, 1, 2]
+    bodies = cases(scene, combinations(varied("body=skin-slab,palm,none")))
+    assert [case.scene.body.kind for case in bodies] == ["slab", "palm", "none"]
+    assert len(cases(scene, combinations(varied("body.depth_mm=10,10.0,15")))) == 2
+
+
+def test_rows_say_what_was_commanded_and_what_came_out(scene):
+    rows = swept("--vary", "tacton.speed_m_per_s=4,6", "body=skin-slab,none", "--csv")
+    assert len(rows) == 4
+    assert {(row["model"], row["body.kind"]) for row in rows} == {
+        ("flat-body", "slab"), ("point-kernel", "none"),
+    }  # fmt: skip
+    waves = next(row for row in rows if row["body.kind"] == "slab")
+    assert waves["f_AM_hz"] == 200
+    assert len(waves["f_AM_um"]) == len(waves["level_db"]) == 2
+    assert waves["peak_um"][0] > waves["f_AM_um"][0] > 0
+    assert {waves["kernel_spread_6db_mm"], waves["spread_6db_mm"]} <= {0, 10}
+    assert max(map(abs, waves["kernel_lag_ms"])) < 50
+    assert waves["drawing_frequency_hz"] == pytest.approx(waves["tacton.speed_m_per_s"] / 0.0314159)
+    (scene.parent / "again.toml").write_text(waves["scene"])
+    assert read("again.toml").tacton.trajectory.speed == waves["tacton.speed_m_per_s"]
+    header, *lines = (scene.parent / "short-sweep/rows.csv").read_text().splitlines()
+    assert "f_AM_um[1]" in header
+    assert sum("done" in line for line in lines) == 4
+
+
+def test_a_failing_combination_is_a_row_with_its_error(scene):
+    rows = swept("--vary", "body.width_mm=60,10", "tacton.size_mm=10,50,70", "body.depth_mm=15,inf")
+    failed = [row["error"] for row in rows if row["status"] == "failed"]
+    assert len(rows) == 12
+    assert len(failed) == 8
+    assert sum("off the body" in error for error in failed) == 4
+    assert sum("outside 0..60 mm" in error for error in failed) == 4
+    rows = swept("--vary", "body.depth_mm=15,inf", "tacton.size_mm=11", "--model", "fem", "--h", 15)
+    errors = {row["body.depth_mm"]: row["error"] for row in rows if row["tacton.size_mm"] == 11}
+    assert errors[15] == ""
+    assert "inf has no mesh" in errors[np.inf]
+
+
+def test_what_is_there_is_not_run_again(scene, monkeypatch, capsys):
+    vary = ["--vary", "tacton.speed_m_per_s=4,6", "tacton.size_mm=10,80"]
+    first = swept(*vary)
+    monkeypatch.setattr(sweeping, "_row", None)  # any run would fail
+    assert swept(*vary) == first
+    monkeypatch.undo()
+    os.chdir(scene.parent)
+    assert main(["sweep", "short.toml", "--vary", "tacton.speed_m_per_s=4,6,8", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["there_before"], summary["done"]) == (2, 1)
+    assert len(swept(*vary)) == len(first) + 1
+
+
+def test_bodies_are_prepared_once(scene, monkeypatch):
+    prepared, inner = [], sweeping.prepare
+    counted = lambda *a, **k: prepared.append(a) or inner(*a, **k)  # noqa: E731
+    monkeypatch.setattr(sweeping, "prepare", counted)
+    sweeping._prepared.cache_clear()
+    rows = swept("--vary", "tacton.speed_m_per_s=2:8:6", "body.depth_mm=12,13",
+                 "--model", "fem", "--h", 10, "--workers", 1)  # fmt: skip
+    assert {row["status"] for row in rows} == {"done"}
+    assert len(prepared) == 2
+    assert all(row["dofs"] > 1000 and row["energy_imbalance"] < 0.01 for row in rows)
+
+
+def test_each_row_says_how_wrong_its_mesh_is(scene):
+    smaller = ["body.width_mm=40", "body.height_mm=40", "body.depth_mm=8", "body.sides=clamped"]
+    rows = swept(
+        "--vary", "tacton.am_frequency_hz=80,300", *smaller, "--model", "fem", "--tolerance", 0.3
+    )
+    errors = [row["expected_error"] for row in rows]
+    assert all(0 < error < 0.3 for error in errors)
+    assert rows[0]["h_mm"] == rows[1]["h_mm"]
+
+
+def test_wrong_keys_and_values_are_one_sentence(scene, capsys):
+    ask = lambda *texts: refused(capsys, "sweep", scene, "--vary", *texts)  # noqa: E731
+    assert "did you mean 'tacton.speed_m_per_s'" in ask("tacton.speed_m_s=1,2")
+    assert "lacks values" in ask("tacton.size_mm=")
+    assert "did you mean 'square'" in ask("tacton.shape=circle,sqare")
+    assert "must be a number" in ask("tacton.size_mm=wide,10")
+    assert "is no file and none of" in ask("body=moon")
+    assert "varied twice" in ask("tacton.size_mm=1", "tacton.size_mm=2")
+    assert "whole number" in ask("tacton.size_mm=1:2:2.5")
+    assert "add :n" in ask("tacton.size_mm=1:2")
+    assert "no combination makes a scene" in ask("tacton.size_mm=70,80")
+    assert "runs are outside" in ask("tacton.size_mm=1:2:1000", "body.depth_mm=1:2:1000")
+    assert "lhs needs it" in ask("tacton.size_mm=1:2", "--design", "lhs")
+    assert "design 'latin' is unknown" in ask("tacton.size_mm=1,2", "--design", "latin")
+    assert "below 1" in ask("tacton.size_mm=1,2", "--workers", "0")
+    assert "is none of processes, threads" in ask("tacton.size_mm=1,2", "--scheduler", "cloud")
+    assert "holds no sweep" in ask("tacton.size_mm=1,2", "--out", ".")
+    assert "no rows" in refused(capsys, "plot", "nowhere")
+    assert not (scene.parent / "short-sweep").exists()
+
+
+def test_a_missing_extra_is_one_sentence_with_its_cure(scene, capsys, monkeypatch):
+    monkeypatch.setattr(engine, "find_spec", lambda name: None)
+    said = refused(capsys, "sweep", scene, "--vary", "tacton.size_mm=1,2")
+    assert "pip install 'skinwave[sweep]'" in said
+    said = refused(
+        capsys, "sweep", scene, "--vary", "tacton.size_mm=1,2", "--scheduler", "tcp://a:1"
+    )
+    assert "pip install 'skinwave[cluster]'" in said
+
+
+@pytest.mark.filterwarnings("ignore")  # of Dask's own event loop
+def test_a_scheduler_that_is_not_there_is_one_sentence(scene, capsys, monkeypatch):
+    monkeypatch.setattr(engine, "CONNECTED", 0.5)
+    nowhere = ["--scheduler", "tcp://127.0.0.1:9"]
+    said = refused(capsys, "sweep", scene, "--vary", "tacton.size_mm=1,2", *nowhere)
+    assert "no scheduler answers at tcp://127.0.0.1:9" in said
+    assert "no scheduler answers" in refused(capsys, "run", scene, "--quiet", *nowhere)
+    assert sorted(path.name for path in scene.parent.iterdir()) == ["short.toml"]
+
+
+def test_the_forearm_gives_way_most_near_the_rayleigh_speed(tmp_path, monkeypatch):
+    """Largest deflection on a circle of 100 mm around, in um/Pa, by Hankel transforms."""
+    monkeypatch.chdir(tmp_path)
+    table = dict(zip(
+        [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 18],
+        [0.362, 0.402, 0.409, 0.366, 0.309, 0.260, 0.222, 0.194, 0.175, 0.162, 0.146, 0.130, 0.120],
+        strict=True,
+    ))  # fmt: skip
+    speeds = [*table, 2.25, 2.5, 2.75, 3.25]
+    vary = f"tacton.speed_m_per_s={','.join(map(str, speeds))}"
+    assert main(["sweep", str(FOREARM), "--vary", vary, "--out", "out", *THREADS]) == 0
+    rows = dataset.read(Path("out"))
+    peaks = {row["tacton.speed_m_per_s"]: row["peak_um"][0] / 50 for row in rows}
+    np.testing.assert_allclose([peaks[v] for v in table], list(table.values()), rtol=0.05)
+    assert max(peaks, key=peaks.get) == pytest.approx(rows[0]["rayleigh_speed_m_per_s"], rel=0.15)
+    figure = sweep_figures.speed_figure(rows, None, style("report"))
+    assert [ax.get_ylabel() for ax in figure.axes] == ["largest displacement, µm",
+                                                       "sensation level, dB"]  # fmt: skip
+    assert figure.axes[1].get_xlabel() == "drawing speed, m/s"
+    dashed = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
+    assert dashed[0].get_xdata()[0] == pytest.approx(2.68, abs=0.01)
+
+
+def test_plots_are_drawn_with_units(scene):
+    swept("--vary", "tacton.speed_m_per_s=4,6,8", "tacton.size_mm=8,10,70")
+    for kind in ("png", "svg", "pdf"):
+        check_plots(kind)
+
+
+def check_plots(kind):
+    drawn = ["plot", "short-sweep", "--format", kind, "--quiet"]
+    assert main([*drawn, "--column", "f_AM_um[1]", "--column", "kernel_misfit"]) == 0
+    assert main([*drawn, "--column", "spread_6db_mm", "--heat"]) == 0
+    assert main([*drawn, "--preset", "speed"]) == 0
+    files = list(Path("short-sweep/figures").glob(f"*.{kind}"))
+    assert len(files) == 4
+    assert all(file.stat().st_size > 5000 for file in files)
+    if kind == "svg":
+        text = "".join(file.read_text() for file in files)
+        assert "drawing speed, m/s" in text
+        assert "size of the path, mm" in text
+
+
+def test_a_plot_of_what_is_not_there_is_one_sentence(scene, capsys):
+    swept("--vary", "tacton.speed_m_per_s=4,6")
+    assert "column 'peak' is unknown" in refused(capsys, "plot", "short-sweep", "--column", "peak")
+    assert "did you mean 'peak_um'" in refused(capsys, "plot", "short-sweep", "--column", "peak")
+    assert "two varied keys" in refused(capsys, "plot", "short-sweep", "--heat")
+    assert "no finite number" in refused(capsys, "plot", "short-sweep", "--column", "felt_line")
+
+
+def same(first, second):
+    """Two tables, but for their order and what they cost."""
+    assert len(first) == len(second)
+    for row, other in zip(
+        *(sorted(t, key=lambda r: r["key"]) for t in (first, second)), strict=True
+    ):
+        for name in row.keys() - set(COSTS):
+            if isinstance(row[name], float | list) and row[name] != []:
+                np.testing.assert_allclose(
+                    np.array(row[name], float), np.array(other[name], float), rtol=1e-10, atol=1e-12
+                )
+            else:
+                assert row[name] == other[name], name
+
+
+def environment():
+    """Workers find this checkout, whatever is installed."""
+    here = str(Path(__file__).parent.parent)
+    return {**os.environ, "PYTHONPATH": here, "OMP_NUM_THREADS": "1"}
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """The address of a Dask scheduler with two workers, each a process, and these."""
+    file = tmp_path / "scheduler.json"
+    named = ["--scheduler-file", str(file), "--no-dashboard"]
+
+    def start(program, *arguments):
+        command = [sys.executable, "-m", f"distributed.cli.{program}", *named, *arguments]
+        return subprocess.Popen(
+            command, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+
+    started = [start("dask_scheduler", "--port", "0")]
+    while not file.exists() or not file.stat().st_size:
+        assert started[0].poll() is None
+        time.sleep(0.1)
+    started += [start("dask_worker", "--no-nanny", "--nthreads", "1") for _ in range(2)]
+    try:
+        yield json.loads(file.read_text())["address"], started[1:]
+    finally:
+        for process in started[::-1]:
+            process.kill()
+            process.wait()
+
+
+VARY = ["--vary", "tacton.speed_m_per_s=4,6,8", "tacton.am_frequency_hz=0,100", "--quiet"]
+FEM = ["--model", "fem", "--h", "10"]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of Dask's own event loop
+def test_processes_and_a_cluster_give_the_same_table(scene, cluster, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", environment()["PYTHONPATH"])
+    sweep = ["sweep", "short.toml", *VARY, *FEM]
+    assert main([*sweep, "--out", "here"]) == 0
+    assert main([*sweep, "--out", "there", "--scheduler", cluster[0]]) == 0
+    same(dataset.read(Path("here")), dataset.read(Path("there")))
+    short = read(scene)
+    with engine.mapped_on(cluster[0]) as mapped:
+        spread = simulate(short, "fem-harmonic", h=0.015, mapped=mapped).displacement
+    here = simulate(short, "fem-harmonic", h=0.015).displacement
+    np.testing.assert_allclose(spread, here, rtol=1e-10, atol=1e-10 * abs(here).max())
+
+
+def driver(*arguments):
+    command = [sys.executable, "-m", "skinwave", "sweep", "short.toml", *VARY[:1],
+               "tacton.speed_m_per_s=3:8:12", "--quiet", "--out", "cut", *arguments]  # fmt: skip
+    return subprocess.Popen(command, env=environment(), stderr=subprocess.DEVNULL)
+
+
+def wait_for_rows(process, count):
+    while len(list(Path("cut/rows").glob("part-*.parquet"))) < count:
+        assert process.poll() is None
+        time.sleep(0.02)
+
+
+def whole(rows, count):
+    assert len(rows) == len({row["key"] for row in rows}) == count
+    assert len({row["tacton.speed_m_per_s"] for row in rows}) == count
+    assert {row["status"] for row in rows} == {"done"}
+    parts = Path("cut/rows").glob("part-*.parquet")
+    assert sum(pq.read_metadata(part).num_rows for part in parts) == count
+
+
+@pytest.mark.slow
+@not_on_windows
+def test_killed_workers_and_drivers_lose_no_row_and_double_none(scene, cluster):
+    address, workers = cluster
+    with driver("--scheduler", address) as process:
+        wait_for_rows(process, 2)
+        workers[0].kill()
+        wait_for_rows(process, 4)
+        process.kill()
+    before = len(dataset.names(Path("cut")))
+    assert 4 <= before < 12
+    with driver("--workers", "2") as process:
+        wait_for_rows(process, before + 2)
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 1
+    between = len(dataset.names(Path("cut")))
+    assert before < between < 12
+    with driver("--workers", "2") as process:
+        assert process.wait() == 0
+    whole(dataset.read(Path("cut")), 12)
