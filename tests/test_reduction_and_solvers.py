@@ -254,7 +254,8 @@ def test_a_field_is_the_transients_everywhere():
     ops = operators(build)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 2.5e-5), 0, 801, 160)
-    full = np.array([state.displacement for state in states]).reshape(found.displacement.shape)
+    full = np.array([state.displacement.reshape(-1, 3) for state in states])
+    full = full[:, meshes.part(build.mesh, build.drag == 0)[1]]  # without the layer around it
     assert np.linalg.norm(found.displacement - full) < 0.01 * np.linalg.norm(full)
 
 
