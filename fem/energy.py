@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fem.assembly import Operators
 from fem.transient import State
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,20 +51,32 @@ def audited(
     force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
     """
     C, R, free = operators.C, operators.R, operators.free
+
+    def lost(before: State, state: State) -> Spent:
+        velocity = (state.velocity + before.velocity)[free] / 2
+        dt = state.time - before.time
+        out = dt * float(velocity @ (R @ velocity))
+        return Spent(dissipated=dt * float(velocity @ (C @ velocity)) - out, radiated=out)
+
+    return accounted(states, force, free, lost)
+
+
+def accounted(
+    states: Iterator[State],
+    force: Callable[[float], Floats],
+    free: Ints,
+    lost: Callable[[State, State], Spent],
+) -> Iterator[tuple[State, Spent]]:
+    """States, each with what was spent since the first, of any body: `lost` says what of it between
+    two states.
+    """
     before, spent = next(states), Spent()
     f = force(before.time)[free]
     yield before, spent
     for state in states:
         f_next = force(state.time)[free]
         moved = (state.displacement - before.displacement)[free]
-        velocity = (state.velocity + before.velocity)[free] / 2
-        dt = state.time - before.time
-        out = dt * float(velocity @ (R @ velocity))
-        spent += Spent(
-            work=float(moved @ (f + f_next)) / 2,
-            dissipated=dt * float(velocity @ (C @ velocity)) - out,
-            radiated=out,
-        )
+        spent += Spent(work=float(moved @ (f + f_next)) / 2) + lost(before, state)
         yield state, spent
         before, f = state, f_next
 

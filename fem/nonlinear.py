@@ -19,7 +19,7 @@ from itertools import count
 import numpy as np
 from scipy.optimize import brentq
 
-from fem.energy import Spent
+from fem.energy import Spent, accounted
 from fem.finite_strain import Elastic
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged, State, acceleration, at_rest, weights
@@ -273,16 +273,11 @@ def audited(
     force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
     """
     free = body.operators.free
-    before, spent = next(states), Spent()
-    f = force(before.time)[free]
-    yield before, spent
-    for state in states:
-        f_next, dt = force(state.time)[free], state.time - before.time
+
+    def lost(before: State, state: State) -> Spent:
         moved = (state.displacement - before.displacement)[free]
         middle = (state.displacement + before.displacement)[free] / 2
-        spent = Spent(
-            work=spent.work + float(moved @ (f + f_next)) / 2,
-            dissipated=spent.dissipated + float(moved @ body.viscous(middle, moved)) / dt,
-        )
-        yield state, spent
-        before, f = state, f_next
+        dt = state.time - before.time
+        return Spent(dissipated=float(moved @ body.viscous(middle, moved)) / dt)
+
+    return accounted(states, force, free, lost)

@@ -1,6 +1,6 @@
 """Answers without reduction: every time step, every line, and exact waves of endless bodies."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, partial
 from itertools import islice
 from math import ceil
@@ -79,7 +79,6 @@ def transient_answer(
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
     S = fem.probe_operator(build.mesh, scene.probe_points)
-    stepped = np.empty((steps + 1, len(scene.probes)))
     report("factorise", 0.0)
 
     @lru_cache(maxsize=4)
@@ -89,15 +88,36 @@ def transient_answer(
     with clock("march"):
         states = fem.transient(ops, force, dt, solver=solver)
         audited = fem.audited(ops, islice(states, steps + 1), force)
-        for k, (state, spent) in enumerate(audited):
-            stepped[k] = S @ state.displacement
-            report("march", k / steps)
-            if k % CHECKED_EACH == 0 or k == steps:
-                left = fem.stored(ops, state)
-                energy = energy_balance(spent, left, f" at t = {state.time:g} s, step {k}")
+        stepped, energy = marched(
+            audited, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
+        )
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
     return _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
+
+
+def marched(
+    audited: Iterator[tuple[fem.State, fem.Spent]],
+    steps: int,
+    read: Callable[[Floats], Floats],
+    stored: Callable[[fem.State], float],
+    report: Progress,
+) -> tuple[Floats, tuple[float, float]]:
+    """What is read (steps + 1, p) of each state, and the last balance of the energy.
+
+    Raises
+    ------
+    Diverged
+        If energy is missing in one of the states that are checked.
+    """
+    found = []
+    for k, (state, spent) in enumerate(audited):
+        found.append(read(state.displacement))
+        report("march", k / steps)
+        if k % CHECKED_EACH == 0 or k == steps:
+            when = f" at t = {state.time:g} s, step {k}"
+            energy = energy_balance(spent, stored(state), when)
+    return np.array(found), energy
 
 
 def step_count(duration: float, dt: float) -> int:

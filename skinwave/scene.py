@@ -92,6 +92,11 @@ class Placement:
             )
 
     @property
+    def is_tilted(self) -> bool:
+        """Whether it is turned, and not only moved."""
+        return bool(self.tilt_x or self.tilt_y)
+
+    @property
     def rotation(self) -> NDArray[np.float64]:
         """The matrix (3, 3) that turns the body."""
         (cx, cy), (sx, sy) = np.cos([self.tilt_x, self.tilt_y]), np.sin([self.tilt_x, self.tilt_y])

@@ -20,10 +20,10 @@ from fem import nonlinear
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
-from simple_model.steady import along_path, load_lines, path_knots
-from skinwave.bodies import Build, build
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from skinwave.bodies import Build, build, surface_load
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.full import CHECKED_EACH, TRANSIENT_RATE, energy_balance, step_count
+from skinwave.full import TRANSIENT_RATE, marched, step_count
 from skinwave.prepared import reduced_lines
 from skinwave.scene import Body, Scene
 
@@ -48,6 +48,11 @@ def sheet_only(body: Body, model: str) -> None:
         raise ValueError(
             f"{model} answers a sheet with clamped sides, not a {body.kind} with {body.sides} "
             "sides; give it one, or use --model fem"
+        )
+    if body.placement.is_tilted:
+        raise ValueError(
+            f"{model} answers a sheet that lies across the beam, not a tilted one; leave out its "
+            "tilt, or use --model fem"
         )
 
 
@@ -87,10 +92,11 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
 
 
 def mean_pressure(pressure: MovingPressure, points: Floats) -> Floats:
-    """Pressure (n,) in Pa at surface points (n, 2), averaged over all time."""
+    """Pressure (n,) in Pa at surface points (n, 2 or 3), averaged over all time."""
     lines = load_lines(pressure)
     mean = lines.frequencies < 1e-9
-    along = along_path(pressure.spot(points, path_knots(pressure)).T)
+    weighted = pressure.spot(points, path_knots(pressure)) * path_weights(pressure)[:, None]
+    along = along_path(weighted.T)
     return (along[:, lines.harmonics[mean]] @ lines.coefficients[mean]).real
 
 
@@ -110,13 +116,15 @@ def full_answer(
         report("assemble", 0.0)
         made = meshed_sheet(scene.body, h or stretching_size(scene.body, reduced=False))
         body = stretching_body(scene.body, made)
-    P, points = fem.load_operator(made.mesh), fem.facet_points(made.mesh)[:, :2]
-    return _marched(
+    P, points = surface_load(made)
+    S = fem.probe_operator(made.mesh, scene.probe_points)
+    dt = dt or 1 / TRANSIENT_RATE
+    return _about_rest(
         "fem-nonlinear-transient", scene, times, report, clock,
         body=body,
         mean=P @ mean_pressure(scene.pressure, points),
-        force=lambda t: P @ scene.pressure(points, t),
-        read=lambda u: fem.probe_operator(made.mesh, scene.probe_points) @ u,
+        force=lambda t: P @ scene.pressure(points, t, over=dt),
+        read=lambda u: S @ u,
         dt=dt, solver=solver,
         effort=Effort(dofs=len(body.operators.free)),
     )  # fmt: skip
@@ -128,7 +136,7 @@ class _Reduced:
 
     made: Build
     modes: fem.StretchingModes
-    load: Floats  # (n, r), modal forces of unit pressure at the points (n, 2)
+    load: Floats  # (n, r), modal forces of unit pressure at the points (n, 3)
     points: Floats
     dofs: int
 
@@ -154,13 +162,13 @@ def reduced_answer(
     def force(t: float) -> Floats:
         return (np.exp(2j * pi * hz * t) @ forces).real
 
-    return _marched(
+    return _about_rest(
         "fem-nonlinear", scene, times, report, clock,
         body=sheet.modes.elastic,
         mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
         read=lambda z: read @ z,
-        dt=dt, solver=solver,
+        dt=dt or 1 / TRANSIENT_RATE, solver=solver,
         effort=Effort(
             dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
         ),
@@ -175,9 +183,10 @@ def _reduced(body: Body, h: float | None, solver: str) -> _Reduced:
     modes = fem.stretching_modes(
         made.mesh, operators, membrane(body, made, 1.0), mode_count(body), solver=solver
     )
-    load = fem.load_operator(made.mesh).T @ modes.basis
-    points = fem.facet_points(made.mesh)[:, :2]
-    return _Reduced(made=made, modes=modes, load=load, points=points, dofs=len(operators.free))
+    P, points = surface_load(made)
+    return _Reduced(
+        made=made, modes=modes, load=P.T @ modes.basis, points=points, dofs=len(operators.free)
+    )
 
 
 def mode_count(body: Body) -> int:
@@ -189,31 +198,25 @@ def mode_count(body: Body) -> int:
     return min(max(found, FEWEST_MODES), MOST_MODES)
 
 
-def _marched(
+def _about_rest(
     model: str, scene: Scene, times: Floats, report: Progress, clock: Clock, *,
     body: fem.Elastic, mean: Floats, force: Callable[[float], Floats],
-    read: Callable[[Floats], Floats], dt: float | None, solver: str, effort: Effort,
+    read: Callable[[Floats], Floats], dt: float, solver: str, effort: Effort,
 ) -> Response:  # fmt: skip
     """The motion from rest under the mean load."""
-    dt = dt or 1 / TRANSIENT_RATE
     steps = step_count(float(times[-1]), dt)
     kept = lru_cache(maxsize=2)(force)
     with clock("preload"):
         report("preload", 0.0)
         rest = nonlinear.static(body, mean, solver=solver)
     start = replace(fem.at_rest(len(rest)), displacement=rest)
-    stepped, energy = np.empty((steps + 1, len(scene.probes))), 0.0
+    at_start = nonlinear.total_energy(body, start)
     with clock("march"):
         states = nonlinear.dynamic(body, lambda t, u: kept(t), dt, initial=start, solver=solver)
-        for k, (state, spent) in enumerate(
-            nonlinear.audited(body, islice(states, steps + 1), kept)
-        ):
-            stepped[k] = read(state.displacement)
-            report("march", k / steps)
-            if k % CHECKED_EACH == 0 or k == steps:
-                when = f" at t = {state.time:g} s, step {k}"
-                gained = nonlinear.total_energy(body, state) - nonlinear.total_energy(body, start)
-                energy = energy_balance(spent, gained, when)[0]
+        stepped, (imbalance, _) = marched(
+            nonlinear.audited(body, islice(states, steps + 1), kept), steps, read,
+            lambda state: nonlinear.total_energy(body, state) - at_start, report,
+        )  # fmt: skip
     return Response(
         model=model,
         times=times,
@@ -222,6 +225,6 @@ def _marched(
         effort=replace(
             effort, seconds=clock.seconds, steps=steps, peak_memory=peak_memory(),
             solver=fem.available()[0] if solver == "auto" else solver,
-            energy_imbalance=energy, versions=versions(),
+            energy_imbalance=imbalance, versions=versions(),
         ),
     )  # fmt: skip

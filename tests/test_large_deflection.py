@@ -10,8 +10,9 @@ import fem
 import meshes
 from fem import nonlinear
 from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.focus import along_axis
 from skinwave.plan import plan
-from skinwave.scene import BODIES, Body, Scene
+from skinwave.scene import BODIES, Body, Placement, Scene
 from skinwave.simulation import simulate
 from skinwave.stretching import mean_pressure, membrane, meshed_sheet, stretching_body
 
@@ -151,3 +152,21 @@ def test_the_plan_of_a_nonlinear_sheet_says_what_is_wrong_with_large_elements():
     coarse = plan(SCENE, model="fem-nonlinear-transient", h=0.01)
     assert "elements of 10 mm will be wrong" in coarse.warnings[0]
     assert not any("stretching" in row.what for row in coarse.rows)
+
+
+@pytest.mark.parametrize("model", ["fem-nonlinear", "fem-nonlinear-transient"])
+def test_a_lifted_sheet_feels_what_the_focus_has_left_there(model):
+    """Under next to no pressure, where the answer is in proportion."""
+    still = Tacton(am_frequency=140, duration=0.02)
+    scene = replace(SCENE, pressure=MovingPressure(tacton=still, peak_pressure=1e-3))
+    lifted = replace(scene, body=replace(scene.body, placement=Placement(lift=0.02)))
+    moved, level = (
+        np.ptp(simulate(one, model, h=0.0125, dt=1e-4).displacement) for one in (lifted, scene)
+    )
+    assert moved / level == pytest.approx(float(along_axis(0.02)), rel=1e-3)
+
+
+def test_a_tilted_sheet_is_refused():
+    tilted = replace(SCENE.body, placement=Placement(tilt_x=0.1))
+    with pytest.raises(ValueError, match="lies across the beam"):
+        simulate(replace(SCENE, body=tilted), "fem-nonlinear", h=0.0125)
