@@ -7,14 +7,13 @@ propagates. Each name in `ASSUMPTIONS` turns one of these off.
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from math import pi, sqrt
 
 import numpy as np
 
 from simple_model import Trajectory
-from simple_model.flat_body import AIR_DENSITY
 from skinwave.estimates import motion_lines
 from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
+from skinwave.speeds import air_mass
 
 ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",
@@ -137,18 +136,13 @@ def as_one(layers: Sequence[Layer]) -> Layer:
 
 
 def _air_mass(scene: Scene) -> float:
-    """Mass of the air that moves with a sheet, kg/m2: 2 rho / k at the strongest moving line.
+    """Mass of the air that moves with a sheet at the strongest moving line, kg/m2.
 
-    By wavenumber it differs from line to line (Junger and Feit, Sound, Structures, and Their
-    Interaction, 1986, section 5.11); elements have one mass for all.
+    It differs from line to line; elements have one mass for all.
     """
     frequencies, shares = motion_lines(scene, 0.05)
     moving = frequencies > 0
     if not moving.any():
         return 0.0
-    body, solid = scene.body, scene.body.solid
     strongest = frequencies[moving][np.argmax(shares[moving].max(axis=1))]
-    stiffness = solid.young * body.depth**3 / 12 / (1 - solid.poisson**2)
-    mass = solid.density * body.depth
-    k = sqrt(2 * pi * strongest * sqrt(mass / stiffness))
-    return 2 * AIR_DENSITY / k
+    return air_mass(scene.body, float(strongest))

@@ -11,6 +11,7 @@ from fem.assembly import Operators, assemble
 from fem.materials import Material
 from fem.surface import facet_normals, facet_points, load_operator
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
+from meshes.intake import FINE_RADIUS
 from meshes.structured import check_size, round_up, with_planes
 from meshes.tetmesh import Floats, Ints
 from simple_model.flat_body import Compliance, half_space, slab, thin_sheet
@@ -18,7 +19,6 @@ from skinwave import hands
 from skinwave.scene import Body
 
 SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
-FINE_RADIUS = 30e-3  # m: the palm-sized paths
 # From cell to cell along the surface and downwards, and the coarsest cell over the finest.
 GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 # A layer around absorbing sides, in which a drag that rises with the square of the depth lets waves
@@ -230,8 +230,8 @@ def compliance(body: Body) -> Compliance:
     solid = body.solid
     if body.kind == "sheet":
         return thin_sheet(
-            bending_stiffness=solid.young * body.depth**3 / 12 / (1 - solid.poisson**2),
-            mass_per_area=solid.density * body.depth,
+            bending_stiffness=body.bending_stiffness,
+            mass_per_area=body.mass_per_area,
             loss_factor=solid.loss_factor,
             viscous_lag=solid.viscosity / solid.shear_modulus,
             air_density=0.0,

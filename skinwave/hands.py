@@ -4,7 +4,6 @@ import numpy as np
 
 from meshes import (
     Grading,
-    Palm,
     TetMesh,
     body_from_file,
     graded,
@@ -12,11 +11,12 @@ from meshes import (
     palm_mesh,
     quadratic,
 )
+from meshes.intake import FINE_RADIUS, GROWTH
 from meshes.tetmesh import Floats
 from skinwave.scene import Body
 
 KINDS = ("palm", "mesh")
-FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 3.0  # m about the middle; cells; of h
+COARSEST = 3.0  # cells far from the middle, over those of h
 DOWNWARDS = -0.7  # z of the normals of what rests on bone
 
 
@@ -34,7 +34,7 @@ def hand(body: Body, h: float) -> TetMesh:
     """
     if body.kind == "palm":
         sizing = graded(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h))
-        mesh = palm_mesh(palm_of(body), h, sizing=sizing)
+        mesh = palm_mesh(body.palm, h, sizing=sizing)
         cut = [mesh.facets["wrist"], mesh.facets["fingers"]]
     else:
         mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
@@ -43,11 +43,6 @@ def hand(body: Body, h: float) -> TetMesh:
     within = named(mesh, bottom=lambda centroids, normals: normals[:, 2] < DOWNWARDS)
     bottom = within.facets["bottom"]
     return TetMesh(points=mesh.points, tets=mesh.tets, facets={**facets, "bottom": bottom})
-
-
-def palm_of(body: Body) -> Palm:
-    """The palm that a body's outline and relief describe."""
-    return Palm(breadth=body.width, length=body.height, thickness=body.depth, **vars(body.relief))
 
 
 def depths(mesh: TetMesh) -> Floats:

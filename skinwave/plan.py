@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.flat_body import AIR_DENSITY
 from simple_model.focus import spot_width
 from skinwave.bodies import check_mesh
 from skinwave.effort import Progress
@@ -23,6 +22,7 @@ from skinwave.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
 from skinwave.refinement import AIM, ORDER, Refined, refined
 from skinwave.scene import FLAT, Body, Scene
 from skinwave.sensitivity import sensitivity
+from skinwave.speeds import air_mass
 from skinwave.stretching import expected_error, sheet_only, stretching_size
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
@@ -315,15 +315,12 @@ def _extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[
 
 def _left_out(scene: Scene, highest: float) -> list[Row]:
     """What the model leaves out, with the estimate behind that."""
-    body, solid = scene.body, scene.body.solid
+    body = scene.body
     if body.kind != "sheet":
         return []
-    stiffness = solid.young * body.depth**3 / 12 / (1 - solid.poisson**2)
-    mass = solid.density * body.depth
-    k = (mass * (2 * np.pi * max(highest / 2, 20.0)) ** 2 / stiffness) ** 0.25
-    air = 2 * AIR_DENSITY / k / mass
+    air = air_mass(body, max(highest / 2, 20.0)) / body.mass_per_area
     force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
-    sag = 0.0056 * force * min(body.width, body.height) ** 2 / stiffness / body.depth
+    sag = 0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness / body.depth
     shift = 1 - 1 / np.sqrt(1 + air)
     return [
         Row(

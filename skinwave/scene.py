@@ -48,12 +48,12 @@ class Relief:
     rounded edges.
     """
 
-    cup_depth: float = 0.003
-    thenar_height: float = 0.005
-    hypothenar_height: float = 0.003
-    pad_height: float = 0.0012
-    corner_radius: float = 0.028
-    edge_radius: float = 0.007
+    cup_depth: float = Palm.cup_depth
+    thenar_height: float = Palm.thenar_height
+    hypothenar_height: float = Palm.hypothenar_height
+    pad_height: float = Palm.pad_height
+    corner_radius: float = Palm.corner_radius
+    edge_radius: float = 0.007  # soft tissue on bone is thinner than a whole hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +172,7 @@ class Body:
                 "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
             )
         if self.kind == "palm":
-            Palm(breadth=self.width, length=self.height, thickness=self.depth, **vars(self.relief))
+            self.palm  # noqa: B018 - refuses what does not fit
 
     def _check_layers(self) -> None:
         if not self.layers:
@@ -189,6 +189,23 @@ class Body:
     def solid(self) -> Material:
         """The material itself, below all layers."""
         return solid_of(self.material)
+
+    @property
+    def palm(self) -> Palm:
+        """The palm that outline and relief describe."""
+        return Palm(
+            breadth=self.width, length=self.height, thickness=self.depth, **vars(self.relief)
+        )
+
+    @property
+    def bending_stiffness(self) -> float:
+        """E d^3 / 12 (1 - nu^2) of a sheet, N m."""
+        return self.solid.young * self.depth**3 / 12 / (1 - self.solid.poisson**2)
+
+    @property
+    def mass_per_area(self) -> float:
+        """Of a sheet, kg/m2."""
+        return self.solid.density * self.depth
 
     @property
     def strata(self) -> tuple[tuple[float, Material], ...]:

@@ -3,7 +3,7 @@
 import difflib
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import inf, isfinite, nextafter, pi
 from pathlib import Path
 from typing import Any
@@ -279,13 +279,7 @@ MATERIAL = {
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
 }
-RELIEF = {
-    f"{name}_mm": _scaled(name, 1e3)
-    for name in (
-        "cup_depth", "thenar_height", "hypothenar_height", "pad_height", "corner_radius",
-        "edge_radius",
-    )
-}  # fmt: skip
+RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
     "material": Field("material", _material, _write_material),

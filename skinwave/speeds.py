@@ -7,6 +7,7 @@ import numpy as np
 from fem.materials import Material
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
+from simple_model.flat_body import AIR_DENSITY
 from skinwave.scene import Body
 
 LONGEST_PERIOD = 0.05  # s that two tones may take to meet again, and that pictures follow
@@ -29,9 +30,22 @@ def surface_speed(body: Body, frequency: float) -> float:
         raise ValueError("body kind 'none' carries no wave; choose a sheet or a slab")
     solid, w = body.solid, 2 * pi * frequency
     if body.kind == "sheet":
-        stiffness = solid.young * body.depth**2 / 12 / (1 - solid.poisson**2)
-        return float((stiffness * w**2 / solid.density) ** 0.25)
+        return w / bending_wavenumber(body, frequency)
     return _viscous(solid, w) * solid.rayleigh_speed / solid.shear_speed
+
+
+def bending_wavenumber(body: Body, frequency: float) -> float:
+    """(m w^2 / D)^(1/4) of an endless sheet in vacuum, rad/m, at a frequency in Hz."""
+    w = 2 * pi * frequency
+    return float((body.mass_per_area * w**2 / body.bending_stiffness) ** 0.25)
+
+
+def air_mass(body: Body, frequency: float) -> float:
+    """2 rho / k, the mass of the air that moves with both sides of a sheet, kg/m2.
+
+    Junger and Feit, Sound, Structures, and Their Interaction (1986), section 5.11.
+    """
+    return 2 * AIR_DENSITY / bending_wavenumber(body, frequency)
 
 
 def _viscous(solid: Material, w: float) -> float:

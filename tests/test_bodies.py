@@ -13,7 +13,7 @@ from meshes.palm import Palm, level_set, surface
 from meshes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.focus import along_axis, array_field, spot_width
-from skinwave import compare, hands, simulate
+from skinwave import compare, simulate
 from skinwave.bodies import build, has_layer, operators, surface_load
 from skinwave.cli import main
 from skinwave.plan import plan
@@ -241,7 +241,7 @@ def test_layers_of_a_body_from_a_file_lie_below_its_top(slab_file):
 
 def test_a_palm_without_relief_is_a_slab_with_round_edges():
     relief = Relief(cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0)
-    palm = hands.palm_of(Body(kind="palm", relief=relief))
+    palm = Body(kind="palm", relief=relief).palm
     inside = np.array([[0.0, 0.0, -1e-3], [0.02, 0.01, -1e-3], [0.0, -0.02, -0.014]])
     np.testing.assert_allclose(level_set(palm, inside), -1e-3, rtol=1e-12)
     flat = meshes.ready("flat-palm")
