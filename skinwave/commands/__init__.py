@@ -14,6 +14,7 @@ from skinwave.commands import (
     run,
     tradeoff,
     verify,
+    web,
 )
 
 COMMANDS = {
@@ -26,5 +27,6 @@ COMMANDS = {
     "verify": verify,
     "report": report,
     "film": film,
+    "web": web,
     "doctor": doctor,
 }
