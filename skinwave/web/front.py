@@ -19,6 +19,7 @@ from aiohttp import web
 
 HOSTS = ("127.0.0.1", "localhost", "[::1]")
 PATIENCE = 60.0  # s that a session may take to start
+LATER = 5.0  # s after which the next process is made ready: the page that opens comes first
 LARGEST = 2**26  # bytes of a message
 
 
@@ -29,6 +30,7 @@ class Front:
         self.scene = scene
         self._spare: asyncio.Task[Any] | None = None
         self._sessions: dict[str, Any] = {}
+        self._ending = False
 
     def app(self, static: dict[str, str], page: str) -> web.Application:
         """The application; `static` folders by route, `page` the folder of the page itself."""
@@ -47,13 +49,16 @@ class Front:
     async def open(self, request: web.Request) -> web.Response:
         """A session for a page: where it is to talk to."""
         asked = await request.json()
-        spare, self._spare = self._spare, asyncio.create_task(_started())
+        spare, self._spare = self._spare, None
+        asyncio.get_running_loop().call_later(LATER, self._make_ready)
         process, port = await (spare or _started())
         given = {str(key): str(value) for key, value in asked.items()}
         line = json.dumps({"scene": self.scene, "query": given}) + "\n"
         process.stdin.write(line.encode())
         await process.stdin.drain()
-        await asyncio.wait_for(process.stdout.readline(), PATIENCE)
+        if await asyncio.wait_for(process.stdout.readline(), PATIENCE) != b"ready\n":
+            _kill(process)
+            return web.json_response({"error": "the session did not start"}, status=500)
         name = uuid.uuid4().hex
         self._sessions[name] = (process, port)
         return web.json_response({"sessionURL": f"ws://USE_HOST/session/{name}"})
@@ -82,9 +87,14 @@ class Front:
         return page
 
     async def _prepare(self, _: web.Application) -> None:
-        self._spare = asyncio.create_task(_started())
+        self._make_ready()
+
+    def _make_ready(self) -> None:
+        if self._spare is None and not self._ending:
+            self._spare = asyncio.create_task(_started())
 
     async def _end(self, _: web.Application) -> None:
+        self._ending = True
         for process, _port in self._sessions.values():
             _kill(process)
         if self._spare is not None:

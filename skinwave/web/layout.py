@@ -8,6 +8,7 @@ from trame.widgets import client, html, plotly
 from trame.widgets import vuetify3 as v3
 
 from skinwave.web import controls, panels
+from skinwave.web.plots import SPANS
 from skinwave.web.session import HIGHEST, Session
 
 STATIC = Path(__file__).with_name("static")
@@ -71,6 +72,7 @@ def _bar(session: Session) -> None:
                     v3.VListItem(title=name, id=f"preset-{name}",
                                  click=(session.preset, f"['{name}']"))  # fmt: skip
         v3.VSpacer()
+        _looks()
         _button("mdi-undo", "Undo", session.undo, id="undo", disabled=("!undoable",))
         _button("mdi-redo", "Redo", session.redo, id="redo", disabled=("!redoable",))
         v3.VBtn("{{ pinned ? 'Unpin' : 'Pin' }}", prepend_icon="mdi-pin", click=session.pin,
@@ -143,16 +145,13 @@ def _plots(session: Session) -> None:
         with html.Div(style="position: fixed; right: 10px; top: 54px; width: 340px; z-index: 5",
                       raw_attrs=['role="status"', 'aria-live="polite"']):  # fmt: skip
             panels.notices(session)
-    with html.Div(style="position: fixed; right: 12px; bottom: 4px; display: flex; gap: 8px"):
-        v3.VSelect(v_model=("span",), items=("spans", list(_spans())), density="compact",
-                   hide_details=True, variant="plain", style="width: 130px", id="span",
-                   raw_attrs=['aria-label="Part of the Tacton that is shown"'])  # fmt: skip
-        v3.VSelect(v_model=("highest",), items=("highests", list(HIGHEST)), density="compact",
-                   hide_details=True, variant="plain", style="width: 90px", suffix="Hz",
-                   raw_attrs=['aria-label="Highest frequency shown"'], id="highest")  # fmt: skip
 
 
-def _spans() -> tuple[str, ...]:
-    from skinwave.web.plots import SPANS
-
-    return tuple(SPANS)
+def _looks() -> None:
+    """What is shown of the answer."""
+    v3.VSelect(v_model=("span",), items=("spans", list(SPANS)), density="compact", id="span",
+               hide_details=True, variant="plain", style="flex: 0 0 120px",
+               raw_attrs=['aria-label="Part of the Tacton that is shown"'])  # fmt: skip
+    v3.VSelect(v_model=("highest",), items=("highests", list(HIGHEST)), density="compact",
+               hide_details=True, variant="plain", style="flex: 0 0 96px", suffix="Hz",
+               raw_attrs=['aria-label="Highest frequency shown"'], id="highest")  # fmt: skip

@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats
 from simple_model import (
@@ -21,7 +22,8 @@ from simple_model import (
     spectrum,
     tacton_lines,
 )
-from simple_model.focus import lobe_width
+from simple_model.focus import lobe_width, moved_spot
+from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import CARRIER, level
 from simple_model.threshold import PRESSURE
 from skinwave.scene import BODIES, Body, Scene
@@ -31,8 +33,10 @@ from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, pulses_of
 REACH = 50e-3  # m: half the side of the area that is shown
 SIDE = 41  # places along a side of a map
 FINE_SIDE = 101  # of the borderline's grid
-SAMPLES = 320  # times at which a map looks at the pressure
+GAIN_RATE = 4000.0  # Hz at which the pressure at the foci is looked at
+PHASES = 120  # of a path
 MOST_SHOWN = 1500  # points of a curve
+MOST_ENVELOPE = 600  # of the commanded Tacton without its carrier
 HIGHEST = 1000.0  # Hz of spectra
 FAINTEST = 1e-3  # of the strongest line: weaker ones are not named
 RESOLVED = 10  # samples of a period of the carrier
@@ -206,6 +210,13 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
             known[name] = f
     if not known:
         return ()
+    f, rough = spectrum(response)  # to fit only what is there: a fit of all takes ten times as long
+    near = np.array([rough[np.abs(f - each) < 2.5 * f[1]].max(initial=0.0) for each in
+                     known.values()])  # fmt: skip
+    known = {name: known[name] for name, a in zip(known, near, strict=True)
+             if a > 0.5 * FAINTEST * near.max(initial=0.0)}  # fmt: skip
+    if not known:
+        return ()
     amplitudes = lines(response, list(known.values()))[:, 0]
     felt = response.unit == "m"
     found = [
@@ -227,16 +238,33 @@ def places(side: int = SIDE) -> Floats:
 
 
 def kernel_map(pressure: MovingPressure) -> Map:
-    """Where the pressure changes, and where it is ever above what is just felt.
-
-    Looked at at `SAMPLES` times, one at random in each equal part of the Tacton: RMS within 3 %.
+    """Where the pressure changes, by its lines, and where it can rise above what is just felt: at
+    its largest at the foci, with these wherever on their path. Of a rhythm, while a pulse is on.
     """
-    parts = np.arange(SAMPLES) + np.random.default_rng(0).random(SAMPLES)
-    pushed = pressure(places(), parts / SAMPLES * pressure.tacton.duration)
-    highest = np.abs(pushed).max(axis=0).reshape(SIDE, SIDE)
-    return Map(
-        rms=pushed.std(axis=0).reshape(SIDE, SIDE), felt=borderline(highest, PRESSURE)
-    )
+    tacton = replace(pressure.tacton, rhythm=None)
+    path, duration = tacton.trajectory, tacton.duration
+    found = load_lines(replace(pressure, tacton=tacton), 1e-3)
+    places_only = path if path.is_static else replace(path, speed=1.0)
+    f, amplitudes = found.gather(harmonics_of(places_only, pressure.height, pressure.focus))
+    rms = np.sqrt((np.abs(amplitudes[f > 1e-6]) ** 2).sum(axis=0) / 2).reshape(SIDE, SIDE)
+    gain = np.abs(pressure.gain(np.linspace(0, duration, round(duration * GAIN_RATE) + 2))).max()
+    swept = nearest_foci(places_only, tacton.foci, pressure.height, pressure.focus)
+    return Map(rms=rms, felt=borderline(gain * swept, PRESSURE))
+
+
+@lru_cache(maxsize=32)
+def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.complex128]:
+    """Harmonics (n, SIDE^2) of a focus of unit pressure that runs a path, at the places of a map."""
+    pressure = MovingPressure(tacton=Tacton(trajectory=path), height=height, focus=focus)
+    return along_path(pressure.spot(places(), path_knots(pressure)).T).T
+
+
+@lru_cache(maxsize=32)
+def nearest_foci(path: Trajectory, foci: tuple[float, ...], height: float, focus: str) -> Floats:
+    """The largest relative pressure (SIDE, SIDE) of all foci together, wherever on their path."""
+    phases = np.zeros(1) if path.is_static else np.arange(PHASES) / PHASES
+    spots = sum(moved_spot(places(), path.at_phase((phases + a) % 1), height, focus) for a in foci)
+    return np.asarray(spots).max(axis=0).reshape(SIDE, SIDE)
 
 
 def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
@@ -268,7 +296,7 @@ def commanded_curve(tacton: Tacton, start: float, end: float) -> tuple[Floats, F
     if needed <= MOST_SHOWN:
         t = np.linspace(start, end, max(2, int(needed) + 1))
         return t, commanded(tacton, t), True
-    t = np.linspace(start, end, MOST_SHOWN)
+    t = np.linspace(start, end, MOST_ENVELOPE)
     return t, np.asarray(tacton.amplitude * level(tacton, t) * np.abs(modulation(tacton, t))), False
 
 

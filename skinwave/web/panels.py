@@ -2,6 +2,7 @@
 
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
+from trame_client.widgets.core import HtmlElement
 
 from skinwave.web.controls import CHOICES, NUMBERS
 from skinwave.web.session import Session, setter
@@ -33,7 +34,7 @@ LEFT_OUT = (
     "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
     "above the threshold for a focal spot; point kernel: 4.4 Pa, just felt with AM at 200 Hz. "
     "Maps of a rhythm are those of its pulses while they are on.",
-    "RMS pressure of the map is sampled, within 3 %. Weights of the superposition multiply the two "
+    "Weights of the superposition multiply the two "
     "AM sinusoids; a frequency of 0 is a factor of 1.",
 )
 
@@ -111,7 +112,7 @@ def area(name: str, marked: str, said: str) -> None:
     steps = {"left": "x - 1, y", "right": "x + 1, y", "up": "x, y + 1", "down": "x, y - 1"}
     keys = [f'@keydown.{key}.prevent="trigger(\'select\', [{at}])"' for key, at in steps.items()]
     drag = "trigger('select', utils.skinwave.place($event))"
-    html.HtmlElement(
+    HtmlElement(
         "svg", classes="sw-map", id=marked, children=[
             f'<image v-if="{name}.picture" :href="{name}.picture" x="-51.25" y="-51.25" '
             'width="102.5" height="102.5" preserveAspectRatio="none"/>'
@@ -169,6 +170,8 @@ def about() -> None:
         v_model=("about", False), location="right", temporary=True, width=380,
         raw_attrs=['aria-label="About this model"'],
     ), html.Div(style="padding: 16px"):  # fmt: skip
+        v3.VBtn("Close", click="about = false", size="small", id="close-about",
+                style="float: right")  # fmt: skip
         html.H2("About this model", style="font-size: 1.1rem")
         for sentence in LEFT_OUT:
             html.P(sentence, style="margin-top: 10px; font-size: 0.86rem")
@@ -185,7 +188,7 @@ def _rhythm(session: Session) -> None:
             raw_attrs=['aria-describedby="pulses-error"'],
         )  # fmt: skip
         _error("pulses")
-    html.HtmlElement(
+    HtmlElement(
         "svg", v_if="pulses", classes="sw-timeline", children=[
             '<polyline :points="timeline" fill="none" stroke="currentColor" stroke-width="1.5" '
             'vector-effect="non-scaling-stroke"/>'

@@ -47,16 +47,18 @@ def span_of(name: str, duration: float) -> tuple[float, float]:
 def commanded_plot(tacton: Tacton, start: float, end: float, dark: bool) -> Plot:
     """The commanded Tacton between two times in s, with its carrier if that can be resolved."""
     t, p, resolved = commanded_curve(tacton, start, end)
-    colour, x, y = _colours(dark)[0], numbers(1e3 * t), numbers(100 * p)
-    data = [_curve(x, y, colour, "carrier" if resolved else "envelope")]
+    colour, y = _colours(dark)[0], numbers(100 * p)
+    steps = {"x0": 1e3 * float(t[0]), "dx": 1e3 * float(t[1] - t[0])}
+    data = [_curve([], y, colour, "carrier" if resolved else "envelope") | steps]
+    del data[0]["x"]
     if not resolved:
-        low = _curve(x, [-v for v in y], colour, "envelope")
+        low = data[0] | {"y": [-v for v in y]}
         data.append(low | {"fill": "tonexty", "fillcolor": _faded(colour, 0.35)})
     shown = "with its 40 kHz carrier" if resolved else "envelope of the carrier; zoom in to see it"
     return {
         "data": data,
         "layout": _layout(f"Commanded Tacton, {shown}", "time, ms", "% of full drive", dark)
-        | {"uirevision": f"{start}-{end}"},
+        | {"uirevision": "commanded", "showlegend": False},
     }
 
 
@@ -112,7 +114,8 @@ def picture(found: Map) -> str:
 
 
 def drawn(lines: Sequence[Floats]) -> str:
-    """Lines (k, 2) in metre as a path of an SVG in mm, y upwards."""
+    """Lines (k, 2) in metre as a path of an SVG in mm, y upwards; at most 200 points of each."""
+    lines = [line[:: max(1, len(line) // 200)] for line in lines]
     return "".join(
         "M" + "L".join(f"{1e3 * x:.2f},{-1e3 * y:.2f}" for x, y in line) for line in lines
     )
@@ -120,6 +123,8 @@ def drawn(lines: Sequence[Floats]) -> str:
 
 def timeline(tacton: Tacton) -> str:
     """The level of a rhythm over a Tacton as points of a line, 100 wide and 26 high."""
+    if tacton.rhythm is None:
+        return ""
     t = np.linspace(0, tacton.duration, 800)
     high = np.broadcast_to(level(tacton, t), t.shape)
     return " ".join(

@@ -8,10 +8,12 @@ import json
 import os
 import sys
 import threading
+import traceback
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
 
@@ -38,9 +40,23 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
     return session
 
 
+def _on_one_thread() -> None:
+    """Have numpy compute on one thread here: what a move takes is too small to share out, and
+    threads that wait for each other delay it. The process that answers with a body has all.
+    """
+    limits = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(limits, "1"))
+    import numpy as np
+
+    np.ones((2, 2)) @ np.ones((2, 2))
+    for name in limits:
+        del os.environ[name]
+
+
 def main() -> None:
     """Serve one page until it is closed."""
     sys.argv = sys.argv[:1]  # trame reads it
+    _on_one_thread()
     from trame.app import get_server
 
     import skinwave.web.layout  # noqa: F401, what takes its time, before a page asks
@@ -61,11 +77,15 @@ def main() -> None:
         os._exit(0)
 
     def assign(asked: dict[str, Any]) -> None:
-        session = session_of(server, asked["scene"], asked["query"])
-        session.attach(loop)
-        with session.state:
-            pass
-        print("ready", flush=True)
+        try:
+            session = session_of(server, asked["scene"], asked["query"])
+            session.attach(loop)
+            with session.state:
+                pass
+            print("ready", flush=True)
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
 
     server.controller.on_server_ready.add(begin)
     loop.run_until_complete(

@@ -217,7 +217,7 @@ class Session:
             "problem": "", "stale": False, "waves_stale": waiting, "query": query,
             "drawing_frequency": self.scene.tacton.trajectory.drawing_frequency,
             "undoable": self.history.undoable, "redoable": self.history.redoable,
-            "busy": self.state.busy if waiting else "",
+            "busy": (self.state.busy or ("" if self.waves else "starting")) if waiting else "",
         })  # fmt: skip
         self.draw()
         if waiting and self._loop:
