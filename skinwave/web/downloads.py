@@ -21,8 +21,7 @@ def csv_of(answers: Sequence[Answer]) -> bytes:
     writer.writerow(
         ["time, s"]
         + [
-            f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} "
-            f"({a.response.model})"
+            f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
             for a in answers
         ]
     )
@@ -50,9 +49,7 @@ def figure_of(scene: Scene, kernel: Answer, waves: Answer | None, kind: str) -> 
 
     answers = [a for a in (kernel, waves) if a is not None]
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
-    for row, answer in zip(
-        figure.subplots(len(answers), 3, squeeze=False), answers, strict=True
-    ):
+    for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
         unit, per = ("Pa", 1.0) if answer.response.unit == "Pa" else ("µm", 1e6)
         edge = 1e3 * REACH
         image = row[0].imshow(

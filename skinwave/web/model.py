@@ -210,8 +210,10 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
             known[name] = f
     if not known:
         return ()
-    f, rough = spectrum(response)  # to fit only what is there: a fit of all takes ten times as long
-    near = np.array([rough[np.abs(f - each) < 2.5 * f[1]].max(initial=0.0) for each in
+    bins, rough = spectrum(
+        response
+    )  # to fit only what is there: a fit of all takes ten times as long
+    near = np.array([rough[np.abs(bins - each) < 2.5 * bins[1]].max(initial=0.0) for each in
                      known.values()])  # fmt: skip
     known = {name: known[name] for name, a in zip(known, near, strict=True)
              if a > 0.5 * FAINTEST * near.max(initial=0.0)}  # fmt: skip
@@ -254,7 +256,7 @@ def kernel_map(pressure: MovingPressure) -> Map:
 
 @lru_cache(maxsize=32)
 def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.complex128]:
-    """Harmonics (n, SIDE^2) of a focus of unit pressure that runs a path, at the places of a map."""
+    """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places."""
     pressure = MovingPressure(tacton=Tacton(trajectory=path), height=height, focus=focus)
     return along_path(pressure.spot(places(), path_knots(pressure)).T).T
 

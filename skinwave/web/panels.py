@@ -1,4 +1,7 @@
-"""Parts of the page: the control panel, an area with its map, notices, what the model leaves out."""
+"""Parts of the page: controls, an area with its map, notices, what the model leaves out."""
+
+from collections.abc import Sequence
+from typing import Any
 
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
@@ -99,10 +102,10 @@ def number(session: Session, key: str) -> None:
         _error(key)
 
 
-def choice(key: str, said: str, items: list[dict[str, str]] | None = None) -> None:
+def choice(key: str, said: str, items: Sequence[Any] = ()) -> None:
     """A dropdown."""
     v3.VSelect(
-        v_model=(key,), items=(f"{key}_items", items or list(CHOICES[key])), label=said,
+        v_model=(key,), items=(f"{key}_items", list(items or CHOICES[key])), label=said,
         density="compact", hide_details=True, id=key, style="margin-top: 8px",
     )  # fmt: skip
 
@@ -110,7 +113,7 @@ def choice(key: str, said: str, items: list[dict[str, str]] | None = None) -> No
 def area(name: str, marked: str, said: str) -> None:
     """A map of the area with path, foci, borderlines and the selected point, which it selects."""
     steps = {"left": "x - 1, y", "right": "x + 1, y", "up": "x, y + 1", "down": "x, y - 1"}
-    keys = [f'@keydown.{key}.prevent="trigger(\'select\', [{at}])"' for key, at in steps.items()]
+    keys = [f"@keydown.{key}.prevent=\"trigger('select', [{at}])\"" for key, at in steps.items()]
     drag = "trigger('select', utils.skinwave.place($event))"
     HtmlElement(
         "svg", classes="sw-map", id=marked, children=[

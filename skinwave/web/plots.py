@@ -162,7 +162,7 @@ def written(name: str) -> str:
     """A line's name with its subscripts, such as 2f_d-f_AM, as HTML."""
     for tone in ("AM2", "AM", "d", "e", "r"):
         name = name.replace(f"f_{tone}", f"f<sub>{tone}</sub>")
-    return name.replace("-", "−")
+    return name
 
 
 @cache
@@ -201,9 +201,7 @@ def _styled(
         found.append(
             (waves, {"colour": colours[1], "name": name, "opacity": STALE if stale else 1.0})
         )
-    return [
-        (a, style | ({"axis": "y2"} if a.response.unit == "m" else {})) for a, style in found
-    ]
+    return [(a, style | ({"axis": "y2"} if a.response.unit == "m" else {})) for a, style in found]
 
 
 def _curve(

@@ -1,6 +1,6 @@
 """The process behind one page: says its port, waits for what the page asks, and serves it.
 
-    python -m skinwave.web.serve      # started by `front`, not by hand
+python -m skinwave.web.serve      # started by `front`, not by hand
 """
 
 import asyncio
@@ -66,7 +66,10 @@ def main() -> None:
     asyncio.set_event_loop(loop)
 
     def begin(**_: Any) -> None:
-        print(server.port, flush=True)
+        try:
+            print(server.port, flush=True)
+        except OSError:
+            os._exit(0)  # who started this has ended
         threading.Thread(target=listen, daemon=True).start()
 
     def listen() -> None:

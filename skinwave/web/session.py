@@ -42,7 +42,7 @@ class Session:
         self.state.change(*PLOTTED)(self.on_look)
         self.state.change("phase")(self.draw_foci)
         self.state.change("opened")(self.on_file)
-        for name in ("scene_toml", "waveform_csv", "waveform_wav", "figure", "select"):
+        for name in ("scene_toml", "waveform_csv", "waveform_wav", "figure", "select", "restart"):
             server.trigger(name)(getattr(self, name))
         self.refresh()
 
@@ -89,6 +89,12 @@ class Session:
     def preset(self, name: str) -> None:
         """Take one of the paper's Tactons."""
         self.turn(controls.presets()[name])
+
+    def restart(self, query: str = "") -> None:
+        """Begin anew with what an address says."""
+        self.pinned, self.history = (), History(STARTS)
+        self.state.update({"hold": False, "pinned": False, "problem": ""})
+        self._take(controls.from_query(query)[0])
 
     def undo(self) -> None:
         """Back to the values before the last move."""

@@ -87,10 +87,8 @@ class Waves:
     def __call__(self, scene: Scene, progress: Progress) -> Answer:
         """The answer to a scene of one probe; raises what `simulate` does."""
         if is_exact(scene.body):
-            key = (scene.body, scene.pressure.height)
-            return flat_answer(
-                self._keep("table", key, lambda: tabulate(*key, progress)), scene
-            )
+            flat = (scene.body, scene.pressure.height)
+            return flat_answer(self._keep("table", flat, lambda: tabulate(*flat, progress)), scene)
         path = scene.tacton.trajectory
         still = path if path.is_static else replace(path, speed=1.0)  # the same places
         key = (scene.body, still, scene.pressure.height)
@@ -99,8 +97,8 @@ class Waves:
         )
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
-        body = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
-        return reduce(*body, scene.pressure, progress)
+        made, ops = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
+        return reduced(made, ops, scene.pressure, progress)
 
     def _keep(self, kind: str, key: Any, make: Callable[[], Any]) -> Any:
         kept = self._kept[kind]
@@ -169,7 +167,7 @@ def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Fl
 
 
 def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
-    """The strongest lines' frequencies (f,) in Hz above 0, and w (f, k) in Pa at the path's knots."""
+    """Frequencies (f,) in Hz of the strongest lines, and their w (f, k) in Pa at the knots."""
     found = load_lines(pressure, 1e-3)
     heard = (found.frequencies > 1e-6) & (found.frequencies <= BAND)
     knots = len(path_knots(pressure))
@@ -207,7 +205,7 @@ def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     return made, operators(made)
 
 
-def reduce(made: Any, ops: Any, pressure: MovingPressure, progress: Progress) -> Reduced:
+def reduced(made: Any, ops: Any, pressure: MovingPressure, progress: Progress) -> Reduced:
     """A meshed and assembled body, reduced to a pressure's path."""
     progress("factorise", 0.0)
     P, points = surface_load(made)
@@ -254,9 +252,7 @@ def reduced_answer(body: Reduced, scene: Scene) -> Answer:
     energy_balance(fem.mean_power(*body.damping, forces, motion, frequencies))
     probe = body.probe(scene.probe_points)
     rates = np.concatenate([2j * np.pi * frequencies, body.poles.values])
-    displacement = fem.exponential_sum(
-        rates, np.vstack([motion @ probe.T, start @ probe.T]), times
-    )
+    displacement = fem.exponential_sum(rates, np.vstack([motion @ probe.T, start @ probe.T]), times)
     response = Response(
         model="fem", times=times, probes=scene.probe_points, displacement=displacement,
         effort=body.effort,
