@@ -259,6 +259,24 @@ def test_a_click_or_a_key_on_the_map_selects(page):
     page.wait_for_function("x => window.trame.state.get('x') > x + 0.9", arg=before)
 
 
+def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
+    frame = page.locator("#commanded_plot .nsewdrag").first.bounding_box()
+    middle = frame["y"] + frame["height"] / 2
+    page.mouse.move(frame["x"] + 200, middle)
+    page.mouse.down()
+    page.mouse.move(frame["x"] + 206, middle + 1)
+    page.mouse.move(frame["x"] + 214, middle + 2)
+    page.mouse.up()
+    page.wait_for_function(
+        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('with its')"
+    )
+    photographed(page, "carrier")
+    page.mouse.dblclick(frame["x"] + 200, middle)
+    page.wait_for_function(
+        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('envelope')"
+    )
+
+
 def test_what_is_saved_opens_again(page, tmp_path):
     page.locator("#am-field").fill("95")
     query_has(page, "am=95")

@@ -117,10 +117,11 @@ def _maps(session: Session) -> None:
             panels.area("wave_map", "wave-map", "waves in the body")
         with html.Div(style="grid-column: 1 / -1"):
             html.Div(
-                "<span style='color:#56B4E9'>━</span> path and foci &nbsp; "
-                "┄ dotted: influenced by the focus &nbsp; "
-                "<span style='color:#CC4FA0'>━</span> border of what is felt &nbsp; ✕ selected",
-                classes="sw-caption",
+                "<span><b style='color:#56B4E9'>━</b> path, foci</span> "
+                "<span>┄ border of the influence</span> "
+                "<span><b style='color:#CC4FA0'>━</b> of what can be felt</span> "
+                "<span><b style='color:#D55E00'>✕</b> selected</span>",
+                classes="sw-caption sw-legend",
             )
             v3.VSlider(
                 v_model=("phase", 0), min=0, max=99, step=1, hide_details=True, density="compact",

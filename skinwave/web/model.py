@@ -242,6 +242,8 @@ def places(side: int = SIDE) -> Floats:
 def kernel_map(pressure: MovingPressure) -> Map:
     """Where the pressure changes, by its lines, and where it can rise above what is just felt: at
     its largest at the foci, with these wherever on their path. Of a rhythm, while a pulse is on.
+
+    The root of a spot is all but straight where it ends, as lines between places want it.
     """
     tacton = replace(pressure.tacton, rhythm=None)
     path, duration = tacton.trajectory, tacton.duration
@@ -251,7 +253,7 @@ def kernel_map(pressure: MovingPressure) -> Map:
     rms = np.sqrt((np.abs(amplitudes[f > 1e-6]) ** 2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     gain = np.abs(pressure.gain(np.linspace(0, duration, round(duration * GAIN_RATE) + 2))).max()
     swept = nearest_foci(places_only, tacton.foci, pressure.height, pressure.focus)
-    return Map(rms=rms, felt=borderline(gain * swept, PRESSURE))
+    return Map(rms=rms, felt=borderline(np.sqrt(gain * swept), PRESSURE**0.5))
 
 
 @lru_cache(maxsize=32)

@@ -136,7 +136,7 @@ def area(name: str, marked: str, said: str) -> None:
             'text-anchor="end">{{ t }}</text><text x="50" y="58" text-anchor="end">mm</text>'
         ],
         raw_attrs=[
-            'viewBox="-57 -51 108 110"', 'tabindex="0"', 'role="application"',
+            'viewBox="-60 -51 111 110"', 'tabindex="0"', 'role="application"',
             f':aria-label="`Area of the skin, {said}; selected point ${{x}}, ${{y}} mm; '
             'arrow keys move it`"',
             f'@pointerdown="{drag}"', f'@pointermove="$event.buttons && {drag}"', *keys,
@@ -149,7 +149,8 @@ def line_table() -> None:
     with html.Table(classes="sw-table", id="lines"):
         html.Tr(
             "<th scope='col'>line</th><th scope='col'>Hz</th><th scope='col'>Pa</th>"
-            "<th scope='col'>µm</th><th scope='col'>dB felt</th>"
+            "<th scope='col'>µm</th>"
+            "<th scope='col' title='above the threshold of detection'>felt, dB</th>"
         )
         html.Tr(
             '<td v-html="row.name"></td><td>{{ row.frequency }}</td><td>{{ row.pressure }}</td>'

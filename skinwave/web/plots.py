@@ -58,7 +58,7 @@ def commanded_plot(tacton: Tacton, start: float, end: float, dark: bool) -> Plot
     return {
         "data": data,
         "layout": _layout(f"Commanded Tacton, {shown}", "time, ms", "% of full drive", dark)
-        | {"uirevision": "commanded", "showlegend": False},
+        | {"showlegend": False},
     }
 
 
@@ -74,8 +74,9 @@ def waveform_plot(
         t, y = thinned(times[shown], answer.response.displacement[shown, 0])
         data.append(_curve(numbers(1e3 * t), numbers(_in_unit(answer) * y), **style))
     layout = _layout("Waveform at the point", "time, ms", "pressure, Pa", dark)
-    layout |= {"uirevision": f"{span}"}
-    return {"data": data, "layout": layout | _second_axis(waves, pinned, dark)}
+    layout |= {"uirevision": f"{span}"} | _second_axis(waves, pinned, dark)
+    _aligned(layout, data)
+    return {"data": data, "layout": layout}
 
 
 def spectrum_plot(
@@ -97,7 +98,9 @@ def spectrum_plot(
         data.append(_just_felt(kernel, highest))
     layout |= {"annotations": _names(named, highest, dark), "uirevision": "spectrum"}
     layout["xaxis"] |= {"range": [0, highest]}
-    return {"data": data, "layout": layout | axis}
+    layout |= axis
+    _aligned(layout, data, _tallest(waves, highest))
+    return {"data": data, "layout": layout}
 
 
 def picture(found: Map) -> str:
@@ -222,6 +225,15 @@ def _threshold_curve(waves: Answer, highest: float) -> dict[str, Any]:
     return drawn
 
 
+def _tallest(waves: Answer | None, highest: float) -> float | None:
+    """What the axis of displacement has to reach: the lines, and the least of the threshold."""
+    if waves is None:
+        return None
+    f = np.linspace(50, highest, 60)
+    shown = waves.spectrum[waves.frequencies <= highest]
+    return 1e6 * max(1.25 * float(shown.max()), 1.5 * float(threshold(f).min()))
+
+
 def _just_felt(kernel: Answer, highest: float) -> dict[str, Any]:
     drawn = _curve([0.0, highest], [PRESSURE, PRESSURE], FELT, "just felt with AM at 200 Hz")
     drawn["line"]["dash"] = "dash"
@@ -232,7 +244,7 @@ def _names(answer: Answer, highest: float, dark: bool) -> list[dict[str, Any]]:
     """Names over the strongest lines; with the level above threshold if there is one."""
     shown: list[Any] = []
     for line in answer.lines:
-        far = all(abs(line.frequency - other.frequency) > 0.05 * highest for other in shown)
+        far = all(abs(line.frequency - other.frequency) > 0.08 * highest for other in shown)
         if len(shown) < NAMED and line.frequency <= highest and far:
             shown.append(line)
     axis = "y2" if answer.response.unit == "m" else "y"
@@ -240,6 +252,7 @@ def _names(answer: Answer, highest: float, dark: bool) -> list[dict[str, Any]]:
         {
             "x": round(line.frequency, 2), "y": float(f"{_in_unit(answer) * line.amplitude:.4g}"),
             "yref": axis, "showarrow": False, "yshift": 16, "font": {"size": 10},
+            "bgcolor": _paper(dark),
             "text": written(line.name) + (
                 f"<br>{line.sensation:+.0f} dB" if line.sensation is not None
                 and np.isfinite(line.sensation) else ""
@@ -247,6 +260,24 @@ def _names(answer: Answer, highest: float, dark: bool) -> list[dict[str, Any]]:
         }
         for line in shown
     ]  # fmt: skip
+
+
+def _paper(dark: bool) -> str:
+    return "rgba(18,18,18,0.7)" if dark else "rgba(255,255,255,0.7)"
+
+
+def _aligned(layout: Plot, data: Sequence[Plot], most: float | None = None) -> None:
+    """Ranges with one zero for both axes; `most` is the largest that the second has to show."""
+    ends = {}
+    for name, axis in (("y", "yaxis"), ("y2", "yaxis2")):
+        values = [v for curve in data if curve["yaxis"] == name for v in curve["y"]]
+        high, low = max([*values, 0.0]), min([*values, 0.0])
+        if axis in layout and values:
+            ends[axis] = (high if most is None or name == "y" else most, -low)
+    below = max((low / high if high else 1.0) for high, low in ends.values())
+    for axis, (high, low) in ends.items():
+        top = 1.08 * max(high, low / below if below else high) or 1.0
+        layout[axis] |= {"range": [-max(below, 0.03) * top, top]}
 
 
 def _layout(title: str, x: str, y: str, dark: bool) -> dict[str, Any]:

@@ -277,7 +277,9 @@ class Session:
     def _draw_commanded(self) -> None:
         tacton = self.scene.tacton
         between = self._zoom or plots.span_of(self.state.span, tacton.duration)
-        self.state.commanded_plot = plots.commanded_plot(tacton, *between, bool(self.state.dark))
+        plot = plots.commanded_plot(tacton, *between, bool(self.state.dark))
+        plot["layout"]["uirevision"] = self.state.span
+        self.state.commanded_plot = plot
 
     def _current_waves(self) -> Answer | None:
         return None if self.state.waves_stale else self.waves
