@@ -168,7 +168,7 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
     # Beyond the borderline the pressure never exceeds what is just felt, on it somewhere it does.
     outermost = max(found.felt, key=lambda line: np.abs(line).max())
     highest = np.abs(pressure(outermost, np.linspace(0, 1, 4001))).max(axis=0)
-    assert highest.max() == pytest.approx(4.4, rel=0.02)
+    assert highest.max() == pytest.approx(4.4, rel=0.03)
 
 
 def test_the_influenced_area_ends_a_main_lobe_from_the_path():
@@ -212,7 +212,7 @@ def test_tabulated_waves_are_the_exact_ones(scene):
     some = np.random.default_rng(0).choice(model.SIDE**2, 12, replace=False)
     f, a = steady_lines(compliance(scene.body), scene.pressure, model.places()[some])
     rms = np.sqrt((np.abs(a[f > 0]) ** 2).sum(axis=0) / 2)
-    assert shown.map.rms.ravel()[some] == pytest.approx(rms, rel=0.02)
+    assert shown.map.rms.ravel()[some] == pytest.approx(rms, rel=0.03)
 
 
 def test_tabulated_waves_follow_pulses_and_foci(scene):

@@ -297,14 +297,14 @@ def test_what_is_saved_opens_again(page, tmp_path):
 
 
 def test_plots_follow_a_slider_and_waves_come_with_a_body(page):
-    kernel = latencies(page, "am", 12, "true")
+    kernel = latencies(page, "am", 8, "true")
     choose(page, "body", "skin-slab")
     state_becomes(page, "waves_stale", False)
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     shown = drawn(page, "waveform_plot")
     assert [curve["name"] for curve in shown] == ["point kernel, Pa", "waves (flat-body), µm"]
     current = "data.some(d => d.name === 'waves (flat-body), µm')"
-    overlay = latencies(page, "am", 12, current)
+    overlay = latencies(page, "am", 8, current)
     photographed(page, "waves")
     for what, times in (("point kernel", kernel), ("waves", overlay)):
         print(f"{what}: median {statistics.median(times):.3f} s, largest {times.max():.3f} s")

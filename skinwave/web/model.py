@@ -32,6 +32,7 @@ from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, pulses_of
 
 REACH = 50e-3  # m: half the side of the area that is shown
 SIDE = 41  # places along a side of a map
+FELT_SIDE = 81  # of the borderline of what is felt of a pressure
 FINE_SIDE = 101  # of the borderline's grid
 GAIN_RATE = 4000.0  # Hz at which the pressure at the foci is looked at
 PHASES = 120  # of a path
@@ -265,10 +266,11 @@ def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.comp
 
 @lru_cache(maxsize=32)
 def nearest_foci(path: Trajectory, foci: tuple[float, ...], height: float, focus: str) -> Floats:
-    """The largest relative pressure (SIDE, SIDE) of all foci together, wherever on their path."""
+    """The largest relative pressure (y, x) of all foci together, wherever on their path."""
     phases = np.zeros(1) if path.is_static else np.arange(PHASES) / PHASES
-    spots = sum(moved_spot(places(), path.at_phase((phases + a) % 1), height, focus) for a in foci)
-    return np.asarray(spots).max(axis=0).reshape(SIDE, SIDE)
+    at = places(FELT_SIDE)
+    spots = sum(moved_spot(at, path.at_phase((phases + a) % 1), height, focus) for a in foci)
+    return np.asarray(spots).max(axis=0).reshape(FELT_SIDE, FELT_SIDE)
 
 
 def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
