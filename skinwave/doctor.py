@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 import fem
-from skinwave import cache
+from meshes import cache
 from skinwave.effort import versions
 from skinwave.renderer import renderer
 
