@@ -246,11 +246,12 @@ def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
 def test_a_palm_answers(monkeypatch):
     monkeypatch.setitem(waves.SIZES, "palm", 9e-3)
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
-    shown = waves.Waves()(model.scene_of(values), nothing)
+    answered = waves.Waves()
+    shown = answered(model.scene_of(values), nothing)
     assert np.isnan(shown.map.rms[0, 0])
     assert np.isfinite(shown.map.rms[model.SIDE // 2, model.SIDE // 2])
     with pytest.raises(ValueError, match="beside"):
-        waves.Waves()(model.scene_of(values | {"x": 42.0, "y": 49.0}), nothing)
+        answered(model.scene_of(values | {"x": 42.0, "y": 49.0}), nothing)
 
 
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
