@@ -33,6 +33,7 @@ _FORCES = np.array(
     [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
     + [1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414]
 )
+_INTENSITY = PchipInterpolator(_HEIGHTS, _FORCES)
 
 
 def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:
@@ -65,7 +66,7 @@ def relative_intensity(height: float) -> float:
         raise ValueError(
             f"height = {1e3 * height:g} mm is outside {low}..{high} mm, where the array focuses"
         )
-    return float(PchipInterpolator(_HEIGHTS, _FORCES)(1e3 * height))
+    return float(_INTENSITY(1e3 * height))
 
 
 def lobe_width(height: float) -> float:

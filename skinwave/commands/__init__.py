@@ -17,6 +17,7 @@ from skinwave.commands import (
     sweep,
     tradeoff,
     verify,
+    web,
 )
 
 COMMANDS = {
@@ -32,5 +33,6 @@ COMMANDS = {
     "verify": verify,
     "report": report,
     "film": film,
+    "web": web,
     "doctor": doctor,
 }

@@ -1,0 +1,120 @@
+"""How soon the page follows? `python -m bench.web [moves]`, in Debian's chromium without a window.
+
+From a key press on a slider to plots drawn with the new answer; the process's own share of that, in
+CPU time, which other work on the machine disturbs little; and from opening a page to its plots.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import time
+
+import numpy as np
+from trame.app import get_server
+
+from skinwave.web import waves
+from skinwave.web.controls import STARTS
+from skinwave.web.model import scene_of
+from skinwave.web.serve import session_of
+
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+PAGES = 5
+PRESSED = """async ([key, count, name]) => {
+  const slider = document.querySelector(`.sw-row:has(#${key}-field) [role=slider]`);
+  const at = document.getElementById('spectrum_plot'), times = [];
+  const plot = at.data ? at : at.querySelector('.js-plotly-plot');
+  const shown = () => JSON.stringify((plot.data.find(d => d.name === name) || {}).y);
+  slider.focus();
+  for (let k = 0; k < count; k++) {
+    const before = shown(), start = performance.now();
+    const done = new Promise(resolve => {
+      const look = () => {
+        const now = shown();
+        if (now && now !== before) {
+          plot.removeListener('plotly_afterplot', look);
+          resolve(performance.now() - start);
+        }
+      };
+      plot.on('plotly_afterplot', look);
+    });
+    slider.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}));
+    times.push(await done);
+    await new Promise(resolve => setTimeout(resolve, 150));
+  }
+  return times }"""
+
+
+def row(what: str, seconds: list[float]) -> None:
+    median, high = 1e3 * np.percentile(seconds, [50, 95])
+    print(f"{what:<52}{median:7.0f} ms {high:7.0f} ms {len(seconds):5d}", flush=True)
+
+
+def own_share(moves: int) -> None:
+    """CPU time of a move in the process behind a page, and of its waves in the other one."""
+    server = get_server("bench", client_type="vue3")
+    session = session_of(server)
+    server.state.ready()
+    spent = []
+    for am in 100 + np.arange(moves):
+        before = time.process_time()
+        with server.state:
+            server.state.am = int(am)
+        spent.append(time.process_time() - before)
+    row("the process behind the page, CPU", spent)
+    session.worker.close()
+    answered, spent = waves.Waves(), []
+    for am in 100 + np.arange(moves + 1):
+        scene = scene_of(STARTS | {"body": "skin-slab", "am": float(am)})
+        before = time.process_time()
+        answered(scene, lambda phase, done: None)
+        spent.append(time.process_time() - before)
+    row("waves of the slab, CPU", spent[1:])
+    print(f"{'':<4}the first, with its table: {spent[0]:.2f} s")
+
+
+def in_a_browser(moves: int) -> None:
+    """What a user waits for."""
+    from playwright.sync_api import sync_playwright
+
+    command = [sys.executable, "-m", "skinwave", "web", "--port", "0"]
+    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    assert server.stderr is not None
+    address = re.search(r"http://\S+/", server.stderr.readline()).group()  # type: ignore[union-attr]
+    try:
+        with sync_playwright() as p:
+            browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+            ready = []
+            for _ in range(PAGES):
+                time.sleep(9)  # the next session is made ready
+                page = browser.new_page(viewport={"width": 1280, "height": 720})
+                page.set_default_timeout(120_000)
+                before = time.perf_counter()
+                page.goto(address)
+                page.wait_for_selector("#spectrum_plot .main-svg")
+                ready.append(time.perf_counter() - before)
+            row("page ready", ready)
+            said = "point kernel, Pa"
+            times = page.evaluate(PRESSED, ["am", moves, said])
+            row("slider to plots, point kernel", [t / 1e3 for t in times])
+            page.goto(address + "?body=skin-slab")
+            page.wait_for_function(
+                "() => window.trame?.state?.get('wave_map')?.picture"
+                " && document.querySelector('#spectrum_plot .main-svg')"
+            )
+            times = page.evaluate(PRESSED, ["am", moves, "waves (flat-body), µm"])
+            row("slider to waves of the slab", [t / 1e3 for t in times])
+            browser.close()
+    finally:
+        server.terminate()
+
+
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    sys.argv = sys.argv[:1]  # trame reads it
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} before")
+    print(f"{'':<52}{'median':>10} {'95 %':>10} {'of':>5}")
+    own_share(count)
+    in_a_browser(count)
+    print(f"load {os.getloadavg()[0]:.1f} after")

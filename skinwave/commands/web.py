@@ -1,0 +1,47 @@
+"""The interactive tool, in a browser: turn a Tacton's parameters, and see what is felt."""
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument(
+        "scene", nargs="?", type=Path, metavar="SCENE", help="scene file (TOML) to begin with"
+    )
+    parser.add_argument("--port", type=int, default=8080, help="0 is any (default: 8080)")
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    parser.add_argument("--debug", action="store_true", help="traceback of an error")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave.web import check_extra
+
+    if not 0 <= options.port <= 65535:
+        raise ValueError(f"port = {options.port} is outside 0..65535; leave it out for 8080")
+    check_extra()
+    from skinwave.scene_file import dumps, read
+    from skinwave.web import front, model
+
+    scene = read(options.scene) if options.scene else None
+    if scene is not None:
+        model.values_of(scene)  # refuses what no control says
+
+    def ready(address: str) -> None:
+        print(f"skinwave: {address} (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        if options.open:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    try:
+        front.run(options.port, dumps(scene) if scene is not None else "", ready)
+    except KeyboardInterrupt:
+        return 0
+    except OSError as error:
+        raise ValueError(
+            f"port {options.port} cannot be used ({error.strerror}); name another with --port"
+        ) from None
+    return 0

@@ -1,0 +1,25 @@
+"""The interactive tool: turn a Tacton's parameters, and see at once what a point of the skin feels.
+
+`controls` are what can be turned, `model` turns them into a scene and arrays, `plots` into what a
+page draws, all without a browser. `waves` and `worker` answer with a body, in a process of its own;
+`session` and `layout` are the page, `front` gives each page a process of its own.
+"""
+
+EXTRA = ("trame", "trame_vuetify", "trame_plotly")
+
+
+def check_extra() -> None:
+    """Refuse to start without what a page is made of.
+
+    Raises
+    ------
+    ValueError
+        If one of `EXTRA` is not installed.
+    """
+    from importlib.util import find_spec
+
+    if missing := [name for name in EXTRA if find_spec(name) is None]:
+        raise ValueError(
+            f"the interactive tool needs {', '.join(missing)}, which is not installed; "
+            "pip install 'skinwave[web]'"
+        )

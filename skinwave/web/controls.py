@@ -1,0 +1,166 @@
+"""What can be turned: ranges, units and steps, and the same as text for an address or undo.
+
+Values are in the units that a page shows. Ranges are those of Lim, Seifi and Park, CHI EA '24,
+section 2.2, where they give one: amplitude, ratio, duration, shape and size.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+from urllib.parse import parse_qsl, urlencode
+
+from simple_model.choices import choose
+from simple_model.drive import DRIVES
+from simple_model.tacton import SHARINGS, SUPERPOSITIONS
+from simple_model.trajectory import SHAPES
+from skinwave.paper15 import tactons
+from skinwave.scene import BODIES
+
+Values = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number:
+    """A number with a slider: `low` to `high` in steps of `step`, in `unit`; `least` is the
+    smallest value that a field takes, `low` if not given.
+    """
+
+    label: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    start: float
+    least: float | None = None
+
+
+NUMBERS = {
+    "amplitude": Number(label="Amplitude", unit="%", low=0, high=100, step=1, start=100),
+    "am": Number(label="AM frequency", unit="Hz", low=0, high=500, step=1, start=140),
+    "am2": Number(label="Second AM frequency", unit="Hz", low=0, high=500, step=1, start=0),
+    "envelope": Number(label="Envelope frequency", unit="Hz", low=0, high=100, step=0.5, start=0),
+    "duration": Number(
+        label="Duration", unit="s", low=0.1, high=10, step=0.1, start=1, least=0.01
+    ),
+    "size": Number(label="Size", unit="mm", low=0, high=60, step=0.5, start=20),
+    "speed": Number(label="Drawing speed", unit="m/s", low=0, high=40, step=0.1, start=12),
+    "height": Number(label="Height of the focus", unit="mm", low=20, high=600, step=5, start=200),
+    "foci": Number(label="Focal points", unit="", low=1, high=8, step=1, start=1),
+    "ramp": Number(label="Ramp", unit="ms", low=0, high=100, step=1, start=0),
+    "x": Number(label="Point x", unit="mm", low=-50, high=50, step=0.1, start=10),
+    "y": Number(label="Point y", unit="mm", low=-50, high=50, step=0.1, start=0),
+}  # fmt: skip
+RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
+OWN_BODY = "from the scene"
+CHOICES: dict[str, tuple[str, ...]] = {
+    "ratio": tuple(RATIOS),
+    "shape": SHAPES,
+    "drive": tuple(DRIVES),
+    "body": (*BODIES, OWN_BODY),
+    "sharing": SHARINGS,
+}
+STARTS = {
+    **{key: number.start for key, number in NUMBERS.items()},
+    "ratio": "1:0",
+    "shape": "circle",
+    "drive": "linear",
+    "body": "none",
+    "sharing": "simultaneous",
+    "pulses": "",
+}
+KEYS = tuple(STARTS)
+MOST_PULSES = 64
+
+
+def checked(key: str, given: Any) -> Any:
+    """The value of a control.
+
+    Raises
+    ------
+    ValueError
+        If it is none, unknown, not finite or out of range.
+    """
+    if key in CHOICES:
+        return choose(key, str(given), CHOICES[key])
+    if key == "pulses":
+        pulses_of(str(given))
+        return str(given).strip()
+    number = NUMBERS[key]
+    unit = f" {number.unit}" if number.unit else ""
+    try:
+        value = float(str(given).replace(",", "."))
+    except ValueError:
+        raise ValueError(f"'{given}' is no number; give one in {number.unit or 'whole'}") from None
+    low = number.low if number.least is None else number.least
+    if not (isfinite(value) and low <= value <= number.high):
+        raise ValueError(f"{value:g}{unit} is outside {low:g} to {number.high:g}{unit}")
+    if key == "foci" and value != int(value):
+        raise ValueError(f"{value:g} focal points; give a whole number")
+    return int(value) if key == "foci" else value
+
+
+def pulses_of(text: str) -> tuple[tuple[float, float], ...]:
+    """Pulses and gaps (n, 2) in s of a text such as "100/50, 40/110" in ms; none if it is empty.
+
+    Raises
+    ------
+    ValueError
+        If it is no such text, a pulse does not last or a gap is below 0.
+    """
+    found = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        try:
+            on, gap = (float(number) for number in part.split("/"))
+        except ValueError:
+            raise ValueError(f"'{part}' is no pulse; give on/off in ms, such as 100/50") from None
+        if not (isfinite(on) and isfinite(gap) and on > 0 and gap >= 0):
+            raise ValueError(f"'{part}': a pulse lasts longer than 0 ms, its gap 0 ms or longer")
+        found.append((on / 1e3, gap / 1e3))
+    if len(found) > MOST_PULSES:
+        raise ValueError(f"{len(found)} pulses exceed {MOST_PULSES}; repeat a shorter pattern")
+    return tuple(found)
+
+
+def to_query(values: Mapping[str, Any]) -> str:
+    """The part of an address that `from_query` reads; only what differs from `STARTS`."""
+    changed = {
+        key: f"{values[key]:.10g}" if key in NUMBERS else values[key]
+        for key in KEYS
+        if values[key] != STARTS[key] and values[key] != OWN_BODY
+    }
+    return urlencode(changed, safe="/:,")
+
+
+def from_query(query: str) -> tuple[Values, tuple[str, ...]]:
+    """Values of an address, and a sentence for everything in it that was left out."""
+    values, refused = dict(STARTS), []
+    for key, given in parse_qsl(query):
+        try:
+            if key not in KEYS:
+                raise ValueError("is not known here")
+            values[key] = checked(key, given)
+        except ValueError as error:
+            refused.append(f"left out of the address: {key}: {error}")
+    return values, tuple(refused)
+
+
+def presets() -> dict[str, Values]:
+    """The paper's 15 Tactons by name: what each changes."""
+    return {
+        name: {
+            "amplitude": 100.0 * tacton.amplitude,
+            "am": tacton.am_frequency,
+            "am2": 0.0,
+            "ratio": "1:0",
+            "envelope": 0.0,
+            "duration": tacton.duration,
+            "shape": "circle" if tacton.trajectory.size else "point",
+            "size": 1e3 * tacton.trajectory.size,
+            "speed": tacton.trajectory.speed,
+            "foci": 1,
+            "pulses": "",
+            "ramp": 0.0,
+        }
+        for name, tacton in tactons()
+    }

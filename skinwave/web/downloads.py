@@ -1,0 +1,75 @@
+"""What a page gives to keep: waveforms as tables and sound, and a figure."""
+
+import csv
+from collections.abc import Sequence
+from io import BytesIO, StringIO
+
+import numpy as np
+
+from simple_model.response import step
+from skinwave.exports import FULL_SCALE
+from skinwave.scene import Scene
+from skinwave.web.model import REACH, Answer, influenced
+
+
+def csv_of(answers: Sequence[Answer]) -> bytes:
+    """Time in s and a column an answer, with its unit and place in the header."""
+    x, y = 1e3 * answers[0].response.probes[0]
+    kinds = {"Pa": "pressure", "m": "displacement"}
+    text = StringIO()
+    writer = csv.writer(text)
+    writer.writerow(
+        ["time, s"]
+        + [
+            f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
+            for a in answers
+        ]
+    )
+    columns = [answers[0].response.times, *(a.response.displacement[:, 0] for a in answers)]
+    writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+    return text.getvalue().encode()
+
+
+def wav_of(answer: Answer) -> bytes:
+    """The waveform about its mean (16 bit, mono) at its own rate, as loud as the format holds."""
+    from scipy.io import wavfile
+
+    motion = answer.response.displacement[:, 0]
+    motion = motion - motion.mean()
+    largest = float(np.abs(motion).max()) or 1.0
+    buffer = BytesIO()
+    samples = np.round(motion / largest * FULL_SCALE).astype(np.int16)
+    wavfile.write(buffer, round(1 / step(answer.response.times)), samples)
+    return buffer.getvalue()
+
+
+def figure_of(scene: Scene, kernel: Answer, waves: Answer | None, kind: str) -> bytes:
+    """Maps, waveform and spectrum; `kind` is "svg" or "png"."""
+    from matplotlib.figure import Figure
+
+    answers = [a for a in (kernel, waves) if a is not None]
+    figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
+    for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
+        unit, per = ("Pa", 1.0) if answer.response.unit == "Pa" else ("µm", 1e6)
+        edge = 1e3 * REACH
+        image = row[0].imshow(
+            per * answer.map.rms, extent=(-edge, edge, -edge, edge), origin="lower", cmap="cividis"
+        )
+        figure.colorbar(image, ax=row[0], label=f"RMS, {unit}")
+        path = scene.tacton.trajectory
+        row[0].plot(*(1e3 * path.outline.T), color="#56B4E9")
+        for line in influenced(path, scene.pressure.height):
+            row[0].plot(*(1e3 * line.T), color="white", ls="dotted")
+        for line in answer.map.felt:
+            row[0].plot(*(1e3 * line.T), color="#ff2fd0", lw=1)
+        row[0].plot(*(1e3 * answer.response.probes.T), "x", color="white")
+        row[0].set(xlabel="x, mm", ylabel="y, mm", title=answer.response.model)
+        shown = answer.response.times <= 0.06
+        row[1].plot(1e3 * answer.response.times[shown],
+                    per * answer.response.displacement[shown, 0], lw=1)  # fmt: skip
+        row[1].set(xlabel="time, ms", ylabel=unit, title="waveform at the point")
+        row[2].plot(answer.frequencies, per * answer.spectrum, lw=1)
+        row[2].set(xlabel="frequency, Hz", ylabel=unit, title="spectrum", xlim=(0, 600))
+    buffer = BytesIO()
+    figure.savefig(buffer, format=kind, dpi=150)
+    return buffer.getvalue()

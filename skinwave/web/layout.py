@@ -1,0 +1,158 @@
+"""The page: control panel on the left, visualization panel beside it (trame, Vuetify)."""
+
+from pathlib import Path
+from typing import Any
+
+from trame.ui.vuetify3 import VAppLayout
+from trame.widgets import client, html, plotly
+from trame.widgets import vuetify3 as v3
+
+from skinwave.web import controls, panels
+from skinwave.web.plots import SPANS
+from skinwave.web.session import HIGHEST, Session
+
+STATIC = Path(__file__).with_name("static")
+MODULE = {
+    "serve": {"__skinwave": str(STATIC)},
+    "scripts": ["__skinwave/skinwave.js"],
+    "styles": ["__skinwave/skinwave.css"],
+}
+LOST = """
+<div id="sw-lost" role="alert" style="font: 1rem sans-serif; padding: 3rem; text-align: center">
+  <p>The connection to skinwave is lost. This page comes back by itself, with what its address says,
+  as soon as the program answers.</p><p><a href="">Try now</a></p>
+</div>
+"""
+PLOTS = {
+    "commanded_plot": "The commanded Tacton over time",
+    "waveform_plot": "Waveform at the selected point",
+    "spectrum_plot": "Spectrum at the selected point, with its lines and what is felt of them",
+}
+SAVED = {  # name of the file, what makes it, its kind, what it is called
+    "scene.toml": ("scene_toml", "", "application/toml", "Scene (TOML)"),
+    "waveform.csv": ("waveform_csv", "", "text/csv", "Waveform (CSV)"),
+    "waveform.wav": ("waveform_wav", "", "audio/wav", "Waveform (WAV)"),
+    "figure.svg": ("figure", ", ['svg']", "image/svg+xml", "Figure (SVG)"),
+    "figure.png": ("figure", ", ['png']", "image/png", "Figure (PNG)"),
+}
+
+
+def lay_out(session: Session) -> None:
+    """Make the page of a session."""
+    server = session.server
+    server.enable_module(MODULE)
+    session.state.trame__title = "skinwave"
+    session.state.trame__template_error = LOST
+    with VAppLayout(server, theme=("dark ? 'dark' : 'light'",)):
+        client.ClientStateChange(
+            value="query", immediate=True, change="utils.skinwave.address(query)"
+        )
+        client.ClientTriggers(mounted="dark = utils.skinwave.prefersDark()")
+        _bar(session)
+        with v3.VNavigationDrawer(
+            v_model=("drawer", None), width=320, mobile_breakpoint=960,
+            raw_attrs=['aria-label="Control panel"'],
+        ):  # fmt: skip
+            panels.control_panel(session)
+        panels.about()
+        with v3.VMain(), html.Div(classes="sw-page", id="ready"):
+            _maps(session)
+            _plots(session)
+
+
+def _bar(session: Session) -> None:
+    with v3.VAppBar(density="compact", flat=True, border=True, height=48):
+        _button("mdi-menu", "Show or hide the control panel", "drawer = !drawer")
+        v3.VAppBarTitle("skinwave", style="flex: 0 0 auto; min-width: 90px")
+        with v3.VMenu():
+            with v3.Template(v_slot_activator="{ props }"):
+                v3.VBtn("Presets", v_bind="props", append_icon="mdi-menu-down", id="presets")
+            with v3.VList(density="compact", max_height=420):
+                for name in controls.presets():
+                    v3.VListItem(title=name, id=f"preset-{name}",
+                                 click=(session.preset, f"['{name}']"))  # fmt: skip
+        v3.VSpacer()
+        _looks()
+        _button("mdi-undo", "Undo", session.undo, id="undo", disabled=("!undoable",))
+        _button("mdi-redo", "Redo", session.redo, id="redo", disabled=("!redoable",))
+        v3.VBtn("{{ pinned ? 'Unpin' : 'Pin' }}", prepend_icon="mdi-pin", click=session.pin,
+                id="pin", title="Keep what is shown as dotted curves, to compare with")  # fmt: skip
+        v3.VBtn("A/B", click=session.take_pinned, disabled=("!pinned",), id="swap",
+                title="Exchange what is shown and what is pinned")  # fmt: skip
+        _save_menu()
+        _button("mdi-theme-light-dark", "Light or dark", "dark = !dark", id="theme")
+        _button("mdi-information-outline", "About this model", "about = !about", id="about")
+
+
+def _save_menu() -> None:
+    with v3.VMenu():
+        with v3.Template(v_slot_activator="{ props }"):
+            v3.VBtn("Save", v_bind="props", append_icon="mdi-menu-down", id="save")
+        with v3.VList(density="compact"):
+            for file, (made_by, given, kind, said) in SAVED.items():
+                v3.VListItem(
+                    title=said, id=f"save-{file.replace('.', '-')}",
+                    click=f"utils.download('{file}', trigger('{made_by}'{given}), '{kind}')",
+                )  # fmt: skip
+
+
+def _button(icon: str, said: str, click: Any, **more: Any) -> None:
+    v3.VBtn(icon=icon, click=click, title=said, density="comfortable",
+            raw_attrs=[f'aria-label="{said}"'], **more)  # fmt: skip
+
+
+def _maps(session: Session) -> None:
+    with html.Div(classes="sw-maps"):
+        with html.Div():
+            html.Div(
+                "<b>Point kernel</b>, RMS pressure: up to {{ kernel_map.largest }}",
+                classes="sw-caption",
+            )
+            panels.area("kernel_map", "kernel-map", "point kernel")
+        with html.Div(v_if="body != 'none'", classes=("{ 'sw-stale': waves_stale }",)):
+            html.Div(
+                "<b>Waves</b>, RMS displacement: up to {{ wave_map.largest || '…' }}",
+                classes="sw-caption",
+            )
+            panels.area("wave_map", "wave-map", "waves in the body")
+        with html.Div(style="grid-column: 1 / -1"):
+            html.Div(
+                "<span><b style='color:#56B4E9'>━</b> path, foci</span> "
+                "<span>┄ border of the influence</span> "
+                "<span><b style='color:#CC4FA0'>━</b> of what can be felt</span> "
+                "<span><b style='color:#D55E00'>✕</b> selected</span>",
+                classes="sw-caption sw-legend",
+            )
+            v3.VSlider(
+                v_model=("phase", 0), min=0, max=99, step=1, hide_details=True, density="compact",
+                raw_attrs=['aria-label="Where the foci are in a drawing period, per cent"'],
+                label="foci at", id="phase",
+            )  # fmt: skip
+            panels.line_table()
+
+
+def _plots(session: Session) -> None:
+    with html.Div(classes="sw-plots"):
+        for name, said in PLOTS.items():
+            with html.Div(raw_attrs=['role="img"', f'aria-label="{said}"'],
+                          classes=("{ 'sw-stale': stale }",)):  # fmt: skip
+                more = {"relayout": (session.zoom, "[$event]")} if name == "commanded_plot" else {}
+                plotly.Figure(
+                    state_variable_name=name, display_logo=False, display_mode_bar="hover",
+                    responsive=True, id=name, style="width: 100%; height: 100%",
+                    to_image_options=("{ format: 'svg' }",),
+                    mode_bar_buttons_to_remove=("['lasso2d', 'select2d', 'autoScale2d']",), **more,
+                )  # fmt: skip
+        with html.Div(style="position: fixed; right: 10px; top: 54px; width: 340px; z-index: 5",
+                      raw_attrs=['role="status"', 'aria-live="polite"']):  # fmt: skip
+            panels.notices(session)
+
+
+def _looks() -> None:
+    """What is shown of the answer."""
+    v3.VSelect(v_model=("span",), items=("spans", list(SPANS)), density="compact", id="span",
+               hide_details=True, variant="plain", style="flex: 0 0 120px",
+               raw_attrs=['aria-label="Part of the Tacton that is shown"'])  # fmt: skip
+    v3.VSelect(v_model=("highest",), items=("highests", list(HIGHEST)), density="compact",
+               hide_details=True, variant="plain", style="flex: 0 0 96px", suffix="Hz",
+               raw_attrs=['aria-label="Highest frequency shown"'], id="highest")  # fmt: skip

@@ -1,0 +1,326 @@
+"""From the values of the controls to a scene, and from that to everything a page shows of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshes.tetmesh import Floats
+from simple_model import (
+    MovingPressure,
+    Response,
+    Rhythm,
+    Tacton,
+    Trajectory,
+    commanded,
+    lines,
+    modulation,
+    sensation_level,
+    spectrum,
+    tacton_lines,
+)
+from simple_model.focus import lobe_width, moved_spot
+from simple_model.steady import along_path, load_lines, path_knots
+from simple_model.tacton import CARRIER, level
+from simple_model.threshold import PRESSURE
+from skinwave.scene import BODIES, Body, Scene
+from skinwave.simulation import simulate
+from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, pulses_of
+
+REACH = 50e-3  # m: half the side of the area that is shown
+SIDE = 41  # places along a side of a map
+FELT_SIDE = 81  # of the borderline of what is felt of a pressure
+FINE_SIDE = 101  # of the borderline's grid
+GAIN_RATE = 4000.0  # Hz at which the pressure at the foci is looked at
+PHASES = 120  # of a path
+MOST_SHOWN = 1500  # points of a curve
+MOST_ENVELOPE = 600  # of the commanded Tacton without its carrier
+HIGHEST = 1000.0  # Hz of spectra
+FAINTEST = 1e-3  # of the strongest line: weaker ones are not named
+RESOLVED = 10  # samples of a period of the carrier
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Map:
+    """A quantity over the area: `rms` (y, x) of it about its mean, in its unit, not a number beside
+    the body, and the borderline `felt` of what is felt, closed lines (k, 2) in metre.
+    """
+
+    rms: Floats
+    felt: tuple[Floats, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Line:
+    """A line at a point: `amplitude` in the unit of the model, and `sensation` in dB above the
+    threshold of detection, None of a pressure.
+    """
+
+    name: str
+    frequency: float
+    amplitude: float
+    sensation: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """A model's answer: the `response` at the one point that is selected, its `frequencies` (f,)
+    in Hz with the amplitudes `spectrum` (f,), its named `lines`, the strongest first, and the map.
+    """
+
+    response: Response
+    frequencies: Floats
+    spectrum: Floats
+    lines: tuple[Line, ...]
+    map: Map
+
+
+def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
+    """The scene that controls say, probed at the selected point; `own` is a body from a file.
+
+    Raises
+    ------
+    ValueError
+        If values are out of range together, such as a path beyond the body.
+    """
+    shape = values["shape"]
+    moving = {} if shape == "point" else {"size": values["size"] / 1e3, "speed": values["speed"]}
+    pulses = pulses_of(values["pulses"])
+    foci = int(values["foci"])
+    tacton = Tacton(
+        amplitude=values["amplitude"] / 100,
+        am_frequency=values["am"],
+        second_am_frequency=values["am2"],
+        superposition=RATIOS[values["ratio"]],
+        envelope_frequency=values["envelope"],
+        duration=values["duration"],
+        trajectory=Trajectory(shape=shape, **moving),
+        foci=tuple(k / foci for k in range(foci)),
+        sharing=values["sharing"],
+        rhythm=Rhythm(pulses=pulses, ramp=values["ramp"] / 1e3) if pulses else None,
+    )
+    body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
+    pressure = MovingPressure(
+        tacton=tacton,
+        # The published model has the main lobe; exact waves and elements a Gaussian of its width.
+        focus="main_lobe" if body.kind == "none" else "gaussian",
+        drive=values["drive"],
+        height=values["height"] / 1e3,
+    )
+    return Scene(
+        name="skinwave web", pressure=pressure, body=body,
+        probes=((values["x"] / 1e3, values["y"] / 1e3),),
+    )  # fmt: skip
+
+
+def values_of(scene: Scene) -> Values:
+    """The controls' values that give a scene, probed at its first probe.
+
+    Raises
+    ------
+    ValueError
+        If it has what no control says.
+    """
+    tacton, path = scene.tacton, scene.tacton.trajectory
+    known = {body: name for name, body in BODIES.items()}
+    ratio = {weights: name for name, weights in RATIOS.items()}.get(tacton.superposition)
+    even = tuple(k / len(tacton.foci) for k in range(len(tacton.foci)))
+    beyond = {
+        "a path of its own points": path.shape not in ("point", "line", "circle", "triangle",
+                                                       "square"),
+        "a path that is moved or swept one way": any(path.centre)
+        or path.sweep != "there_and_back",
+        "a sampled signal": tacton.signal is not None,
+        "foci at uneven phases": not np.allclose(sorted(tacton.foci), even),
+        "a superposition that is none of the five": ratio is None,
+    }  # fmt: skip
+    if said := [what for what, holds in beyond.items() if holds]:
+        raise ValueError(f"{' and '.join(said)} cannot be turned here; use skinwave run")
+    rhythm, (x, y) = tacton.rhythm, scene.probes[0]
+    pulses = rhythm.pulses if rhythm else ()
+    return STARTS | {
+        "amplitude": 100 * tacton.amplitude,
+        "am": tacton.am_frequency,
+        "am2": tacton.second_am_frequency,
+        "ratio": ratio,
+        "envelope": tacton.envelope_frequency,
+        "duration": tacton.duration,
+        "shape": path.shape,
+        "size": 1e3 * path.size,
+        "speed": path.speed,
+        "height": 1e3 * scene.pressure.height,
+        "drive": scene.pressure.drive,
+        "body": known.get(scene.body, OWN_BODY),
+        "foci": len(tacton.foci),
+        "sharing": tacton.sharing,
+        "pulses": ", ".join(f"{1e3 * on:g}/{1e3 * gap:g}" for on, gap in pulses),
+        "ramp": 1e3 * rhythm.ramp if rhythm else 0.0,
+        "x": round(1e3 * x, 6),
+        "y": round(1e3 * y, 6),
+    }
+
+
+def held(values: Mapping[str, Any], moved: str, frequency: float) -> Values:
+    """Size or speed, whichever was not moved, so that the path is drawn `frequency` times a second
+    (in Hz).
+
+    Raises
+    ------
+    ValueError
+        If that is out of the range of its control.
+    """
+    from skinwave.web.controls import checked
+
+    per_size = Trajectory(shape=values["shape"], size=1e-3).length  # metre per mm
+    if not per_size or not frequency:
+        return {}
+    found = (
+        ("speed", frequency * per_size * values["size"])
+        if moved != "speed"
+        else ("size", values["speed"] / (frequency * per_size))
+    )
+    return {found[0]: checked(found[0], round(found[1], 6))}
+
+
+def kernel(scene: Scene) -> Answer:
+    """The point kernel's answer to a scene of one probe."""
+    return answer_of(scene, simulate(scene, "point-kernel"), kernel_map(scene.pressure))
+
+
+def answer_of(scene: Scene, response: Response, found: Map) -> Answer:
+    """What is shown of a response at one point."""
+    f, amplitude = spectrum(response)
+    shown = f <= HIGHEST
+    return Answer(
+        response=response, frequencies=f[shown], spectrum=amplitude[shown, 0],
+        lines=named_lines(scene, response), map=found,
+    )  # fmt: skip
+
+
+def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
+    """The lines of a Tacton in its answer, the strongest first; one name for each frequency."""
+    nyquist = 0.5 / (response.times[1] - response.times[0])
+    resolved = 2 / np.ptp(response.times)
+    known: dict[str, float] = {}
+    for name, f in sorted(tacton_lines(scene.tacton).items(), key=lambda item: len(item[0])):
+        apart = all(abs(f - other) > resolved for other in known.values())
+        if resolved < f <= min(HIGHEST, 0.99 * nyquist) and apart:
+            known[name] = f
+    if not known:
+        return ()
+    bins, rough = spectrum(
+        response
+    )  # to fit only what is there: a fit of all takes ten times as long
+    near = np.array([rough[np.abs(bins - each) < 2.5 * bins[1]].max(initial=0.0) for each in
+                     known.values()])  # fmt: skip
+    known = {name: known[name] for name, a in zip(known, near, strict=True)
+             if a > 0.5 * FAINTEST * near.max(initial=0.0)}  # fmt: skip
+    if not known:
+        return ()
+    amplitudes = lines(response, list(known.values()))[:, 0]
+    felt = response.unit == "m"
+    found = [
+        Line(
+            name=name, frequency=f, amplitude=float(a),
+            sensation=float(sensation_level(a, f)) if felt else None,
+        )
+        for (name, f), a in zip(known.items(), amplitudes, strict=True)
+    ]  # fmt: skip
+    found.sort(key=lambda line: -line.amplitude)
+    return tuple(x for x in found if x.amplitude > FAINTEST * max(found[0].amplitude, 1e-300))
+
+
+def places(side: int = SIDE) -> Floats:
+    """Places (side * side, 2) in metre of a map, row after row."""
+    line = np.linspace(-REACH, REACH, side)
+    x, y = np.meshgrid(line, line)
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def kernel_map(pressure: MovingPressure) -> Map:
+    """Where the pressure changes, by its lines, and where it can rise above what is just felt: at
+    its largest at the foci, with these wherever on their path. Of a rhythm, while a pulse is on.
+
+    The root of a spot is all but straight where it ends, as lines between places want it.
+    """
+    tacton = replace(pressure.tacton, rhythm=None)
+    path, duration = tacton.trajectory, tacton.duration
+    found = load_lines(replace(pressure, tacton=tacton), 1e-3)
+    places_only = path if path.is_static else replace(path, speed=1.0)
+    f, amplitudes = found.gather(harmonics_of(places_only, pressure.height, pressure.focus))
+    rms = np.sqrt((np.abs(amplitudes[f > 1e-6]) ** 2).sum(axis=0) / 2).reshape(SIDE, SIDE)
+    gain = np.abs(pressure.gain(np.linspace(0, duration, round(duration * GAIN_RATE) + 2))).max()
+    swept = nearest_foci(places_only, tacton.foci, pressure.height, pressure.focus)
+    return Map(rms=rms, felt=borderline(np.sqrt(gain * swept), PRESSURE**0.5))
+
+
+@lru_cache(maxsize=32)
+def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.complex128]:
+    """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places."""
+    pressure = MovingPressure(tacton=Tacton(trajectory=path), height=height, focus=focus)
+    return along_path(pressure.spot(places(), path_knots(pressure)).T).T
+
+
+@lru_cache(maxsize=32)
+def nearest_foci(path: Trajectory, foci: tuple[float, ...], height: float, focus: str) -> Floats:
+    """The largest relative pressure (y, x) of all foci together, wherever on their path."""
+    phases = np.zeros(1) if path.is_static else np.arange(PHASES) / PHASES
+    at = places(FELT_SIDE)
+    spots = sum(moved_spot(at, path.at_phase((phases + a) % 1), height, focus) for a in foci)
+    return np.asarray(spots).max(axis=0).reshape(FELT_SIDE, FELT_SIDE)
+
+
+def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
+    """Lines (k, 2) in metre along which values (side, side) of the area are `at`."""
+    from contourpy import contour_generator
+
+    line = np.linspace(-REACH, REACH, len(values))
+    masked = np.ma.masked_invalid(values)
+    return tuple(np.asarray(x) for x in contour_generator(line, line, masked).lines(at))
+
+
+@lru_cache(maxsize=32)
+def influenced(path: Trajectory, height: float) -> tuple[Floats, ...]:
+    """The borderline of the influenced area: as far from the path as the main lobe reaches."""
+    outline = path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, 181))
+    away = np.full(FINE_SIDE**2, np.inf)
+    for point in outline:
+        np.minimum(away, ((places(FINE_SIDE) - point) ** 2).sum(axis=1), out=away)
+    return borderline(np.sqrt(away).reshape(FINE_SIDE, FINE_SIDE), lobe_width(height))
+
+
+def commanded_curve(tacton: Tacton, start: float, end: float) -> tuple[Floats, Floats, bool]:
+    """Times (t,) in s and the commanded Tacton between two times in s.
+
+    With the carrier, if `MOST_SHOWN` points resolve it; else its upper envelope, and False.
+    """
+    start, end = max(0.0, start), min(end, tacton.duration)
+    needed = (end - start) * CARRIER * RESOLVED
+    if needed <= MOST_SHOWN:
+        t = np.linspace(start, end, max(2, int(needed) + 1))
+        return t, commanded(tacton, t), True
+    t = np.linspace(start, end, MOST_ENVELOPE)
+    return t, np.asarray(tacton.amplitude * level(tacton, t) * np.abs(modulation(tacton, t))), False
+
+
+def thinned(x: Floats, y: Floats, most: int = MOST_SHOWN) -> tuple[Floats, Floats]:
+    """At most about `most` points of a curve (n,), with every peak: the least and the largest of
+    each part.
+    """
+    if len(x) <= most:
+        return x, y
+    width = int(np.ceil(2 * len(x) / most))
+    count = len(x) // width * width
+    parts = y[:count].reshape(-1, width)
+    both = np.sort([parts.argmin(axis=1), parts.argmax(axis=1)], axis=0).T
+    kept = np.unique((both + np.arange(0, count, width)[:, None]).ravel())
+    kept = np.append(kept, np.arange(count, len(x)))
+    return x[kept], y[kept]
+
+
+def with_point(scene: Scene, x: float, y: float) -> Scene:
+    """The scene probed elsewhere, in metre."""
+    return replace(scene, probes=((x, y),))

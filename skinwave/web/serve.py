@@ -1,0 +1,103 @@
+"""The process behind one page: says its port, waits for what the page asks, and serves it.
+
+python -m skinwave.web.serve      # started by `front`, not by hand
+"""
+
+import asyncio
+import json
+import os
+import sys
+import threading
+import traceback
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
+
+
+def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None) -> Any:
+    """A session with its page; the address's values, if it has any, before the scene's."""
+    from skinwave.scene_file import loads
+    from skinwave.web import controls, model
+    from skinwave.web.layout import lay_out
+    from skinwave.web.session import Session
+
+    start, own = None, None
+    if scene:
+        read = loads(scene)
+        start = model.values_of(read)
+        own = read.body if start["body"] == controls.OWN_BODY else None
+    given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
+    refused: tuple[str, ...] = ()
+    if given:
+        start, refused = controls.from_query(urlencode(given))
+    session = Session(server, start, own)
+    lay_out(session)
+    if refused:
+        session.state.problem = "; ".join(refused)
+    return session
+
+
+def _on_one_thread() -> None:
+    """Have numpy compute on one thread here: what a move takes is too small to share out, and
+    threads that wait for each other delay it. The process that answers with a body has all.
+    """
+    limits = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(limits, "1"))
+    import numpy as np
+
+    np.ones((2, 2)) @ np.ones((2, 2))
+    for name in limits:
+        del os.environ[name]
+
+
+def main() -> None:
+    """Serve one page until it is closed."""
+    sys.argv = sys.argv[:1]  # trame reads it
+    _on_one_thread()
+    from trame.app import get_server
+
+    import skinwave.web.layout  # noqa: F401, what takes its time, before a page asks
+
+    server = get_server("page", client_type="vue3")
+    loop = asyncio.new_event_loop()
+    asyncio.set_event_loop(loop)
+
+    def begin(**_: Any) -> None:
+        try:
+            print(server.port, flush=True)
+        except OSError:
+            os._exit(0)  # who started this has ended
+        threading.Thread(target=listen, daemon=True).start()
+
+    def listen() -> None:
+        line = sys.stdin.readline()
+        if line:
+            loop.call_soon_threadsafe(assign, json.loads(line))
+            sys.stdin.read()  # until the other end is closed
+        os._exit(0)
+
+    def assign(asked: dict[str, Any]) -> None:
+        try:
+            session = session_of(server, asked["scene"], asked["query"])
+            session.attach(loop)
+            with session.state:
+                pass
+            print("ready", flush=True)
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
+
+    server.controller.on_server_ready.add(begin)
+    loop.run_until_complete(
+        server.start(
+            host="127.0.0.1", port=0, exec_mode="coroutine", open_browser=False,
+            show_connection_info=False, disable_logging=True, timeout=0,
+        )
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,32 @@
+// What only a page itself can do: its address, the point under a pointer, coming back after a loss.
+window.trame.utils.skinwave = {
+  address(query) {
+    const at = window.location.pathname + (query ? "?" + query : "");
+    window.history.replaceState({}, document.title, at);
+  },
+  // The place in mm under a pointer on a map whose view box is in mm, y downwards.
+  place(event) {
+    const matrix = event.currentTarget.getScreenCTM().inverse();
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix);
+    return [at.x, -at.y];
+  },
+  prefersDark: () => window.matchMedia("(prefers-color-scheme: dark)").matches,
+};
+document.title = "skinwave";
+document.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.target.tagName === "INPUT") return;
+  const key = event.key.toLowerCase();
+  const name = key === "y" || (key === "z" && event.shiftKey) ? "redo" : key === "z" ? "undo" : "";
+  if (name) {
+    event.preventDefault();
+    document.getElementById(name)?.click();
+  }
+});
+// A lost connection leaves a note with this id: as soon as there is a server again, begin anew at
+// the same address.
+setInterval(async () => {
+  if (!document.getElementById("sw-lost")) return;
+  try {
+    if ((await fetch("alive", { cache: "no-store" })).ok) window.location.reload();
+  } catch {}
+}, 1500);

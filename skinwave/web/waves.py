@@ -1,0 +1,266 @@
+"""What a body makes of a Tacton, quickly enough to follow a slider.
+
+Slab: exact waves of an endless one. A table of g(r, w), tabulated once for a body and a height,
+carries every path; a probe's motion from rest is then a sum over harmonics of the path, as in
+`simple_model.flat_body`, and a line's motion of the whole area
+
+    u_f(x) = sum_k g(|x - X_k|, f) w_k(f),   w_k(f) = 1/K sum_n c_fn exp(-2 pi i n a_k)
+
+over K knots X_k of the path. Other bodies: finite elements, reduced to the pressure along the path
+and read everywhere; another path needs another reduction, other controls none.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from scipy import fft, sparse
+from scipy.interpolate import CubicSpline
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model import Effort, MovingPressure, Response, sensation_level
+from simple_model.flat_body import point_response
+from simple_model.focus import spot_width
+from simple_model.response import step
+from simple_model.steady import (
+    along_path,
+    foci_harmonics,
+    harmonics,
+    load_lines,
+    path_knots,
+)
+from skinwave.bodies import build, compliance, operators, surface_load
+from skinwave.effort import Progress
+from skinwave.full import energy_balance
+from skinwave.prepared import reduced_lines, sample_times
+from skinwave.scene import Body, Scene
+from skinwave.web.model import SIDE, Answer, Map, answer_of, borderline, places
+
+HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
+SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
+TAIL = 0.4  # s that motion may last after the Tacton
+FURTHEST = 0.125  # m: from the far side of the largest path to a corner of the area
+FINER = 4  # places of a map's table in each interval of the table
+FAINTEST = 1e-4  # of the largest harmonic of the path
+MAPPED = 60  # lines that a map is made of, the strongest
+TOLERANCE = 0.02  # of a reduction
+BAND = 1000.0  # Hz
+# Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
+SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
+KEPT = 6  # reductions, tables and meshes each
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """g (f, r) in m/Pa at `frequencies` (f,) in Hz and `distances` (r,) in metre."""
+
+    frequencies: Floats
+    distances: Floats
+    g: fem.Complex
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reduced:
+    """A body reduced to the pressure along one path: reduced forces `load` (k, r) of the surface
+    `points` (k, 3), and displacement `read` (q, r) of the places `within` (SIDE^2,) the area.
+    """
+
+    poles: fem.Poles
+    damping: tuple[Floats, Floats]
+    load: Floats
+    points: Floats
+    read: Floats
+    within: Floats
+    probe: Callable[[Floats], Floats]
+    effort: Effort
+
+
+class Waves:
+    """Answers with a body; keeps what the next answer can use."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, dict[Any, Any]] = {"table": {}, "body": {}, "reduced": {}}
+
+    def __call__(self, scene: Scene, progress: Progress) -> Answer:
+        """The answer to a scene of one probe; raises what `simulate` does."""
+        if is_exact(scene.body):
+            flat = (scene.body, scene.pressure.height)
+            return flat_answer(self._keep("table", flat, lambda: tabulate(*flat, progress)), scene)
+        path = scene.tacton.trajectory
+        still = path if path.is_static else replace(path, speed=1.0)  # the same places
+        key = (scene.body, still, scene.pressure.height)
+        return reduced_answer(
+            self._keep("reduced", key, lambda: self._reduce(scene, progress)), scene
+        )
+
+    def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
+        made, ops = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
+        return reduced(made, ops, scene.pressure, progress)
+
+    def _keep(self, kind: str, key: Any, make: Callable[[], Any]) -> Any:
+        kept = self._kept[kind]
+        found = kept.pop(key) if key in kept else make()
+        kept[key] = found  # the newest is last
+        while len(kept) > KEPT:
+            del kept[next(iter(kept))]
+        return found
+
+
+def is_exact(body: Body) -> bool:
+    """Whether exact waves of an endless body stand for it."""
+    return body.kind == "slab" and body.is_plain and (
+        body.base == "clamped" or not isfinite(body.depth)
+    )  # fmt: skip
+
+
+def tabulate(body: Body, height: float, progress: Progress) -> Table:
+    """The table of a flat body and a height in metre."""
+    progress("exact waves of the slab", 0.0)
+    width = spot_width(height)
+    distances = np.linspace(0, FURTHEST, int(np.ceil(6 * FURTHEST / width)))
+    frequencies = np.arange(0.0, HIGHEST + SPACING, SPACING)
+    g = point_response(compliance(body), distances, 2 * np.pi * frequencies, width)
+    return Table(frequencies=frequencies, distances=distances, g=g)
+
+
+def flat_answer(table: Table, scene: Scene) -> Answer:
+    """Motion from rest of a scene's probe, and RMS motion of the area."""
+    pressure, times = scene.pressure, sample_times(scene)
+    response = Response(
+        model="flat-body", times=times, probes=scene.probe_points,
+        displacement=flat_motion(table, pressure, scene.probe_points[0], times)[:, None],
+    )  # fmt: skip
+    f, w = path_amplitudes(_steady(pressure))
+    away = np.linalg.norm(places()[:, None] - path_knots(pressure), axis=2)
+    fine = np.linspace(0, FURTHEST, FINER * len(table.distances))
+    index = np.rint(away / fine[1]).astype(np.int32)
+    of_lines = CubicSpline(table.frequencies, table.g, axis=0)(f)
+    of_lines = CubicSpline(table.distances, of_lines, axis=1)(fine).astype(np.complex64)
+    motion = np.array([g[index] @ weights for g, weights in zip(of_lines, w, strict=True)])
+    return answer_of(scene, response, motion_map(f, motion))
+
+
+def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Floats) -> Floats:
+    """Motion (t,) in metre of a probe (2,) from rest at times (t,) in s."""
+    dt, n = step(times), len(times)
+    padded = fft.next_fast_len(n + round(TAIL / dt), real=True)
+    t = np.arange(padded) * dt
+    f = np.fft.rfftfreq(padded, dt)
+    f = f[f <= HIGHEST]
+    gain = pressure.gain(t, over=dt) * (np.arange(padded) < n)
+    gain[0] /= 2  # as in `flat_body`
+    away = np.linalg.norm(probe - path_knots(pressure), axis=1)
+    h = along_path(CubicSpline(table.distances, table.g, axis=1)(away))
+    orders = harmonics(h.shape[1])
+    h[:, orders] *= foci_harmonics(pressure, orders)
+    orders = orders[np.abs(h[:, orders]).max(axis=0) > FAINTEST * np.abs(h).max()]
+    h = CubicSpline(table.frequencies, h[:, orders], axis=0)(f)
+    turn = np.exp(2j * np.pi * pressure.tacton.trajectory.drawing_frequency * t)
+    u = np.zeros(padded // 2 + 1, np.complex128)
+    for column, order in zip(h.T, orders, strict=True):
+        driven = fft.fft(gain * turn**order)[: len(f)]
+        u[: len(f)] += column * driven
+    return np.asarray(fft.irfft(u, padded)[:n])
+
+
+def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
+    """Frequencies (f,) in Hz of the strongest lines, and their w (f, k) in Pa at the knots."""
+    found = load_lines(pressure, 1e-3)
+    heard = (found.frequencies > 1e-6) & (found.frequencies <= BAND)
+    knots = len(path_knots(pressure))
+    phases = (np.arange(knots) + 0.5) / knots
+    f, which = np.unique(np.round(found.frequencies[heard], 9), return_inverse=True)
+    waves = np.exp(-2j * np.pi * found.harmonics[heard, None] * phases) / knots
+    w = np.zeros((len(f), knots), np.complex128)
+    np.add.at(w, which, found.coefficients[heard, None] * waves)
+    strength = np.zeros(len(f))
+    np.maximum.at(strength, which, found.strengths[heard])
+    strongest = np.sort(np.argsort(-strength)[:MAPPED])
+    return f[strongest], w[strongest]
+
+
+def motion_map(frequencies: Floats, motion: fem.Complex) -> Map:
+    """The map of lines (f,) in Hz whose complex amplitudes (f, SIDE^2) in metre are known."""
+    amplitudes = np.abs(motion)
+    felt = sensation_level(amplitudes, frequencies[:, None]) if len(frequencies) else -np.inf
+    level = np.broadcast_to(np.max(felt, axis=0, initial=-200.0), SIDE**2)
+    rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
+    level = np.where(np.isnan(rms), np.nan, level.reshape(SIDE, SIDE))
+    return Map(rms=rms, felt=borderline(level, 0.0))
+
+
+def _steady(pressure: MovingPressure) -> MovingPressure:
+    """The same pressure while a pulse of its rhythm is on."""
+    return replace(pressure, tacton=replace(pressure.tacton, rhythm=None))
+
+
+def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
+    progress("mesh", 0.0)
+    made = build(body, min(SIZES[body.kind], body.depth) if body.kind != "sheet"
+                 else SIZES["sheet"])  # fmt: skip
+    progress("assemble", 0.0)
+    return made, operators(made)
+
+
+def reduced(made: Any, ops: Any, pressure: MovingPressure, progress: Progress) -> Reduced:
+    """A meshed and assembled body, reduced to a pressure's path."""
+    progress("factorise", 0.0)
+    P, points = surface_load(made)
+    spots = pressure.spot(points, path_knots(pressure))
+    seeds = fem.load_subspace(P @ spots.T, TOLERANCE / 5)
+    model = fem.reduce(
+        ops, sparse.csr_array(seeds.T), BAND, TOLERANCE,
+        progress=lambda done: progress("reduce", done),
+    )  # fmt: skip
+    progress("read the surface", 1.0)
+    inwards = (1 - 1e-6) * places()  # a body may end where the area does
+    within = _on(made.mesh, inwards)
+    read = fem.probe_operator(made.mesh, inwards[within]) @ model.basis
+    basis, mesh = model.basis, made.mesh
+    return Reduced(
+        poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=(model.C, model.R),
+        load=P.T @ basis, points=points, read=read, within=within,
+        probe=lambda at: fem.probe_operator(mesh, at) @ basis,
+        effort=Effort(
+            dofs=len(ops.free), reduced_dofs=len(model.K), solver=model.solver,
+            estimate=model.estimate,
+        ),
+    )  # fmt: skip
+
+
+def _on(mesh: Any, points: Floats) -> Any:
+    """Which points (n,) lie on the top of a mesh, seen from above."""
+    a, b, c = np.moveaxis(mesh.points[mesh.facets["top"][:, :3], :2], 1, 0)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    area = ux * vy - uy * vx
+    found = []
+    for part in np.array_split(points, len(points) // 64 + 1):
+        dx, dy = np.moveaxis(part[:, None] - a, -1, 0)
+        s, t = (dx * vy - dy * vx) / area, (ux * dy - uy * dx) / area
+        found.append(((s >= -1e-6) & (t >= -1e-6) & (s + t <= 1 + 1e-6)).any(axis=1))
+    return np.concatenate(found)
+
+
+def reduced_answer(body: Reduced, scene: Scene) -> Answer:
+    """Motion from rest of a scene's probe, and RMS motion of the area."""
+    times = sample_times(scene)
+    frequencies, forces = reduced_lines(scene.pressure, body.points, body.load)
+    motion, start = fem.line_response(body.poles, forces, frequencies)
+    energy_balance(fem.mean_power(*body.damping, forces, motion, frequencies))
+    probe = body.probe(scene.probe_points)
+    rates = np.concatenate([2j * np.pi * frequencies, body.poles.values])
+    displacement = fem.exponential_sum(rates, np.vstack([motion @ probe.T, start @ probe.T]), times)
+    response = Response(
+        model="fem", times=times, probes=scene.probe_points, displacement=displacement,
+        effort=body.effort,
+    )  # fmt: skip
+    if scene.tacton.rhythm:
+        frequencies, forces = reduced_lines(_steady(scene.pressure), body.points, body.load)
+        motion, _ = fem.line_response(body.poles, forces, frequencies)
+    heard = (frequencies > 1e-6) & (frequencies <= BAND)
+    area = np.full((int(heard.sum()), SIDE**2), np.nan, np.complex128)
+    area[:, body.within] = motion[heard] @ body.read.T
+    return answer_of(scene, response, motion_map(frequencies[heard], area))

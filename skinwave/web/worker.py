@@ -1,0 +1,130 @@
+"""A process that answers with a body, so that a page never waits: newest question first, cancel."""
+
+import contextlib
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+Told = Callable[[str, int, Any], None]  # what, number of the question, content
+LEAST_STEP = 0.02  # of progress that is told
+
+
+def answer_forever(pipe: Connection) -> None:
+    """Answer questions (number, scene) until the other end is closed.
+
+    Tells ("progress", number, (phase, fraction)), then ("answer", number, Answer) or
+    ("failed", number, sentence).
+    """
+    from skinwave.web.waves import Waves
+
+    with contextlib.suppress(AttributeError, OSError):
+        os.nice(5)  # the page comes first
+    waves = Waves()
+    with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
+        while True:
+            number, scene = pipe.recv()
+            try:
+                found = waves(scene, _teller(pipe, number))
+            except (ValueError, ArithmeticError, MemoryError) as error:
+                said = " ".join(str(error).split()) or "not enough memory for this body"
+                pipe.send(("failed", number, said))
+            else:
+                pipe.send(("answer", number, found))
+
+
+def _teller(pipe: Connection, number: int) -> Callable[[str, float], None]:
+    last: list[tuple[str, float]] = [("", 0.0)]
+
+    def tell(phase: str, fraction: float) -> None:
+        before, done = last[0]
+        if phase != before or abs(fraction - done) > LEAST_STEP:
+            last[0] = (phase, fraction)
+            pipe.send(("progress", number, (phase, fraction)))
+
+    return tell
+
+
+class Worker:
+    """The process and the one question that it is at; of those that wait only the newest counts.
+
+    `told` is called from a thread of this process with everything that the other one tells.
+    """
+
+    def __init__(self, told: Told) -> None:
+        self._told = told
+        self._process: Any = None
+        self._pipe: Any = None
+        self._lock = threading.Lock()
+        self._at: int | None = None
+        self._waiting: tuple[int, Any] | None = None
+
+    def ask(self, number: int, scene: Any) -> None:
+        """Ask for a scene's answer; an older question that still waits is forgotten."""
+        with self._lock:
+            if self._at is not None:
+                self._waiting = (number, scene)
+                return
+            self._start()
+            self._send(number, scene)
+
+    def cancel(self) -> None:
+        """Forget all questions, and end the process if it is at one."""
+        with self._lock:
+            self._waiting = None
+            if self._at is not None:
+                self._at = None
+                self._end()
+
+    def close(self) -> None:
+        """End the process."""
+        with self._lock:
+            self._waiting = self._at = None
+            self._end()
+
+    def _start(self) -> None:
+        if self._process is not None and self._process.is_alive():
+            return
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=answer_forever, args=(other,), daemon=True)
+        self._process.start()
+        other.close()
+        threading.Thread(target=self._listen, args=(self._pipe,), daemon=True).start()
+
+    def _send(self, number: int, scene: Any) -> None:
+        self._at = number
+        self._pipe.send((number, scene))
+
+    def _end(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.join(5)
+        self._process = self._pipe = None
+
+    def _listen(self, pipe: Connection) -> None:
+        while True:
+            try:
+                what, number, content = pipe.recv()
+            except (EOFError, OSError):
+                break
+            self._told(what, number, content)
+            if what != "progress":
+                self._next(number)
+        with self._lock:
+            lost = self._at if pipe is self._pipe else None
+            if pipe is self._pipe:
+                self._at = self._waiting = self._process = self._pipe = None
+        if lost is not None:
+            self._told("failed", lost, "the process that answers has ended; choose the body again")
+
+    def _next(self, number: int) -> None:
+        with self._lock:
+            if self._at != number:
+                return
+            self._at = None
+            if self._waiting is not None:
+                waiting, self._waiting = self._waiting, None
+                self._send(*waiting)

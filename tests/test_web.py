@@ -1,0 +1,436 @@
+"""The interactive tool: its model, its state without a browser, and the page itself."""
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from io import BytesIO
+from queue import Queue
+
+import numpy as np
+import pytest
+
+from simple_model import commanded, spectrum
+from simple_model.flat_body import steady_lines
+from simple_model.focus import lobe_width
+from skinwave.bodies import compliance
+from skinwave.cli import main
+from skinwave.paper15 import tactons
+from skinwave.scene import BODIES, Body
+from skinwave.scene_file import dumps, loads
+from skinwave.simulation import simulate
+from skinwave.web import check_extra, controls, model, plots, waves
+from skinwave.web.controls import STARTS
+from skinwave.web.history import History
+from skinwave.web.worker import Worker
+
+
+def nothing(phase, fraction):
+    pass
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A short Tacton of AM and STM on the slab."""
+    return model.scene_of(STARTS | {"body": "skin-slab", "duration": 0.15, "x": 7.3, "y": -2.1})
+
+
+def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"pip install 'skinwave\[web\]'"):
+        check_extra()
+    assert main(["web"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_help_and_import_load_no_page():
+    code = "import sys, skinwave, skinwave.cli as c\ntry: c.main(['web', '--help'])\n"
+    code += "except SystemExit: pass\nassert not {'trame', 'numpy', 'aiohttp'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_a_scene_that_no_control_says_is_refused_by_the_command(tmp_path, capsys):
+    pytest.importorskip("trame")
+    path = tmp_path / "own.toml"
+    path.write_text('[tacton]\nshape = "polyline"\npoints_mm = [[0, 0], [5, 5]]\n')
+    assert main(["web", str(path)]) == 2
+    assert "a path of its own points cannot be turned here" in capsys.readouterr().err
+
+
+# Controls
+
+
+def test_an_address_carries_every_control():
+    changed = STARTS | {
+        "amplitude": 55.0, "am": 33.5, "am2": 210.0, "ratio": "0.25:0.75", "envelope": 2.5,
+        "duration": 0.7, "shape": "triangle", "size": 31.5, "speed": 4.2, "height": 150.0,
+        "drive": "force_corrected", "body": "palm", "foci": 3, "sharing": "time_multiplexed",
+        "pulses": "100/50, 40/110", "ramp": 5.0, "x": -3.21, "y": 4.0,
+    }  # fmt: skip
+    assert set(changed) == set(STARTS)
+    assert all(changed[key] != STARTS[key] for key in STARTS)
+    assert controls.from_query(controls.to_query(changed)) == (changed, ())
+    assert controls.to_query(STARTS) == ""
+
+
+@pytest.mark.parametrize(
+    ("key", "given", "said"),
+    [
+        ("size", "61", "61 mm is outside 0 to 60 mm"),
+        ("size", "wide", "'wide' is no number"),
+        ("am", "nan", "outside 0 to 500 Hz"),
+        ("duration", "0", "0 s is outside 0.01 to 10 s"),
+        ("foci", "2.5", "give a whole number"),
+        ("shape", "circel", "did you mean 'circle'"),
+        ("pulses", "100", "give on/off in ms, such as 100/50"),
+        ("pulses", "0/10", "lasts longer than 0 ms"),
+    ],
+)
+def test_what_is_wrong_is_said(key, given, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        controls.checked(key, given)
+    values, refused = controls.from_query(f"{key}={given}&am2=7")
+    assert values[key] == STARTS[key]
+    assert values["am2"] == 7
+    assert said in refused[0]
+
+
+def test_presets_are_the_papers_tactons():
+    found = controls.presets()
+    assert len(found) == 15
+    for name, tacton in tactons():
+        made = model.scene_of(STARTS | found[name]).tacton
+        assert made.trajectory.drawing_frequency == pytest.approx(
+            tacton.trajectory.drawing_frequency
+        )
+        assert (made.am_frequency, made.duration) == (tacton.am_frequency, tacton.duration)
+
+
+def test_a_scene_goes_through_its_file_and_back_to_the_controls():
+    values = STARTS | {"body": "palm", "pulses": "100/50", "ramp": 5.0, "foci": 2, "am": 90.0}
+    assert model.values_of(loads(dumps(model.scene_of(values)))) == values
+
+
+def test_a_body_of_ones_own_stays():
+    own = Body(depth=0.008)
+    values = model.values_of(replace(model.scene_of(STARTS), body=own))
+    assert values["body"] == controls.OWN_BODY
+    assert model.scene_of(values, own).body == own
+
+
+def test_a_held_drawing_frequency_moves_the_other():
+    before = model.scene_of(STARTS).tacton.trajectory.drawing_frequency
+    for moved, given in (("size", 30.0), ("speed", 6.0), ("shape", "square")):
+        values = STARTS | {moved: given}
+        values |= model.held(values, moved, before)
+        assert model.scene_of(values).tacton.trajectory.drawing_frequency == pytest.approx(before)
+        assert values[moved] == given
+    with pytest.raises(ValueError, match="outside 0 to 40 m/s"):
+        model.held(STARTS | {"size": 60.0, "shape": "square"}, "size", before)
+
+
+def test_undo_takes_a_drawn_slider_as_one_move():
+    history = History(STARTS)
+    for am in (141, 142, 143):
+        history.push(STARTS | {"am": am})
+    history.push(STARTS | {"am": 143, "size": 10})
+    assert history.undo()["size"] == STARTS["size"]
+    assert history.undo() == STARTS
+    assert history.undo() is None
+    assert history.redo()["am"] == 143
+    assert history.redo()["size"] == 10
+    assert history.redo() is None
+
+
+# What is shown
+
+
+def test_what_is_shown_is_what_simulate_answers():
+    scene = model.scene_of(STARTS)
+    shown, alone = model.kernel(scene), simulate(scene, "point-kernel")
+    f, amplitude = spectrum(alone)
+    plot = plots.spectrum_plot(shown, None, (), False, highest=600)["data"][0]
+    assert plot["x"] == pytest.approx(f[f <= 600])
+    assert plot["y"] == pytest.approx(amplitude[f <= 600, 0], abs=1e-4 * amplitude.max())
+    named = {line.name: line for line in shown.lines}
+    assert named["f_AM"].amplitude == pytest.approx(amplitude[140, 0], rel=1e-3)
+    assert [line.amplitude for line in shown.lines] == sorted(
+        (line.amplitude for line in shown.lines), reverse=True
+    )
+
+
+def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
+    pressure = model.scene_of(STARTS).pressure
+    t = np.random.default_rng(1).random(4000)
+    sampled = pressure(model.places(), t).std(axis=0).reshape(model.SIDE, model.SIDE)
+    found = model.kernel_map(pressure)
+    assert np.abs(found.rms - sampled).max() < 0.05 * sampled.max()
+    # Beyond the borderline the pressure never exceeds what is just felt, on it somewhere it does.
+    outermost = max(found.felt, key=lambda line: np.abs(line).max())
+    highest = np.abs(pressure(outermost, np.linspace(0, 1, 4001))).max(axis=0)
+    assert highest.max() == pytest.approx(4.4, rel=0.03)
+
+
+def test_the_influenced_area_ends_a_main_lobe_from_the_path():
+    path = model.scene_of(STARTS).tacton.trajectory
+    outer, inner = (
+        sorted(model.influenced(path, 0.2), key=lambda x: -np.linalg.norm(x, axis=1).max())[:1] * 2
+    )
+    assert outer is inner  # D0 exceeds the radius: no hole
+    assert np.linalg.norm(outer, axis=1) == pytest.approx(0.01 + lobe_width(0.2), rel=0.01)
+
+
+def test_the_carrier_is_shown_where_it_can_be_resolved():
+    tacton = model.scene_of(STARTS).tacton
+    t, p, resolved = model.commanded_curve(tacton, 0.001, 0.002)
+    assert resolved
+    assert p == pytest.approx(commanded(tacton, t))
+    t, p, resolved = model.commanded_curve(tacton, 0, 1)
+    assert not resolved
+    assert len(t) <= model.MOST_SHOWN
+    assert p.max() == pytest.approx(1, abs=0.05)
+
+
+def test_a_thinned_curve_keeps_its_peaks():
+    y = np.zeros(100_003)
+    y[[5, 777, 100_002]] = 3, -2, 9
+    x, thin = model.thinned(np.arange(100_003.0), y)
+    assert len(x) <= 1.05 * model.MOST_SHOWN
+    assert set(thin) == {0, 3, -2, 9}
+    assert (np.diff(x) > 0).all()
+
+
+# Waves
+
+
+def test_tabulated_waves_are_the_exact_ones(scene):
+    shown = waves.Waves()(scene, nothing)
+    exact = simulate(scene, "flat-body").displacement[:, 0]
+    error = shown.response.displacement[:, 0] - exact
+    assert np.linalg.norm(error) < 2e-3 * np.linalg.norm(exact)
+    # RMS over the area against exact lines at some places.
+    some = np.random.default_rng(0).choice(model.SIDE**2, 12, replace=False)
+    f, a = steady_lines(compliance(scene.body), scene.pressure, model.places()[some])
+    rms = np.sqrt((np.abs(a[f > 0]) ** 2).sum(axis=0) / 2)
+    assert shown.map.rms.ravel()[some] == pytest.approx(rms, rel=0.02)
+
+
+def test_tabulated_waves_follow_pulses_and_foci(scene):
+    tacton = model.scene_of(STARTS | {"pulses": "30/20", "foci": 3, "duration": 0.15}).tacton
+    scene = replace(scene, pressure=replace(scene.pressure, tacton=tacton))
+    shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
+    exact = simulate(scene, "flat-body").displacement[:, 0]
+    assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
+    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+    values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
+    answered, scene = waves.Waves(), model.scene_of(values, own)
+    shown = answered(scene, nothing)
+    alone = simulate(scene, "fem", h=5e-3).displacement[:, 0]
+    assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
+    said = []
+    faster = answered(model.scene_of(values | {"speed": 9.0}, own), lambda *told: said.append(told))
+    assert not said  # nothing was reduced anew
+    assert faster.lines[0].sensation > 0
+    # Beside the body there is no map, on it everywhere.
+    edge, on = 1e3 * np.abs(model.places()).max(axis=1), np.isfinite(shown.map.rms).ravel()
+    assert on[edge < 29.9].all()
+    assert not on[edge > 30.1].any()
+    assert plots.picture(shown.map).startswith("data:image/png;base64,")
+
+
+@pytest.mark.slow
+def test_a_palm_answers(monkeypatch):
+    monkeypatch.setitem(waves.SIZES, "palm", 9e-3)
+    values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
+    answered = waves.Waves()
+    shown = answered(model.scene_of(values), nothing)
+    assert np.isnan(shown.map.rms[0, 0])
+    assert np.isfinite(shown.map.rms[model.SIDE // 2, model.SIDE // 2])
+    with pytest.raises(ValueError, match="beside"):
+        answered(model.scene_of(values | {"x": 42.0, "y": 49.0}), nothing)
+
+
+def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
+    told = Queue()
+    worker = Worker(lambda *content: told.put(content))
+    try:
+        for number in range(1, 5):
+            worker.ask(number, scene)
+        answered = []
+        while 4 not in answered:
+            what, number, _ = told.get(timeout=60)
+            answered += [number] if what == "answer" else []
+        assert answered[-1] == 4
+        assert len(answered) <= 2
+        worker.ask(5, replace(scene, body=BODIES["palm"]))
+        while told.get(timeout=60)[:2] != ("progress", 5):
+            pass
+        worker.cancel()
+        worker.ask(6, scene)
+        while (last := told.get(timeout=60))[:2] != ("answer", 6):
+            assert last[0] != "answer"
+    finally:
+        worker.close()
+
+
+# The state of a page, without a browser
+
+
+@pytest.fixture
+def session(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    made = session_of(get_server(request.node.name, client_type="vue3"))
+    made.state.ready()
+    yield made
+    made.worker.close()
+
+
+def test_a_move_changes_what_is_shown(session):
+    before = session.state.spectrum_plot
+    with session.state:
+        session.state.am = 200
+    assert session.state.spectrum_plot != before
+    assert session.state.query == "am=200"
+    assert session.scene.tacton.am_frequency == 200
+    assert session.state.undoable
+    with session.state:
+        session.undo()
+    assert session.state.am == 140
+    assert session.state.spectrum_plot == before
+
+
+def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
+    before = session.state.spectrum_plot
+    with session.state:
+        session.turn({"size": "70"})
+    assert "outside 0 to 60 mm" in session.state.errors["size"]
+    assert session.state.size == STARTS["size"]
+    assert session.state.spectrum_plot == before
+    with session.state:
+        session.turn({"size": "30"})
+    assert session.state.errors == {}
+    with session.state:
+        session.turn({"pulses": "5/5", "ramp": 100})
+    assert "ramp" in session.state.problem
+    assert session.state.stale
+
+
+def test_waves_are_stale_until_they_are_answered(session):
+    with session.state:
+        session.state.body = "skin-slab"
+    assert session.state.waves_stale
+    assert [d["name"] for d in session.state.waveform_plot["data"]] == ["point kernel, Pa"]
+    answer = waves.Waves()(session.scene, nothing)
+    with session.state:
+        session.told("answer", session._number - 1, answer)
+    assert session.state.waves_stale, "an older answer is not shown"
+    with session.state:
+        session.told("progress", session._number, ("reduce", 0.5))
+    assert (session.state.busy, session.state.done) == ("reduce", 50)
+    with session.state:
+        session.told("answer", session._number, answer)
+    assert not session.state.waves_stale
+    drawn = {d["name"]: d for d in session.state.spectrum_plot["data"]}
+    assert drawn["waves (flat-body), µm"]["opacity"] == 1
+    assert any("threshold" in name for name in drawn)
+    with session.state:
+        session.state.am = 150
+    drawn = {d["name"]: d for d in session.state.waveform_plot["data"]}
+    assert drawn["waves (flat-body), µm — being computed"]["opacity"] == plots.STALE
+    with session.state:
+        session.told("failed", session._number, "it cannot be")
+    assert session.state.problem == "it cannot be"
+    with session.state:
+        session.cancel()
+    assert session.state.body == "none"
+    assert not session.state.busy
+
+
+def test_a_held_frequency_and_a_preset(session):
+    with session.state:
+        session.state.hold = True
+    with session.state:
+        session.state.size = 30
+    assert session.state.speed == pytest.approx(18)
+    assert session.state.drawing_frequency == pytest.approx(190.986, abs=1e-3)
+    with session.state:
+        session.state.shape, session.state.size = "square", 60
+    assert "cannot be held" in session.state.errors["hold"]
+    with session.state:
+        session.state.hold = False
+    with session.state:
+        session.preset("am210-stm10")
+    assert (session.state.am, session.state.size, session.state.errors) == (210, 10, {})
+
+
+def test_pinning_keeps_and_exchanges(session):
+    with session.state:
+        session.pin()
+        session.state.am = 90
+    assert any(d["name"] == "pinned kernel" for d in session.state.spectrum_plot["data"])
+    with session.state:
+        session.take_pinned()
+    assert session.state.am == 140
+    with session.state:
+        session.take_pinned()
+    assert session.state.am == 90
+    with session.state:
+        session.pin()
+    assert len(session.state.waveform_plot["data"]) == 1
+
+
+def test_what_is_saved_can_be_opened(session):
+    from PIL import Image
+    from scipy.io import wavfile
+
+    with session.state:
+        session.turn({"pulses": "100/50", "am": 90, "size": 12})
+    kept, values = session.scene_toml().decode(), session.values
+    with session.state:
+        session.preset("am80")
+        session.open_scene(kept)
+    assert session.values == values
+    rate, samples = wavfile.read(BytesIO(session.waveform_wav()))
+    assert (rate, len(samples)) == (10_000, 10_000)
+    lines = session.waveform_csv().decode().splitlines()
+    assert lines[0] == '"time, s","pressure at (10, 0) mm, Pa (point-kernel)"'
+    assert len(lines) == 10_001
+    assert b"<svg" in session.figure("svg")
+    assert Image.open(BytesIO(session.figure("png"))).width > 1000
+    with session.state:
+        session.open_scene("[tacton]\nam = 5")
+    assert "the scene cannot be opened" in session.state.problem
+    with session.state:
+        session.on_file({"content": kept.encode()})
+    assert session.state.problem == ""
+
+
+def test_zooming_in_shows_the_carrier(session):
+    assert "envelope" in session.state.commanded_plot["layout"]["title"]["text"]
+    with session.state:
+        session.zoom({"xaxis.range[0]": 10.0, "xaxis.range[1]": 11.0})
+    assert "with its 40 kHz carrier" in session.state.commanded_plot["layout"]["title"]["text"]
+    with session.state:
+        session.zoom({"xaxis.autorange": True})
+    assert "envelope" in session.state.commanded_plot["layout"]["title"]["text"]
+
+
+def test_an_address_begins_a_page_and_what_is_wrong_in_it_is_said(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    server = get_server(request.node.name, client_type="vue3")
+    session = session_of(server, "", {"am": "77", "size": "900", "application": "trame"})
+    assert (session.state.am, session.state.size) == (77, STARTS["size"])
+    assert "size: 900 mm is outside" in session.state.problem
+    assert "application" not in session.state.problem

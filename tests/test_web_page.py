@@ -1,0 +1,370 @@
+"""The interactive tool in a browser: what a user does, and what is then to be seen."""
+
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simple_model import spectrum
+from skinwave.scene_file import loads
+from skinwave.simulation import simulate
+from skinwave.web import controls, model
+from skinwave.web.controls import NUMBERS, STARTS
+
+ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+PATIENCE = 60_000  # ms; other work on the machine may take most of it
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no browser here"),
+]
+for name in ("playwright", "trame", "trame_plotly", "trame_vuetify"):
+    pytest.importorskip(name)
+
+
+def served(*arguments):
+    """A server in a process of its own, and its address."""
+    command = [sys.executable, "-m", "skinwave", "web", *arguments]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    return process, re.search(r"http://\S+/", process.stderr.readline()).group()
+
+
+def ended(process):
+    process.terminate()
+    said = process.communicate(timeout=20)[1]
+    assert "Traceback" not in said, said
+
+
+@pytest.fixture(scope="module")
+def address():
+    process, address = served("--port", "0")
+    yield address
+    ended(process)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+class Logs:
+    def __init__(self):
+        self.asked, self.errors = [], []
+
+
+def opened(browser, address, query="", **viewport):
+    size = {"width": 1280, "height": 720} | viewport
+    page, logs = browser.new_page(viewport=size), Logs()
+    page.set_default_timeout(PATIENCE)
+    page.on("request", lambda request: logs.asked.append(request.url))
+    page.on("pageerror", lambda error: logs.errors.append(str(error)))
+    page.on("console", lambda m: logs.errors.append(m.text) if m.type == "error" else None)
+    page.goto(address + query)
+    page.wait_for_selector("#spectrum_plot .main-svg")
+    return page, logs
+
+
+@pytest.fixture(scope="module")
+def visit(browser, address):
+    return opened(browser, address)
+
+
+@pytest.fixture
+def page(visit):
+    """The page as it is at the beginning."""
+    page = visit[0]
+    page.evaluate("q => window.trame.trigger('restart', [q])", "")
+    state_becomes(page, "query", "")
+    return page
+
+
+def state(page, key):
+    return page.evaluate("key => window.trame.state.get(key)", key)
+
+
+def state_becomes(page, key, value):
+    page.wait_for_function(
+        "([key, value]) => JSON.stringify(window.trame.state.get(key)) === value",
+        arg=[key, json.dumps(value, separators=(",", ":"))],
+    )
+
+
+def query_has(page, part):
+    """What the session answered with: the address of the page."""
+    page.wait_for_function("part => decodeURIComponent(location.search).includes(part)", arg=part)
+
+
+def drawn(page, plot):
+    """The curves that plotly draws."""
+    return page.evaluate(
+        """plot => { const at = document.getElementById(plot);
+        const drawn = at.data ? at : at.querySelector('.js-plotly-plot');
+        return drawn.data.map(d => ({name: d.name, x: [...(d.x || [])], y: [...d.y]})) }""",
+        plot,
+    )
+
+
+def latencies(page, key, count, until):
+    """Seconds from each of `count` key presses on a slider until a plot has been drawn, in which
+    `until`, an expression of its `data`, is true.
+    """
+    found = page.evaluate(
+        """async ([key, count, until]) => {
+        const slider = document.querySelector(`.sw-row:has(#${key}-field) [role=slider]`);
+        const at = document.getElementById('spectrum_plot');
+        const plot = at.data ? at : at.querySelector('.js-plotly-plot');
+        const good = new Function('data', 'return ' + until), times = [];
+        slider.focus();
+        for (let k = 0; k < count; k++) {
+          const before = JSON.stringify(plot.data[0].y), start = performance.now();
+          const done = new Promise(resolve => {
+            const look = () => {
+              if (JSON.stringify(plot.data[0].y) !== before && good(plot.data)) {
+                plot.removeListener('plotly_afterplot', look);
+                resolve(performance.now() - start);
+              }
+            };
+            plot.on('plotly_afterplot', look);
+          });
+          slider.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}));
+          times.push(await done);
+          await new Promise(resolve => setTimeout(resolve, 100));
+        }
+        return times }""",
+        [key, count, until],
+    )
+    return np.array(found) / 1e3
+
+
+def choose(page, key, title):
+    page.locator(f".v-field:has(#{key})").click()
+    page.get_by_role("option", name=title).click()
+
+
+def photographed(page, name):
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=ARTEFACTS / f"web-{name}.png")
+
+
+def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
+    page.locator(".sw-row:has(#am-field) [role=slider]").press("ArrowRight")
+    query_has(page, "am=141")
+    values = controls.from_query(page.evaluate("location.search.slice(1)"))[0]
+    f, amplitude = spectrum(simulate(model.scene_of(values), "point-kernel"))
+    page.wait_for_function("() => true")
+    shown = drawn(page, "spectrum_plot")[0]
+    assert np.allclose(shown["x"], f[f <= 600], atol=1e-2)
+    assert np.allclose(shown["y"], amplitude[f <= 600, 0], atol=1e-4 * amplitude.max())
+    named = model.kernel(model.scene_of(values)).lines[0]
+    row = page.locator("#lines tr").nth(1).locator("td")
+    assert row.nth(1).inner_text() == f"{named.frequency:.1f}"
+    assert row.nth(2).inner_text() == f"{named.amplitude:.3g}"
+    photographed(page, "kernel")
+
+
+@pytest.mark.parametrize("key", [key for key in NUMBERS if key != "ramp"])
+def test_a_slider_and_a_field_turn_each_number(page, key):
+    number, row = NUMBERS[key], page.locator(f".sw-row:has(#{key}-field)")
+    way = -1 if number.start == number.high else 1
+    row.locator("[role=slider]").press("ArrowRight" if way > 0 else "ArrowLeft")
+    expected = number.start + way * number.step
+    state_becomes(page, "query", controls.to_query(STARTS | {key: round(expected, 6)}))
+    assert float(page.locator(f"#{key}-field").input_value()) == pytest.approx(expected)
+    page.locator(f"#{key}-field").fill(f"{number.low + 3 * number.step:g}")
+    query_has(page, f"{key}={number.low + 3 * number.step:g}")
+    page.locator(f"#{key}-field").fill("1e9")
+    page.wait_for_selector(f"#{key}-error")
+    assert "is outside" in page.locator(f"#{key}-error").inner_text()
+    assert page.locator(f"#{key}-field").get_attribute("aria-invalid") == "true"
+
+
+def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
+    choose(page, "ratio", "0.25:0.75")
+    query_has(page, "ratio=0.25:0.75")
+    choose(page, "drive", "pressure squared")
+    query_has(page, "drive=pressure_squared")
+    page.locator("#foci-field").fill("3")
+    choose(page, "sharing", "in turn")
+    query_has(page, "sharing=time_multiplexed")
+    assert len(state(page, "foci_at")) == 3
+    for shape in ("point", "line", "triangle", "square"):
+        page.locator(f"#shape-{shape}").click()
+        query_has(page, f"shape={shape}")
+    page.locator("#pulses-field").fill("100/50, 40/110")
+    query_has(page, "pulses=100/50")
+    page.wait_for_selector(".sw-timeline")
+    page.locator("#ramp-field").fill("10")
+    query_has(page, "ramp=10")
+    photographed(page, "rhythm")
+    page.locator("#pulses-field").fill("")
+    page.locator("#hold").check()
+    held = page.locator("#drawing").inner_text()
+    page.locator("#size-field").fill("14")
+    query_has(page, "speed=8.4")
+    assert page.locator("#drawing").inner_text() == held
+    page.locator("#hold").uncheck()
+
+
+def test_presets_undo_redo_pin_and_looks(page):
+    page.locator("#presets").click()
+    page.locator("#preset-am80-stm30").click()
+    query_has(page, "am=80")
+    page.locator("#undo").click()
+    state_becomes(page, "query", "")
+    page.locator("#redo").click()
+    query_has(page, "size=30")
+    page.locator("#pin").click()
+    page.locator("#undo").click()
+    page.wait_for_function("() => window.trame.state.get('spectrum_plot').data.length === 3")
+    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel"
+    page.locator("#swap").click()
+    query_has(page, "size=30")
+    photographed(page, "pinned")
+    page.locator("#pin").click()
+    choose(page, "span", "all")
+    page.wait_for_function("() => window.trame.state.get('waveform_plot').data[0].x.at(-1) > 900")
+    choose(page, "span", "first 60 ms")
+    choose(page, "highest", "300")
+    page.wait_for_function(
+        "() => window.trame.state.get('spectrum_plot').layout.xaxis.range[1] === 300"
+    )
+    choose(page, "highest", "600")
+
+
+def test_a_click_or_a_key_on_the_map_selects(page):
+    area = page.locator("#kernel-map")
+    frame = area.locator("rect").bounding_box()
+    for x, y in ((12.3, -7.8), (-31.4, 22.2)):
+        at = ((x + 50) / 100 * frame["width"], (50 - y) / 100 * frame["height"])
+        page.mouse.click(frame["x"] + at[0], frame["y"] + at[1])
+        page.wait_for_function("x => Math.abs(window.trame.state.get('x') - x) < 0.5", arg=x)
+        assert abs(state(page, "y") - y) < 0.5
+    before = state(page, "x")
+    area.press("ArrowRight")
+    page.wait_for_function("x => window.trame.state.get('x') > x + 0.9", arg=before)
+
+
+def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
+    frame = page.locator("#commanded_plot .nsewdrag").first.bounding_box()
+    middle = frame["y"] + frame["height"] / 2
+    page.mouse.move(frame["x"] + 200, middle)
+    page.mouse.down()
+    page.mouse.move(frame["x"] + 206, middle + 1)
+    page.mouse.move(frame["x"] + 214, middle + 2)
+    page.mouse.up()
+    page.wait_for_function(
+        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('with its')"
+    )
+    photographed(page, "carrier")
+    page.mouse.dblclick(frame["x"] + 200, middle)
+    page.wait_for_function(
+        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('envelope')"
+    )
+
+
+def test_what_is_saved_opens_again(page, tmp_path):
+    page.locator("#am-field").fill("95")
+    query_has(page, "am=95")
+    for item, start in (("scene-toml", b"name ="), ("waveform-csv", b'"time'),
+                        ("waveform-wav", b"RIFF"), ("figure-svg", b"<?xml"),
+                        ("figure-png", b"\x89PNG")):  # fmt: skip
+        page.locator("#save").click()
+        with page.expect_download() as saved:
+            page.locator(f"#save-{item}").click()
+        saved.value.save_as(tmp_path / item)
+        assert (tmp_path / item).read_bytes().startswith(start), item
+    assert loads((tmp_path / "scene-toml").read_text()).tacton.am_frequency == 95
+    page.locator("#am-field").fill("96")
+    query_has(page, "am=96")
+    (tmp_path / "again.toml").write_bytes((tmp_path / "scene-toml").read_bytes())
+    page.locator("input[type=file]").set_input_files(tmp_path / "again.toml")
+    query_has(page, "am=95")
+
+
+def test_plots_follow_a_slider_and_waves_come_with_a_body(page):
+    kernel = latencies(page, "am", 8, "true")
+    choose(page, "body", "skin-slab")
+    state_becomes(page, "waves_stale", False)
+    page.wait_for_function("() => window.trame.state.get('wave_map').picture")
+    shown = drawn(page, "waveform_plot")
+    assert [curve["name"] for curve in shown] == ["point kernel, Pa", "waves (flat-body), µm"]
+    current = "data.some(d => d.name === 'waves (flat-body), µm')"
+    overlay = latencies(page, "am", 8, current)
+    photographed(page, "waves")
+    for what, times in (("point kernel", kernel), ("waves", overlay)):
+        print(f"{what}: median {statistics.median(times):.3f} s, largest {times.max():.3f} s")
+    assert statistics.median(kernel) < 3  # other work may have most of the machine
+    assert statistics.median(overlay) < 5
+
+
+def test_themes_about_and_a_tablet(page):
+    before = state(page, "dark")
+    page.locator("#theme").click()
+    page.wait_for_function("d => window.trame.state.get('dark') !== d", arg=before)
+    page.locator("#about").click()
+    page.get_by_text("What is felt", exact=False).first.wait_for(state="attached")
+    page.wait_for_timeout(400)
+    photographed(page, "about")
+    page.locator("#close-about").click()
+    page.locator("#theme").click()
+    page.set_viewport_size({"width": 820, "height": 1180})
+    page.wait_for_timeout(600)
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    photographed(page, "tablet")
+    page.set_viewport_size({"width": 1280, "height": 720})
+    assert wide <= 820
+
+
+def test_what_can_be_turned_has_a_name_for_a_screen_reader(page):
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll('button, [role=slider], input:not([type=hidden])')]
+        .filter(e => e.offsetParent && !(e.getAttribute('aria-label') || e.title || e.innerText
+          || (e.labels && e.labels.length) || e.getAttribute('aria-labelledby')))
+        .map(e => e.outerHTML.slice(0, 200))"""
+    )
+    assert nameless == []
+
+
+def test_two_pages_do_not_disturb_each_other_and_ask_nothing_of_the_network(
+    browser, address, page, visit
+):
+    other, logs = opened(browser, address, "?am=60&shape=square&body=none")
+    assert (state(other, "am"), state(other, "shape")) == (60, "square")
+    other.locator("#size-field").fill("33")
+    query_has(other, "size=33")
+    assert state(page, "query") == ""
+    page.locator("#am-field").fill("222")
+    query_has(page, "am=222")
+    assert state(other, "am") == 60
+    other.close()
+    for log in (visit[1], logs):
+        assert log.errors == []
+        elsewhere = [url for url in log.asked if not url.startswith((address, "data:", "blob:"))]
+        assert elsewhere == []
+
+
+def test_a_lost_connection_is_said_and_comes_back(browser):
+    process, address = served("--port", "0")
+    page, _ = opened(browser, address, "?am=71")
+    ended(process)
+    page.wait_for_selector("#sw-lost")
+    again, _ = served("--port", address.rstrip("/").rpartition(":")[2])
+    page.wait_for_selector("#spectrum_plot .main-svg")
+    assert state(page, "am") == 71
+    page.close()
+    ended(again)
