@@ -23,10 +23,10 @@ from bench import codes
 from bench.child import march
 from bench.codes import CODES
 from bench.problem import Problem
-from skinwave import paper15
-from skinwave.bodies import build
-from skinwave.prepared import answer, prepare, sample_times
+from skinwave.models.bodies import build
+from skinwave.models.prepared import answer, prepare, sample_times
 from skinwave.scene import PROBES, Body, Scene
+from skinwave.studies import paper15
 
 SKIN = replace(fem.PRESETS["palm"], poisson=0.45)
 BODY = Body(material=SKIN, sides="free")

@@ -9,12 +9,12 @@ import numpy as np
 
 import fem
 from simple_model import point_kernel
-from skinwave import paper15
-from skinwave.bodies import build
 from skinwave.effort import Clock, peak_memory, silent
-from skinwave.full import TRANSIENT_RATE, assembled, meshed
-from skinwave.prepared import answer, prepare
+from skinwave.models.bodies import build
+from skinwave.models.full import TRANSIENT_RATE, assembled, meshed
+from skinwave.models.prepared import answer, prepare
 from skinwave.scene import PROBES, Body
+from skinwave.studies import paper15
 
 SIZES = (7e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.4e-3)  # m, of elements: 10 k to 500 k unknowns
 MOST_MEMORY = 12 * 2**30  # bytes

@@ -15,7 +15,7 @@ import numpy as np
 from fem import Material
 from fem.materials import from_young
 from simple_model import MovingPressure, Response, Tacton, Trajectory
-from skinwave.bodies import default_size
+from skinwave.models.bodies import default_size
 from skinwave.scene import Body, Scene
 from skinwave.simulation import simulate
 

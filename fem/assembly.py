@@ -20,16 +20,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from fem.boundary import dashpots, fixed_dofs
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from fem.materials import Material, rayleigh_damping
-from fem.surface import facet_geometry
 from meshes import MeshError, TetMesh, facet_set
-from meshes.tetmesh import EDGES, FACES, Floats, Ints
+from meshes.tetmesh import EDGES, Floats, Ints
 
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
 LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, below which 10-node tetrahedra need no remedy
-ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pin the normal motion
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
 
@@ -94,14 +93,14 @@ def assemble(
     )
     a, b = np.array([rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]).T
     pattern = Pattern.of(mesh.tets, len(mesh.points))
-    free = np.flatnonzero(~_fixed_dofs(mesh, fixed))
+    free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
     K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[region], b[region] + lag)
     R = sparse.csr_array(K.shape)
     if absorbing is not None:
-        R = R + _dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+        R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
     if drag is not None:
         R = R + _drag(mesh, pattern, rho * drag)
     C = C + R
@@ -295,63 +294,3 @@ def by_region(
     if missing := sorted(set(numbers.tolist()) - set(material)):
         raise ValueError(f"regions {missing} have no material; give one for each region")
     return [material[r] for r in numbers.tolist()], index
-
-
-def _fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
-    """(3 n,) bool, True where the displacement is held at 0."""
-    if isinstance(fixed, str):
-        fixed = {fixed: "xyz"}
-    if not isinstance(fixed, Mapping):
-        mask = np.asarray(fixed, bool)
-        if mask.shape != mesh.points.shape:
-            raise ValueError(f"fixed has shape {mask.shape}; give {mesh.points.shape}, node by xyz")
-        return mask.ravel()
-    mask = np.zeros(mesh.points.shape, bool)
-    for name, components in fixed.items():
-        if not components or set(components) - set("xyz"):
-            raise ValueError(f"fixed components '{components}' of '{name}': use letters of 'xyz'")
-        for component in components:
-            mask[np.unique(facet_set(mesh, name)), "xyz".index(component)] = True
-    return mask.ravel()
-
-
-def _dashpots(
-    mesh: TetMesh, nodes: Ints, materials: list[Material], region: Ints
-) -> sparse.csr_array:
-    """Lysmer-Kuhlemeyer damping (3 n, 3 n) of facets (k, a)."""
-    m = [materials[r] for r in region[_owners(mesh, nodes)]]
-    shear = np.array([x.density * x.shear_speed for x in m])
-    squared_ratio = np.array(
-        [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]
-    )
-    pressure = shear * np.sqrt(squared_ratio)
-    N, normals = facet_geometry(mesh, nodes)
-    area = np.linalg.norm(normals, axis=2)
-    unit = normals / area[..., None]
-    along = unit[..., :, None] * unit[..., None, :]
-    impedance = pressure[:, None, None, None] * along
-    impedance += shear[:, None, None, None] * (np.eye(3) - along)
-    local = np.einsum("eq,eqij,qa,qb->eaibj", area, impedance, N, N, optimize=True)
-    dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
-    rows = np.broadcast_to(dofs[:, :, None], (*dofs.shape, dofs.shape[1]))
-    columns = rows.transpose(0, 2, 1)
-    shape = (mesh.n_dofs, mesh.n_dofs)
-    return sparse.csr_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
-
-
-def _owners(mesh: TetMesh, nodes: Ints) -> Ints:
-    """The tetrahedron behind each facet: the one that has all its corners."""
-    n = len(mesh.points)
-    corner_sets = mesh.tets[:, FACES[:, :3]].reshape(-1, 3)
-
-    def key(corners: Ints) -> Ints:
-        low, middle, high = np.sort(corners, axis=1).T
-        return (low * n + middle) * n + high
-
-    keys = key(corner_sets)
-    order = np.argsort(keys)
-    wanted = key(nodes[:, :3])
-    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(order) - 1)]
-    if not (keys[found] == wanted).all():
-        raise MeshError("a facet belongs to no tetrahedron; take facets from the same mesh")
-    return found // 4

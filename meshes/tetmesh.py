@@ -180,19 +180,19 @@ def part(mesh: TetMesh, inside: NDArray[np.bool_]) -> tuple[TetMesh, Ints]:
     tets = tets.reshape(-1, mesh.tets.shape[1])
     number = np.full(len(mesh.points), -1)
     number[nodes] = np.arange(len(nodes))
-    outer = _corner_keys(boundary_facets(tets), len(nodes))
+    outer = facet_keys(boundary_facets(tets), len(nodes))
 
     def of_it(facets: Ints) -> Ints:
         kept = number[facets]
         kept = kept[(kept >= 0).all(axis=1)]
-        return kept[np.isin(_corner_keys(kept, len(nodes)), outer)]
+        return kept[np.isin(facet_keys(kept, len(nodes)), outer)]
 
     facets = {name: of_it(each) for name, each in mesh.facets.items()}
     found = TetMesh(points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets)
     return found, nodes
 
 
-def _corner_keys(facets: Ints, n: int) -> Ints:
+def facet_keys(facets: Ints, n: int) -> Ints:
     """A number for each facet (k,) by its corners, whatever their order."""
     low, middle, high = np.sort(facets[:, :3], axis=1).T
     return (low * n + middle) * n + high

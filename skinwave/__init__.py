@@ -17,8 +17,8 @@ _HOMES = {
     "loads": "scene_file",
     "dumps": "scene_file",
     "simulate": "simulation",
-    "Field": "motion",
-    "field": "motion",
+    "Field": "pictures.motion",
+    "field": "pictures.motion",
     "Agreement": "comparison",
     "compare": "comparison",
 }

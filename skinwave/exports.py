@@ -9,7 +9,7 @@ import numpy as np
 
 from simple_model import Response
 from simple_model.response import step
-from skinwave.views import View
+from skinwave.pictures.views import View
 
 FIELD_FRAMES = 8  # of a period, written for ParaView
 FULL_SCALE = 32767

@@ -16,8 +16,9 @@ from typing import IO, Any
 import numpy as np
 
 from simple_model import Effort
-from skinwave.claims import Run, Verdict
+from skinwave.run import Run
 from skinwave.scene_file import dumps
+from skinwave.studies.claims import Verdict
 
 LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",

@@ -1,20 +1,17 @@
-"""Scenes as TOML files: every key with its unit, every mistake with its cure."""
+"""Scenes as TOML files, read and written."""
 
-import difflib
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
-from math import inf, isfinite, nextafter, pi
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from fem.materials import Material
-from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory
+from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
-from simple_model.trajectory import BY_POINTS, Points
-from skinwave.scene import BODIES, KINDS, Body, Layer, Placement, Relief, Scene
+from simple_model.trajectory import BY_POINTS
+from skinwave.scene import BODIES, KINDS, Body, Placement, Scene
+from skinwave.scene_keys import ONLY_OF, PATH, SECTIONS, as_table, as_text, checked
 
 LARGEST = 32_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 
@@ -51,10 +48,10 @@ def loads(text: str) -> Scene:
         raise ValueError(f"not valid TOML: {error}") from None
     except RecursionError:
         raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
-    sections = {"name": _text, **dict.fromkeys(SECTIONS, _table)}
-    top = _checked("scene", table, sections)
+    sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
+    top = checked("scene", table, sections)
     parts = {
-        section: _checked(f"[{section}]", top.get(section, {}), keys)
+        section: checked(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()
     }
     body = _body(parts["body"] | parts["placement"])
@@ -104,259 +101,6 @@ def unused(tacton: Tacton) -> set[str]:
     return keys if tacton.trajectory.shape in BY_POINTS else keys | {"points_mm"}
 
 
-@dataclass(frozen=True)
-class Field:
-    """A key of the file: the attribute behind it and how it is read and written."""
-
-    name: str
-    read: Callable[[str, Any], Any]
-    write: Callable[[Any], Any]
-
-
-def _number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{key} = {_shown(value)} must be a number")
-    try:
-        return float(value)
-    except OverflowError:
-        raise ValueError(f"{key} is too large a number; give one below 1e308") from None
-
-
-def _shown(value: Any) -> str:
-    """A value as a message quotes it."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _text(key: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"{key} = {_shown(value)} must be a text in quotes")
-    return value
-
-
-def _table(key: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise ValueError(f"{key} = {_shown(value)} must be a table, [{key}]")
-    return value
-
-
-def _pair(key: str, value: Any) -> tuple[float, float]:
-    if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(f"{key} = {_shown(value)} must be a pair of numbers, such as [1.0, 0.0]")
-    return _number(key, value[0]), _number(key, value[1])
-
-
-def _place(key: str, value: Any) -> tuple[float, float]:
-    return _points(key, [value])[0]
-
-
-def _points(key: str, value: Any) -> Points:
-    if not isinstance(value, list):
-        raise ValueError(
-            f"{key} = {_shown(value)} must be a list of pairs, such as [[0, 0], [5, 0]]"
-        )
-    points = [_pair(key, point) for point in value]
-    for x, y in points:
-        if not (isfinite(x) and isfinite(y)):
-            raise ValueError(f"{key} has the point [{x}, {y}]; coordinates must be finite")
-    return tuple((x / 1e3, y / 1e3) for x, y in points)
-
-
-def _write_points(points: Points) -> list[list[float]]:
-    return [[_in_units(x, 1e3) for x in point] for point in points]
-
-
-def _numbers(key: str, value: Any) -> tuple[float, ...]:
-    if not isinstance(value, list):
-        raise ValueError(f"{key} = {_shown(value)} must be a list of numbers")
-    return tuple(_number(key, x) for x in value)
-
-
-def _switch(key: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError(f"{key} = {_shown(value)} must be true or false")
-    return value
-
-
-def _pulses(key: str, value: Any) -> Points:
-    if not isinstance(value, list):
-        raise ValueError(
-            f"{key} = {_shown(value)} must be a list of pulses and gaps, such as [[100, 50]]"
-        )
-    return tuple((on / 1e3, gap / 1e3) for on, gap in (_pair(key, pulse) for pulse in value))
-
-
-def _inner(cls: type, keys: dict[str, Field]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """How a table within [tacton] is read as a record, and written."""
-
-    def read(key: str, value: Any) -> Any:
-        values = _checked(f"[tacton.{key}]", _table(key, value), keys)
-        missing = [k for k in list(keys)[: REQUIRED[key]] if keys[k].name not in values]
-        if missing:
-            raise ValueError(f"[tacton.{key}] lacks {' and '.join(missing)}; give it")
-        return cls(**values)
-
-    def write(record: Any) -> dict[str, Any]:
-        return {key: field.write(getattr(record, field.name)) for key, field in keys.items()}
-
-    return read, write
-
-
-def _material(key: str, value: Any) -> str | Material:
-    if isinstance(value, str):
-        return value
-    values = _checked(f"[body.{key}]", _table(key, value), MATERIAL)
-    missing = [k for k in list(MATERIAL)[:3] if MATERIAL[k].name not in values]
-    if missing:
-        raise ValueError(f"[body.{key}] lacks {' and '.join(missing)}; give it, or name a preset")
-    return Material(**values)
-
-
-def _write_material(material: str | Material) -> Any:
-    if isinstance(material, str):
-        return material
-    return {key: field.write(getattr(material, field.name)) for key, field in MATERIAL.items()}
-
-
-def _layers(key: str, value: Any) -> tuple[Layer, ...]:
-    if not isinstance(value, list):
-        raise ValueError(f"{key} = {_shown(value)} must be tables, each under [[body.{key}]]")
-    found = []
-    for table in value:
-        values = _checked(f"[[body.{key}]]", _table(f"body.{key}", table), LAYER)
-        if missing := [k for k, field in LAYER.items() if field.name not in values]:
-            raise ValueError(f"[[body.{key}]] lacks {' and '.join(missing)}; give it")
-        found.append(Layer(**values))
-    return tuple(found)
-
-
-def _write_layers(layers: tuple[Layer, ...]) -> Any:
-    return [
-        {key: field.write(getattr(layer, field.name)) for key, field in LAYER.items()}
-        for layer in layers
-    ]
-
-
-def _relief(key: str, value: Any) -> Relief:
-    return Relief(**_checked(f"[body.{key}]", _table(f"body.{key}", value), RELIEF))
-
-
-def _write_relief(relief: Relief) -> Any:
-    return {key: field.write(getattr(relief, field.name)) for key, field in RELIEF.items()}
-
-
-def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
-    x, y = _pair(key, value)
-    return x / 1e3, y / 1e3
-
-
-def _scaled(name: str, per_unit: float = 1.0) -> Field:
-    """A number whose unit in the file is `per_unit` times smaller than inside."""
-    return Field(
-        name,
-        lambda key, value: _number(key, value) / per_unit,
-        lambda value: _in_units(value, per_unit),
-    )
-
-
-def _in_units(value: float, per_unit: float) -> float:
-    """The number for a file, the shortest that is read as the value itself if there is one."""
-    near = value * per_unit
-    beside = [nextafter(near, way) for way in (-inf, inf)]
-    further = [nextafter(x, way) for x, way in zip(beside, (-inf, inf), strict=True)]
-    nearest = [*(round(near, digits) for digits in (9, 12)), near, *beside, *further]
-    return next((x for x in nearest if x / per_unit == value), near)
-
-
-def _word(name: str) -> Field:
-    return Field(name, _text, str)
-
-
-MATERIAL = {
-    "density_kg_m3": _scaled("density"),
-    "shear_modulus_pa": _scaled("shear_modulus"),
-    "poisson": _scaled("poisson"),
-    "viscosity_pa_s": _scaled("viscosity"),
-    "loss_factor": _scaled("loss_factor"),
-}
-RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
-LAYER = {
-    "thickness_mm": _scaled("thickness", 1e3),
-    "material": Field("material", _material, _write_material),
-}
-PULSES = {
-    "pulses_ms": Field("pulses", _pulses, _write_points),
-    "ramp_ms": _scaled("ramp", 1e3),
-}
-SIGNAL = {
-    "rate_hz": _scaled("rate"),
-    "samples": Field("samples", _numbers, list),
-    "role": _word("role"),
-}
-REQUIRED = {"rhythm": 1, "signal": 2}  # how many of the keys, from the first
-PATH = (
-    "shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold",
-)  # fmt: skip
-SECTIONS = {
-    "tacton": {
-        "amplitude_percent": _scaled("amplitude", 100),
-        "am_frequency_hz": _scaled("am_frequency"),
-        "second_am_frequency_hz": _scaled("second_am_frequency"),
-        "superposition": Field("superposition", _pair, list),
-        "envelope_frequency_hz": _scaled("envelope_frequency"),
-        "duration_s": _scaled("duration"),
-        "shape": _word("shape"),
-        "size_mm": _scaled("size", 1e3),
-        "speed_m_per_s": _scaled("speed"),
-        "sweep": _word("sweep"),
-        "centre_mm": Field("centre", _place, lambda xy: [_in_units(x, 1e3) for x in xy]),
-        "points_mm": Field("points", _points, _write_points),
-        "times_s": Field("times", _numbers, list),
-        "levels": Field("levels", _numbers, list),
-        "hold": Field("hold", _switch, bool),
-        "foci": Field("foci", _numbers, lambda phases: [float(phase) for phase in phases]),
-        "sharing": _word("sharing"),
-        "rhythm": Field("rhythm", *_inner(Rhythm, PULSES)),
-        "signal": Field("signal", *_inner(Signal, SIGNAL)),
-    },
-    "focus": {
-        "height_mm": _scaled("height", 1e3),
-        "drive": _word("drive"),
-        "depth_of_modulation": _scaled("depth_of_modulation"),
-        "peak_pressure_pa": _scaled("peak_pressure"),
-        "profile": _word("focus"),
-    },
-    "body": {
-        "kind": _word("kind"),
-        "material": Field("material", _material, _write_material),
-        "width_mm": _scaled("width", 1e3),
-        "height_mm": _scaled("height", 1e3),
-        "depth_mm": _scaled("depth", 1e3),
-        "base": _word("base"),
-        "sides": _word("sides"),
-        "layers": Field("layers", _layers, _write_layers),
-        "relief": Field("relief", _relief, _write_relief),
-        "file": _word("file"),
-        "unit": _word("unit"),
-        "up": _word("up"),
-    },
-    "placement": {
-        "tilt_x_deg": _scaled("tilt_x", 180 / pi),
-        "tilt_y_deg": _scaled("tilt_y", 180 / pi),
-        "offset_mm": Field(
-            "offset", _pair_in_mm, lambda offset: [_in_units(x, 1e3) for x in offset]
-        ),
-        "lift_mm": _scaled("lift", 1e3),
-    },
-    "probes": {
-        "points_mm": Field("probes", _points, _write_points),
-    },
-}
-
-
-ONLY_OF = {"relief": "palm", "file": "mesh", "unit": "mesh", "up": "mesh"}
-
-
 def _body(values: dict[str, Any]) -> Body:
     presets = {"none": "none", "sheet": "paper-sheet", "slab": "skin-slab", "palm": "palm"}
     kind = values.get("kind", "slab")
@@ -368,23 +112,6 @@ def _body(values: dict[str, Any]) -> Body:
     if kind == "mesh":
         return Body(**shape, placement=Placement(**placement))
     return replace(BODIES[presets[kind]], **shape, placement=Placement(**placement))
-
-
-def _checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by attribute name, each read by its field; the nearest valid key for a wrong one."""
-    values = {}
-    for key, value in table.items():
-        if key not in keys:
-            near = difflib.get_close_matches(key, keys, 1, 0.0)
-            raise ValueError(
-                f"{where} has the unknown key {_shown(key)}; did you mean '{near[0]}'?"
-            )
-        field = keys[key]
-        if isinstance(field, Field):
-            values[field.name] = field.read(key, value)
-        else:
-            values[key] = field(key, value)
-    return values
 
 
 def _split(values: dict[str, Any], names: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -7,13 +7,13 @@ import numpy as np
 import fem
 from simple_model import Response, flat_body, point_kernel
 from simple_model.choices import choose
-from skinwave.bodies import compliance
 from skinwave.effort import Progress, silent
-from skinwave.full import Map, harmonic_answer, transient_answer
-from skinwave.plan import plan
-from skinwave.prepared import REDUCTION_TOLERANCE, answer, prepare, sample_times
+from skinwave.models.bodies import compliance
+from skinwave.models.full import Map, harmonic_answer, transient_answer
+from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare, sample_times
+from skinwave.models.stretching import full_answer, reduced_answer
+from skinwave.planning.plan import plan
 from skinwave.scene import Scene
-from skinwave.stretching import full_answer, reduced_answer
 
 MODELS = (
     "auto", "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient", "fem-nonlinear",

@@ -6,6 +6,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
+from corpus import SMALL
 from hypothesis import settings
 
 import meshes
@@ -26,3 +27,12 @@ def fresh_cache(tmp_path_factory):
 def distorted_cube() -> meshes.TetMesh:
     """A unit cube of ten-node tetrahedra whose inner corners are shaken."""
     return elements.distorted_cube()
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    """The path of a small scene in an empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "short.toml"
+    path.write_text(SMALL)
+    return path

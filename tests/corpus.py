@@ -376,3 +376,19 @@ if __name__ == "__main__":
     folder.mkdir(parents=True)
     for k, content in enumerate([*scenes().values(), *damaged_scenes()]):
         (folder / f"{k:03}.toml").write_bytes(content)
+
+# A scene that is answered in a second.
+SMALL = """
+name = "short"
+[tacton]
+am_frequency_hz = 200
+duration_s = 0.05
+shape = "circle"
+size_mm = 10
+speed_m_per_s = 6
+[body]
+width_mm = 60
+height_mm = 60
+[probes]
+points_mm = [[0, 0], [10, 0]]
+"""

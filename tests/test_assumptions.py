@@ -9,12 +9,12 @@ import pytest
 
 import skinwave
 from simple_model import MovingPressure, Tacton, Trajectory, lines, point_kernel
-from skinwave.assumptions import DEVICE_RATE, as_one, held, ladder, relaxed
 from skinwave.cli import main
-from skinwave.mechanisms import paper_vs_skin, signatures, write
-from skinwave.relax import climb, line_changes
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.scene_file import dumps
+from skinwave.studies.assumptions import DEVICE_RATE, as_one, held, ladder, relaxed
+from skinwave.studies.mechanisms import paper_vs_skin, signatures, write
+from skinwave.studies.relax import climb, line_changes
 
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
@@ -83,7 +83,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, body=replace(SKIN.body, depth=0.004))  # too thin for layers
     monkeypatch.setattr(
-        "skinwave.relax.ladder",
+        "skinwave.studies.relax.ladder",
         lambda scene: tuple(n for n in ladder(scene) if n not in ("flat", "one material")),
     )
     (tmp_path / "scene.toml").write_text(dumps(scene))
@@ -111,9 +111,11 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
 
 
 def test_a_rung_that_fails_leaves_the_others(monkeypatch):
-    monkeypatch.setattr("skinwave.relax.ladder", lambda scene: ("linear drive", "one material"))
     monkeypatch.setattr(
-        "skinwave.relax.relaxed",
+        "skinwave.studies.relax.ladder", lambda scene: ("linear drive", "one material")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
         lambda scene, dropped: (
             replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
         ) if not dropped else (scene, "no such model"),

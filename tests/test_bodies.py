@@ -14,9 +14,9 @@ from meshes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare, simulate
-from skinwave.bodies import build, has_layer, operators, surface_load
 from skinwave.cli import main
-from skinwave.plan import plan
+from skinwave.models.bodies import build, has_layer, operators, surface_load
+from skinwave.planning.plan import plan
 from skinwave.scene import Body, Layer, Placement, Relief
 from skinwave.scene_file import dumps, loads
 

@@ -9,35 +9,13 @@ import sys
 
 import numpy as np
 import pytest
+from corpus import SMALL
 
 from skinwave.cli import main
-
-SMALL = """
-name = "short"
-[tacton]
-am_frequency_hz = 200
-duration_s = 0.05
-shape = "circle"
-size_mm = 10
-speed_m_per_s = 6
-[body]
-width_mm = 60
-height_mm = 60
-[probes]
-points_mm = [[0, 0], [10, 0]]
-"""
 
 
 def table(path):
     return list(csv.DictReader(path.read_text().splitlines()))
-
-
-@pytest.fixture
-def scene(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "short.toml"
-    path.write_text(SMALL)
-    return path
 
 
 def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
@@ -175,7 +153,7 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
 def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
     """A run that was left to plan itself, with a ladder of meshes that ends too early."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skinwave.refinement.FINEST", 2.0)
+    monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
     (tmp_path / "scene.toml").write_text(
         '[tacton]\nam_frequency_hz = 140\nshape = "point"\nduration_s = 0.05\n'
         '[body]\nkind = "sheet"\nmaterial = "paper"\nwidth_mm = 40\nheight_mm = 40\n'

@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from simple_model import MovingPressure, Tacton, Trajectory, flat_body, point_kernel
-from simple_model.flat_body import (
-    half_space,
-    point_response,
-    slab,
-    steady_lines,
-    thin_sheet,
-)
+from simple_model.compliance import half_space, slab, thin_sheet
+from simple_model.flat_body import point_response, steady_lines
 
 FOREARM = {"density": 1000, "shear_modulus": 7.86e3, "viscosity": 5.03}
 PALM = {"density": 1000, "shear_modulus": 25e3, "viscosity": 5.0}

@@ -11,10 +11,10 @@ import meshes
 from fem import nonlinear
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.focus import along_axis
-from skinwave.plan import plan
+from skinwave.models.stretching import mean_pressure, membrane, meshed_sheet, stretching_body
+from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Placement, Scene
 from skinwave.simulation import simulate
-from skinwave.stretching import mean_pressure, membrane, meshed_sheet, stretching_body
 
 PAPER = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
 CIRCLING = MovingPressure(

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from skinwave.claims import TEXTS
+from skinwave.studies.claims import TEXTS
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ import pytest
 
 from skinwave import loads, simulate
 from skinwave.cli import main
-from skinwave.plan import plan
+from skinwave.planning.plan import plan
 
 LONGEST = 10.0  # s
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()

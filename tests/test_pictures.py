@@ -14,13 +14,15 @@ from PIL import Image
 from fem import PRESETS
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.flat_body import steady_lines
-from skinwave import album, exports, films, gallery, maps, motion, render, speeds, views
-from skinwave.bodies import compliance
+from skinwave import exports
 from skinwave.cli import main
-from skinwave.renderer import Renderer, renderer
+from skinwave.models import speeds
+from skinwave.models.bodies import compliance
+from skinwave.pictures import album, films, gallery, maps, motion, render, views
+from skinwave.pictures.renderer import Renderer, renderer
+from skinwave.pictures.styles import style
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps
-from skinwave.styles import style
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
 CHROMIUM = "/usr/bin/chromium"
@@ -311,7 +313,7 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
 
 
 def test_a_window_that_ends_its_process_is_found_out(monkeypatch):
-    monkeypatch.setattr("skinwave.renderer.PROBE", "import os; os.abort()")
+    monkeypatch.setattr("skinwave.pictures.renderer.PROBE", "import os; os.abort()")
     found = renderer.__wrapped__()
     assert not found.found
     assert "libegl1 libgl1-mesa-dri" in found.said

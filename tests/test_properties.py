@@ -11,16 +11,17 @@ import fem
 import meshes
 from meshes import TetMesh
 from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, flat_body
+from simple_model.compliance import half_space, slab
 from simple_model.drive import DRIVES
-from simple_model.flat_body import half_space, slab, steady_lines
+from simple_model.flat_body import steady_lines
 from simple_model.focus import FOCI
 from simple_model.rhythm import ROLES
 from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import Body, Scene, dumps, loads
-from skinwave.plan import plan
-from skinwave.prepared import prepare, reduced_lines
+from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.planning.plan import plan
 from skinwave.scene import BASES
 from skinwave.simulation import MODELS, simulate
 
@@ -376,8 +377,8 @@ def test_a_scene_comes_back_from_its_file(scene, tacton):
 @given(scenes())
 def test_what_is_planned_runs(scene):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skinwave.bodies.SHEET_CELLS", 16)
-        patch.setattr("skinwave.bodies.SLAB_CELL", 6e-3)
+        patch.setattr("skinwave.models.bodies.SHEET_CELLS", 16)
+        patch.setattr("skinwave.models.bodies.SLAB_CELL", 6e-3)
         try:
             required = plan(scene, 0.3)
         except ValueError:

@@ -13,13 +13,13 @@ import meshes
 import skinwave
 from fem import linear_solver
 from simple_model import MovingPressure, Tacton, Trajectory
-from skinwave.bodies import build as build_body
-from skinwave.bodies import operators
-from skinwave.full import energy_balance
-from skinwave.motion import field
-from skinwave.paper15 import scenes
-from skinwave.prepared import prepare, reduced_lines
+from skinwave.models.bodies import build as build_body
+from skinwave.models.bodies import operators
+from skinwave.models.full import energy_balance
+from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.pictures.motion import field
 from skinwave.simulation import simulate
+from skinwave.studies.paper15 import scenes
 
 PROBES = np.column_stack([[0, 5, 10, 15, 20], np.zeros(5)]) * 1e-3
 CIRCLING = Tacton(
@@ -341,7 +341,7 @@ def test_a_march_that_blows_up_stops_within_a_few_steps(monkeypatch):
             steps.append(k)
             yield replace(state, displacement=state.displacement * 2.0 ** max(0, k - 60))
 
-    monkeypatch.setattr("skinwave.full.fem.transient", exploding)
+    monkeypatch.setattr("skinwave.models.full.fem.transient", exploding)
     with pytest.raises(fem.Diverged, match=r"at t = 0.005 s, step 100, above the limit of 1 %"):
         simulate(scene, "fem-transient", h=0.008)
     assert steps[-1] < 102

@@ -16,10 +16,11 @@ from simple_model import (
     point_kernel,
     tacton_lines,
 )
-from simple_model.flat_body import flat_body, half_space
+from simple_model.compliance import half_space
+from simple_model.flat_body import flat_body
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave import Body, Scene, simulate
-from skinwave.plan import plan
+from skinwave.planning.plan import plan
 
 TIMES = np.arange(10_000) / 10_000
 PULSES = Rhythm(pulses=((0.010, 0.006), (0.004, 0.0053)))

@@ -1,6 +1,7 @@
 """Who may import whom, what importing costs, and what the project ships."""
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -14,6 +15,19 @@ ROOMS = {
     "meshes": set(),
     "fem": {"simple_model", "meshes"},
     "skinwave": {"simple_model", "meshes", "fem"},
+}
+
+# Rooms within skinwave, and what each may import beside the modules at the top of it.
+INNER = {
+    "models": set(),
+    "planning": {"models"},
+    "patterns": set(),
+    "pictures": {"models", "planning", "verify"},
+    "studies": {"models", "planning", "pictures", "reports"},
+    "reports": {"models", "planning", "pictures", "studies"},
+    "sweeps": {"models", "planning", "pictures", "studies"},
+    "verify": {"models", "planning", "pictures", "reports", "studies"},
+    "web": {"models", "planning", "pictures", "studies", "reports"},
 }
 
 
@@ -32,6 +46,13 @@ def test_rooms_import_only_what_they_may(room):
     for path in (ROOT / room).rglob("*.py"):
         others = imported(path) & set(ROOMS) - {room}
         assert others <= ROOMS[room], path
+
+
+@pytest.mark.parametrize("room", INNER)
+def test_inner_rooms_import_only_what_they_may(room):
+    for path in (ROOT / "skinwave" / room).rglob("*.py"):
+        used = re.findall(r"from skinwave\.(\w+)[. ]", path.read_text())
+        assert set(used) & {*INNER, "commands"} <= INNER[room] | {room}, path
 
 
 @pytest.mark.parametrize("package", ["fem", "simple_model", "meshes"])

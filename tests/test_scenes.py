@@ -7,7 +7,7 @@ import pytest
 
 from fem import Material
 from skinwave import BODIES, dumps, loads, read
-from skinwave.paper15 import scenes, tactons
+from skinwave.studies.paper15 import scenes, tactons
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
 

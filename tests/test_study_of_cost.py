@@ -9,11 +9,11 @@ import pytest
 from meshes import cache
 from skinwave import loads, simulate
 from skinwave.comparison import compare
-from skinwave.paper15 import scenes, tactons
-from skinwave.plan import plan
-from skinwave.prepared import answer, prepare
-from skinwave.sensitivity import sensitivity
-from skinwave.tradeoff import Candidate, sentences, study, write
+from skinwave.models.prepared import answer, prepare
+from skinwave.planning.plan import plan
+from skinwave.planning.sensitivity import sensitivity
+from skinwave.studies.paper15 import scenes, tactons
+from skinwave.studies.tradeoff import Candidate, sentences, study, write
 
 SHORT = """
 name = "short"

@@ -12,40 +12,18 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from skinwave import dataset, engine, sweep_figures
-from skinwave import sweep as sweeping
 from skinwave.cli import main
-from skinwave.measures import COSTS
+from skinwave.pictures.styles import style
 from skinwave.scene_file import read
 from skinwave.simulation import simulate
-from skinwave.styles import style
-from skinwave.variation import cases, combinations, parse
+from skinwave.sweeps import dataset, engine, sweep_figures
+from skinwave.sweeps import sweep as sweeping
+from skinwave.sweeps.measures import COSTS
+from skinwave.sweeps.variation import cases, combinations, parse
 
-SMALL = """
-name = "short"
-[tacton]
-am_frequency_hz = 200
-duration_s = 0.05
-shape = "circle"
-size_mm = 10
-speed_m_per_s = 6
-[body]
-width_mm = 60
-height_mm = 60
-[probes]
-points_mm = [[0, 0], [10, 0]]
-"""
 THREADS = ["--scheduler", "threads", "--quiet"]
 FOREARM = Path(__file__).parent.parent / "examples/speed-on-forearm.toml"
 not_on_windows = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
-
-
-@pytest.fixture
-def scene(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "short.toml"
-    path.write_text(SMALL)
-    return path
 
 
 def varied(*texts):

@@ -13,12 +13,12 @@ import pytest
 from simple_model import commanded, spectrum
 from simple_model.flat_body import steady_lines
 from simple_model.focus import lobe_width
-from skinwave.bodies import compliance
 from skinwave.cli import main
-from skinwave.paper15 import tactons
+from skinwave.models.bodies import compliance
 from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import simulate
+from skinwave.studies.paper15 import tactons
 from skinwave.web import check_extra, controls, model, plots, waves
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from skinwave.effort import Progress
-    from skinwave.plan import Plan
+    from skinwave.planning.plan import Plan
     from skinwave.scene import Scene
 
 MODELS = (
@@ -54,7 +54,7 @@ def add_model(parser: argparse.ArgumentParser) -> None:
 
 def required_plan(options: argparse.Namespace, scene: "Scene") -> "Plan":
     """The plan, with what the user has decided; what breaks the tolerance is warned of."""
-    from skinwave.plan import plan
+    from skinwave.planning.plan import plan
     from skinwave.simulation import check_knobs
 
     model, h = None if options.model == "auto" else options.model, metre(options.h)

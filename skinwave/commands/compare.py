@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.files import folder_name, output_folder
     from skinwave.scene import with_body
     from skinwave.scene_file import read
-    from skinwave.study import own_scenes, paper_scenes, run_study
+    from skinwave.studies.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)

@@ -14,7 +14,7 @@ from skinwave.commands.common import (
 
 if TYPE_CHECKING:
     from skinwave.effort import Progress
-    from skinwave.views import View
+    from skinwave.pictures.views import View
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -35,9 +35,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave.films import check_format, film, seam
-    from skinwave.renderer import renderer
-    from skinwave.styles import style
+    from skinwave.pictures.films import check_format, film, seam
+    from skinwave.pictures.renderer import renderer
+    from skinwave.pictures.styles import style
 
     source = options.source
     out = options.out or Path(f"{source.resolve().stem}.gif")
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
-    from skinwave.album import answers, open_album
+    from skinwave.pictures.album import answers, open_album
     from skinwave.scene_file import read
 
     if not options.source.is_dir():

@@ -29,12 +29,12 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave import dataset, engine
+    from skinwave.sweeps import dataset, engine
 
     engine.check("threads")
     from skinwave.files import folder_name, output_file
-    from skinwave.styles import style
-    from skinwave.sweep_figures import (
+    from skinwave.pictures.styles import style
+    from skinwave.sweeps.sweep_figures import (
         SPEED,
         finished,
         heat_figure,

@@ -19,9 +19,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import output_folder
-    from skinwave.relax import climb, sentence, write
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
+    from skinwave.studies.relax import climb, sentence, write
 
     h = metre(options.h)
     check_knobs("auto", h=h)
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _mechanisms(options: argparse.Namespace, h: float | None) -> int:
     from skinwave.files import output_folder
-    from skinwave.mechanisms import paper_vs_skin, sentences, write
+    from skinwave.studies.mechanisms import paper_vs_skin, sentences, write
 
     out = options.out or Path("paper-vs-skin")
     with output_folder(out, overwrite=options.overwrite) as folder:

@@ -26,9 +26,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import output_folder
+    from skinwave.pictures.styles import style
+    from skinwave.reports.scene_report import write_report
     from skinwave.scene_file import read
-    from skinwave.scene_report import write_report
-    from skinwave.styles import style
 
     source, made = options.source, options.source.is_dir()
     scene = None if made else read(source)
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         progress_of(options) as progress,
     ):
         if scene is not None:
-            from skinwave.album import make
+            from skinwave.pictures.album import make
 
             make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,

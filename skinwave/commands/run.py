@@ -31,12 +31,12 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave.claims import Run
     from skinwave.files import output_folder
+    from skinwave.run import Run
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
     from skinwave.simulation import simulate
-    from skinwave.study import write_single
+    from skinwave.studies.study import write_single
 
     scene = read(options.scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
@@ -69,7 +69,7 @@ def _mapped(scheduler: str | None) -> AbstractContextManager[Any]:
     """What maps a function over lines: here, or on the workers of a scheduler."""
     if scheduler is None:
         return nullcontext(map)
-    from skinwave import engine
+    from skinwave.sweeps import engine
 
     engine.check(scheduler)
     return engine.mapped_on(scheduler)

@@ -52,11 +52,11 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave import dataset, engine
+    from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
-    from skinwave.sweep import Knobs, sweep
-    from skinwave.variation import cases, combinations, parse
+    from skinwave.sweeps.sweep import Knobs, sweep
+    from skinwave.sweeps.variation import cases, combinations, parse
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")

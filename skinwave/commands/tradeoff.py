@@ -16,7 +16,7 @@ def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import output_folder
     from skinwave.scene_file import read
-    from skinwave.tradeoff import sentences, study, write
+    from skinwave.studies.tradeoff import sentences, study, write
 
     scene = read(options.scene)
     out = options.out or Path(f"{options.scene.stem}-tradeoff")

@@ -9,14 +9,8 @@ import fem
 import meshes
 from meshes import TetMesh
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.flat_body import (
-    Compliance,
-    half_space,
-    point_response,
-    slab,
-    steady_lines,
-    thin_sheet,
-)
+from simple_model.compliance import Compliance, half_space, slab, thin_sheet
+from simple_model.flat_body import point_response, steady_lines
 from simple_model.steady import along_path, load_lines, path_knots
 from skinwave.verify import references
 from skinwave.verify.case import Case, Plot, below, described, largest, misfit, relative

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from skinwave import report
 from skinwave.effort import versions
-from skinwave.figures import SPARE, png
+from skinwave.pictures.figures import SPARE, png
+from skinwave.reports import report
 from skinwave.verify.case import Check, Entry, Plot, Result
 
 HEADER = ("value", "reference", "error", "bar")

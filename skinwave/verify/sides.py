@@ -7,7 +7,7 @@ import numpy as np
 import fem
 import meshes
 from meshes.tetmesh import Floats
-from skinwave.bodies import layer_drag, slab_lines
+from skinwave.models.bodies import layer_drag, slab_lines
 from skinwave.scene import Body
 from skinwave.verify.case import Case, Plot, below
 

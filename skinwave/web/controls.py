@@ -14,8 +14,8 @@ from simple_model.choices import choose
 from simple_model.drive import DRIVES
 from simple_model.tacton import SHARINGS, SUPERPOSITIONS
 from simple_model.trajectory import SHAPES
-from skinwave.paper15 import tactons
 from skinwave.scene import BODIES
+from skinwave.studies.paper15 import tactons
 
 Values = dict[str, Any]
 

@@ -32,10 +32,10 @@ from simple_model.steady import (
     load_lines,
     path_knots,
 )
-from skinwave.bodies import build, compliance, operators, surface_load
 from skinwave.effort import Progress
-from skinwave.full import energy_balance
-from skinwave.prepared import reduced_lines, sample_times
+from skinwave.models.bodies import build, compliance, operators, surface_load
+from skinwave.models.full import energy_balance
+from skinwave.models.prepared import reduced_lines, sample_times
 from skinwave.scene import Body, Scene
 from skinwave.web.model import SIDE, Answer, Map, answer_of, borderline, places
 

@@ -1,0 +1,98 @@
+"""How far a pressure pushes in the surface of an endless body: u = G q at each wavenumber.
+
+Frequencies w are complex, in rad/s; time goes as exp(+i w t).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+# (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f, 1) in rad/s.
+Compliance = Callable[[Complex, Complex], Complex]
+
+AIR_DENSITY = 1.2  # kg/m3
+LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
+
+
+def half_space(
+    *, density: float, shear_modulus: float, poisson: float, viscosity: float = 0.0,
+    loss_factor: float = 0.0,
+) -> Compliance:  # fmt: skip
+    """G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s; 0 <= poisson <= 0.5."""
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        mu = _modulus(shear_modulus, viscosity, loss_factor, w)
+        ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
+        bp, bs = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
+        still = np.abs(ks2) < 1e-9 * np.abs(k) ** 2  # the closed form cancels towards rest
+        rayleigh = (2 * k**2 - ks2) ** 2 - 4 * k**2 * bp * bs
+        dynamic = -bp * ks2 / (mu * np.where(still, 1.0, rayleigh))
+        return np.where(still, (1 - poisson) / (mu * k), dynamic)
+
+    return compliance
+
+
+def slab(
+    *, density: float, shear_modulus: float, poisson: float, depth: float,
+    viscosity: float = 0.0, loss_factor: float = 0.0,
+) -> Compliance:  # fmt: skip
+    """A layer of `depth` metre bonded to a rigid base; poisson < 0.5.
+
+    Potentials phi = A e^{bp z} + B e^{-bp (z + H)} and psi likewise meet zero displacement at
+    the base and unit pressure without shear at the top: four equations for each k and w, whose
+    exponentials all decay, so that no thickness overflows.
+    """
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        w = np.where(np.abs(w) < LEAST_FREQUENCY, LEAST_FREQUENCY, w)
+        mu = _modulus(shear_modulus, viscosity, loss_factor, w)
+        ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
+        k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
+        p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
+        ep, es, one, t = np.exp(-p * depth), np.exp(-s * depth), np.ones_like(p), 2 * k**2 - ks2
+        # Rows: normal stress and shear stress at the top, both displacements at the base.
+        rows = [
+            [t, t * ep, -2 * k * s, 2 * k * s * es],
+            [2 * k * p, -2 * k * p * ep, -t, -t * es],
+            [k * ep, k, -s * es, s],
+            [p * ep, -p, -k * es, -k],
+        ]
+        matrix = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        load = np.stack([one, 0 * one, 0 * one, 0 * one], axis=-1)[..., None]
+        a, b, c, d = np.moveaxis(np.linalg.solve(matrix, load)[..., 0], -1, 0)
+        return (p * (a - b * ep) - k * (c + d * es)) / mu
+
+    return compliance
+
+
+def thin_sheet(
+    *, bending_stiffness: float, mass_per_area: float, loss_factor: float = 0.0,
+    viscous_lag: float = 0.0, air_density: float = AIR_DENSITY,
+) -> Compliance:  # fmt: skip
+    """G = 1 / [D (1 + i eta + i w lag) k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
+
+    Under a steady push an endless sheet gives way without bound: its motion is told about a mean
+    that is left out, G = 0 at rest.
+    """
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        bending = bending_stiffness * (1 + 1j * loss_factor + 1j * w * viscous_lag)
+        inertia = (mass_per_area + 2 * air_density / k) * w**2
+        return np.where(w == 0, 0, 1 / (bending * k**4 - inertia))
+
+    return compliance
+
+
+def _modulus(mu: float, viscosity: float, loss_factor: float, w: Complex) -> Complex:
+    # Frequencies are never below 0 here, so that a hysteretic loss has one sign.
+    return np.asarray(mu * (1 + 1j * loss_factor) + 1j * w * viscosity)
+
+
+def _squared_wavenumbers(
+    density: float, mu: Complex, poisson: float, w: Complex
+) -> tuple[Complex, Complex]:
+    """k_s^2 and k_p^2."""
+    ks2 = density * w**2 / mu
+    return ks2, ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)

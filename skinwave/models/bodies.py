@@ -1,0 +1,250 @@
+"""From a body to its mesh: element sizes, the material that the mesh is made of, its ends."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+
+import numpy as np
+from scipy import sparse
+
+from fem.assembly import Operators, assemble
+from fem.materials import Material
+from fem.surface import facet_normals, facet_points, load_operator
+from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
+from meshes.intake import FINE_RADIUS
+from meshes.structured import check_size, round_up, with_planes
+from meshes.tetmesh import Floats, Ints
+from simple_model.compliance import Compliance, half_space, slab, thin_sheet
+from skinwave.models import hands
+from skinwave.scene import Body
+
+SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
+# From cell to cell along the surface and downwards, and the coarsest cell over the finest.
+GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
+# A layer around absorbing sides, in which a drag that rises with the square of the depth lets waves
+# die out: dashpots alone send back a quarter of a shear wave at 30 degrees. Near the cut-on of a
+# slab on a rigid base, c_s/(4 depth), waves are long, and only a wide layer takes them. Its cells
+# may grow fast. What a plane slab of 50 mm sends back is at most 1.4 % of the motion at the focus
+# at any line, where dashpots alone send back 17 % (`skinwave.verify.sides`).
+LAYER_WIDTH, LAYER_DRAG = 7.0, 0.35  # of the depth; of the angular frequency of cut-on
+LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
+LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
+SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
+# A sheet bends like one of this relative thickness with the same bending stiffness and mass per
+# area, and the fatter elements are far more accurate: thin ones lock.
+SHEET_THICKNESS = 0.01
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Build:
+    """How a body is meshed: arguments of `fem.assemble`; `drag` (m,) in 1/s or None."""
+
+    mesh: TetMesh
+    material: dict[int, Material]
+    fixed: dict[str, str]
+    absorbing: Ints | None
+    drag: Floats | None = None
+    symmetry: str = ""
+
+
+def build(
+    body: Body, h: float | None = None, symmetry: str = "", thickness: float | None = None
+) -> Build:
+    """Mesh a flat body with cells of h in metre, or as fine as the scene set needs.
+
+    Parameters
+    ----------
+    symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
+        part with positive coordinates is meshed, and slides along these planes
+    thickness : of the equivalent of a sheet in metre, `SHEET_THICKNESS` of its shorter side if not
+        given, and no less than the sheet's own
+
+    Raises
+    ------
+    ValueError
+        If the body is "none", or would have too many unknowns.
+    """
+    size, drag = _checked(body, h or default_size(body)), None
+    if body.kind == "sheet":
+        thickness = thickness or SHEET_THICKNESS * min(body.width, body.height)
+        thickness = max(body.depth, thickness)
+        mesh = sheet(body.width, body.height, thickness, size)
+        materials: Sequence[Material] = [bending_equivalent(body.solid, body.depth / thickness)]
+    else:
+        starts, materials = zip(*body.strata, strict=True)
+        if body.kind == "slab":
+            mesh = extrude(*slab_lines(body, size))
+            depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+        else:
+            mesh = hands.hand(body, size)
+            depth = hands.depths(mesh)
+        mesh = replace(mesh, region=_strata(starts, depth, size if body.kind != "slab" else 0.0))
+    ends = {"bottom": body.base, "sides": body.sides}
+    fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
+    for axis in symmetry:
+        mesh = half(mesh, axis)
+        fixed[f"mirror_{axis}"] = axis
+    if has_layer(body):
+        drag = layer_drag(body, mesh)
+    mesh = replace(mesh, points=body.placement(mesh.points))
+    leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
+    leaky = [facets for facets in leaky if len(facets)]  # a whole hand has no ends
+    return Build(
+        mesh=mesh,
+        material=dict(enumerate(materials)),
+        fixed=fixed,
+        absorbing=np.vstack(leaky) if leaky else None,
+        drag=drag,
+        symmetry=symmetry,
+    )
+
+
+def operators(build: Build) -> Operators:
+    """Stiffness, damping and mass of a meshed body."""
+    return assemble(
+        build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing, drag=build.drag
+    )
+
+
+def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
+    """P (3 n, k): nodal forces in N of the pressure in Pa that a surface across the beam would
+    feel, and the points (k, 3) in metre where it is taken.
+
+    Radiation pressure goes with the square of the cosine of incidence: once for the beam that a
+    sloping surface spreads over, and once for the momentum that it turns back along its normal.
+    """
+    cosine = np.maximum(facet_normals(build.mesh)[:, 2], 0.0)
+    return load_operator(build.mesh) * cosine**2, facet_points(build.mesh)
+
+
+def check_mesh(body: Body, h: float) -> None:
+    """Refuse, before anything is computed, what `build` cannot mesh with cells of h in metre.
+
+    Raises
+    ------
+    ValueError
+        If cells are larger than the body, or more than can be solved for.
+    """
+    h = _checked(body, h)
+    if body.kind == "sheet":
+        check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
+    elif body.kind == "slab":
+        check_size(len(line) - 1 for line in slab_lines(body, h))
+
+
+def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
+    """Grid lines along x, y and z: fine where the focus travels, with a layer that absorbs."""
+    along, down = (
+        Grading(radius=radius, growth=growth, coarsest=coarsest * h)
+        for radius, growth, coarsest in zip((FINE_RADIUS, 0.0), GROWTH, COARSEST, strict=True)
+    )
+    halves = [graded_axis(side / 2, h, along) for side in (body.width, body.height)]
+    if has_layer(body):
+        halves = [np.concatenate([half, half[-1] + _layer_line(body, half)]) for half in halves]
+    x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
+    z = graded_axis(body.depth, h, down)
+    return x, y, -with_planes(z, [start for start, _ in body.strata[1:]])[::-1]
+
+
+def _strata(starts: Sequence[float], depth: Floats, h: float) -> Ints:
+    """Which stratum (m,) the middle of each tetrahedron lies in, of a mesh without its planes."""
+    thinnest = np.diff(starts).min(initial=np.inf)
+    if thinnest < 0.5 * h:
+        raise ValueError(
+            f"a layer of {1e3 * thinnest:g} mm is thinner than half an element of {1e3 * h:g} mm; "
+            "take smaller elements, thicker layers, or a slab, whose elements follow its layers"
+        )
+    return np.searchsorted(starts[1:], depth, side="right")
+
+
+def has_layer(body: Body) -> bool:
+    """Whether more is meshed around a body than itself, to take waves away."""
+    return body.kind == "slab" and body.sides == "absorbing"
+
+
+def layer_scale(body: Body) -> float:
+    """The length in metre that an absorbing layer is a multiple of: the depth, if that counts."""
+    return min(body.depth, body.solid.shear_speed / (4 * LOWEST_CUT_ON))
+
+
+def _layer_line(body: Body, half: Floats) -> Floats:
+    """Grid lines of the layer, from where the body ends."""
+    scale = layer_scale(body)
+    grading = Grading(radius=0.0, growth=LAYER_GROWTH, coarsest=LAYER_COARSEST * scale)
+    first = min(LAYER_GROWTH * (half[-1] - half[-2]), grading.coarsest)
+    return graded_axis(LAYER_WIDTH * scale, first, grading)[1:]
+
+
+def layer_drag(body: Body, mesh: TetMesh) -> Floats:
+    """Drag (m,) in 1/s of each element: 0 in the body, rising with the square of the distance."""
+    scale, ends = layer_scale(body), np.array([body.width, body.height]) / 2
+    middles = np.abs(mesh.points[mesh.tets[:, :4], :2].mean(axis=1))
+    beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / (LAYER_WIDTH * scale)
+    return LAYER_DRAG * 2 * np.pi * body.solid.shear_speed / (4 * scale) * beyond**2
+
+
+def _checked(body: Body, h: float) -> float:
+    if body.kind == "none":
+        raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    if body.kind == "mesh":
+        return h
+    if not isfinite(body.depth):
+        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
+    longest = max(body.width, body.height, body.depth)
+    if h > longest:
+        raise ValueError(
+            f"elements of {1e3 * h:g} mm are larger than the body, whose longest side is "
+            f"{1e3 * longest:g} mm; take smaller ones"
+        )
+    return h
+
+
+def default_size(body: Body) -> float:
+    """Element size in metre of a body whose user asks for none."""
+    if body.kind == "sheet":
+        return min(body.width, body.height) / SHEET_CELLS
+    return min(SLAB_CELL, body.depth / 2)
+
+
+def bending_equivalent(material: Material, ratio: float) -> Material:
+    """The material of a thicker sheet that bends and weighs the same; ratio of the thicknesses.
+
+    Bending stiffness goes with E d^3, mass per area with rho d. Right for linear bending only.
+    """
+    return replace(
+        material,
+        density=material.density * ratio,
+        shear_modulus=material.shear_modulus * ratio**3,
+        viscosity=material.viscosity * ratio**3,
+    )
+
+
+def compliance(body: Body) -> Compliance:
+    """How an endless body of the same section gives way; a sheet vibrates in vacuum.
+
+    Raises
+    ------
+    ValueError
+        If there is no body, or none that has exact waves.
+    """
+    solid = body.solid
+    if body.kind == "sheet":
+        return thin_sheet(
+            bending_stiffness=body.bending_stiffness,
+            mass_per_area=body.mass_per_area,
+            loss_factor=solid.loss_factor,
+            viscous_lag=solid.viscosity / solid.shear_modulus,
+            air_density=0.0,
+        )
+    if body.kind not in ("sheet", "slab") or (body.base != "clamped" and isfinite(body.depth)):
+        raise ValueError(
+            "flat-body answers a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
+        )
+    values = {
+        "density": solid.density,
+        "shear_modulus": solid.shear_modulus,
+        "poisson": solid.poisson,
+        "viscosity": solid.viscosity,
+        "loss_factor": solid.loss_factor,
+    }
+    return slab(**values, depth=body.depth) if isfinite(body.depth) else half_space(**values)

@@ -1,0 +1,231 @@
+"""Answers without reduction: every time step, every line, and exact waves of endless bodies."""
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache, partial
+from itertools import islice
+from math import ceil
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import CubicSpline
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model import Effort, Response
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from skinwave.effort import Clock, Progress, peak_memory, versions
+from skinwave.models.bodies import Build, operators, surface_load
+from skinwave.models.bodies import build as build_body
+from skinwave.scene import Body, Scene
+
+Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
+
+MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
+CHECKED_EACH = 50  # steps of a transient
+TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
+MOST_LINES, MOST_KNOTS = 1000, 10_000  # of fem-harmonic, each a factorisation or a pattern
+MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
+
+
+def meshed(
+    body: Body, h: float | None, clock: Clock, report: Progress, symmetry: str = ""
+) -> Build:
+    """A body's mesh and what it is made of."""
+    with clock("mesh"):
+        report("mesh", 0.0)
+        return build_body(body, h, symmetry)
+
+
+def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
+    """A meshed body's operators."""
+    with clock("assemble"):
+        report("assemble", 0.0)
+        return operators(build)
+
+
+def energy_balance(spent: fem.Spent, stored: float = 0.0, when: str = "") -> tuple[float, float]:
+    """The imbalance, if it is small enough to trust an answer, and the share that was radiated.
+
+    Raises
+    ------
+    Diverged
+        If it is not.
+    """
+    imbalance = fem.imbalance(spent, stored)
+    if not imbalance <= MOST_IMBALANCE:
+        raise fem.Diverged(
+            f"the energy balance is off by {100 * imbalance:.2g} %{when}, above the limit of "
+            f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
+        )
+    radiated = spent.radiated / spent.lost if spent.lost > 0 else 0.0
+    return imbalance, radiated
+
+
+def transient_answer(
+    scene: Scene,
+    times: Floats,
+    report: Progress,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+) -> Response:
+    """The full time stepping in steps of dt, read between steps by a cubic spline."""
+    dt = dt or 1 / TRANSIENT_RATE
+    steps = step_count(float(times[-1]), dt)
+    clock = Clock()
+    build = meshed(scene.body, h, clock, report)
+    ops = assembled(build, clock, report)
+    P, points = surface_load(build)
+    S = fem.probe_operator(build.mesh, scene.probe_points)
+    report("factorise", 0.0)
+
+    @lru_cache(maxsize=4)
+    def force(t: float) -> Floats:
+        return P @ scene.pressure(points, t, over=dt)
+
+    with clock("march"):
+        states = fem.transient(ops, force, dt, solver=solver)
+        audited = fem.audited(ops, islice(states, steps + 1), force)
+        stepped, energy = marched(
+            audited, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
+        )
+    displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
+    used = fem.available()[0] if solver == "auto" else solver
+    return _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
+
+
+def marched(
+    audited: Iterator[tuple[fem.State, fem.Spent]],
+    steps: int,
+    read: Callable[[Floats], Floats],
+    stored: Callable[[fem.State], float],
+    report: Progress,
+) -> tuple[Floats, tuple[float, float]]:
+    """What is read (steps + 1, p) of each state, and the last balance of the energy.
+
+    Raises
+    ------
+    Diverged
+        If energy is missing in one of the states that are checked.
+    """
+    found = []
+    for k, (state, spent) in enumerate(audited):
+        found.append(read(state.displacement))
+        report("march", k / steps)
+        if k % CHECKED_EACH == 0 or k == steps:
+            when = f" at t = {state.time:g} s, step {k}"
+            energy = energy_balance(spent, stored(state), when)
+    return np.array(found), energy
+
+
+def step_count(duration: float, dt: float) -> int:
+    """How many steps of dt reach a duration in s.
+
+    Raises
+    ------
+    ValueError
+        If one step is longer, or there are more than `MOST_STEPS`.
+    """
+    if dt > duration:
+        raise ValueError(
+            f"dt = {dt:g} s is longer than the answer, {duration:g} s; take a shorter step"
+        )
+    if duration / dt > MOST_STEPS:
+        raise ValueError(
+            f"dt = {dt:g} s makes {duration / dt:.2g} steps, the limit is {MOST_STEPS:,}; take a "
+            "longer step or a shorter duration"
+        )
+    return max(3, ceil(duration / dt - 1e-9))
+
+
+def harmonic_answer(
+    scene: Scene,
+    times: Floats,
+    report: Progress,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+    threshold: float = 1e-3,
+    mapped: Map = map,
+) -> Response:
+    """The steady state: one factorisation for each line of the load above the threshold.
+
+    `mapped` is shaped like the built-in `map`; it may spread the lines over other machines.
+    """
+    clock = Clock()
+    build = meshed(scene.body, h, clock, report)
+    ops = assembled(build, clock, report)
+    P, points = surface_load(build)
+    S = fem.probe_operator(build.mesh, scene.probe_points)
+    with clock("lines"):
+        lines, knots = load_lines(scene.pressure, threshold), path_knots(scene.pressure)
+        count = len(np.unique(np.round(lines.frequencies, 9)))
+        if count > MOST_LINES or len(knots) > MOST_KNOTS:
+            raise ValueError(
+                f"this load has {count:,} lines from {len(knots):,} positions, the limits are "
+                f"{MOST_LINES:,} and {MOST_KNOTS:,}; take --model fem"
+            )
+        weights = path_weights(scene.pressure)[:, None]
+        spots = along_path((scene.pressure.spot(points, knots) * weights).T)
+        frequencies, pressures = lines.gather(spots.T)
+        amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
+        total = fem.Spent()
+        report("lines", 0.0)
+        answers = mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
+        for k, (amplitudes[k], power) in enumerate(answers):
+            report("lines", (k + 1) / len(frequencies))
+            energy_balance(power, when=f" at {frequencies[k]:g} Hz")
+            total += power
+    energy = energy_balance(total)
+    waves = np.exp(2j * np.pi * times[:, None] * frequencies)
+    displacement = (waves @ amplitudes).real
+    count = len(frequencies)
+    used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
+    return _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
+
+
+def _line(
+    ops: fem.Operators,
+    P: sparse.csr_array,
+    S: sparse.csr_array,
+    solver: str,
+    frequency: float,
+    pressure: fem.Complex,
+) -> tuple[fem.Complex, fem.Spent]:
+    """Motion (p,) in metre of the probes at one line, and what becomes of its power."""
+    force, free = P @ pressure, ops.free
+    u = fem.harmonic(ops, force, frequency, solver=solver)
+    line = force[None, free], u[:, free], np.array([frequency])
+    return S @ u[0], fem.mean_power(ops.C, ops.R, *line)
+
+
+def _response(
+    model: str,
+    scene: Scene,
+    times: Floats,
+    displacement: Floats,
+    clock: Clock,
+    operators: fem.Operators,
+    steps: int,
+    solver: str,
+    energy: tuple[float, float],
+) -> Response:
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        steps=steps,
+        peak_memory=peak_memory(),
+        solver=solver,
+        energy_imbalance=energy[0],
+        radiated=energy[1],
+        versions=versions(),
+    )
+    return Response(
+        model=model,
+        times=times,
+        probes=scene.probe_points,
+        displacement=displacement,
+        effort=effort,
+    )

@@ -1,0 +1,199 @@
+"""A body reduced to its probes, ready to answer any Tacton."""
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+import fem
+from meshes import cache
+from meshes.tetmesh import Floats
+from simple_model import Effort, MovingPressure, Response
+from simple_model.focus import spot_reach, spot_width
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from skinwave.effort import Clock, Progress, peak_memory, silent, versions
+from skinwave.models.bodies import Build, surface_load
+from skinwave.models.full import assembled, energy_balance, meshed
+from skinwave.scene import Body, Scene
+
+SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
+BAND = 1000.0  # Hz up to which the reduced model must be right
+REDUCTION_TOLERANCE = 1e-3
+POLES = ("values", "inputs", "outputs")
+ARRAYS = ("damping", "radiation", "read", "load", "points")
+NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
+
+
+def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
+    """Times (t,) in s of a response: from 0 up to the duration, at least two."""
+    return np.arange(max(2, round(scene.tacton.duration * rate))) / rate
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prepared:
+    """A body ready to answer any Tacton at its probes.
+
+    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r) and the
+    `radiation` (r, r) in it;
+    `read` (p, r): displacement of the probes; `load` (k, r): reduced forces of unit pressure at
+    the surface points (k, 3).
+    """
+
+    probes: Floats
+    poles: fem.Poles
+    damping: Floats
+    radiation: Floats
+    read: Floats
+    load: Floats
+    points: Floats
+    effort: Effort
+
+
+def prepare(
+    body: Body,
+    probes: Floats,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+    tolerance: float = REDUCTION_TOLERANCE,
+    symmetry: str = "",
+) -> Prepared:
+    """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine.
+
+    With `symmetry`, as in `bodies.build`, once for all Tactons that have it.
+    """
+    clock = Clock()
+    build = meshed(body, h, clock, silent, symmetry)
+    mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
+    name = cache.key(
+        mesh.points,
+        mesh.tets,
+        mesh.region,
+        build.material,
+        *ends,
+        probes,
+        BAND,
+        tolerance,
+        versions(),
+    )
+    with clock("read from cache"):
+        entry = cache.load(name) or {}
+    if not {*POLES, *ARRAYS, "meta"} <= set(entry):  # none, or that of another version
+        report = progress or silent
+        return _prepared_anew(body, build, probes, clock, report, solver, tolerance, name)
+    effort = Effort(**entry["meta"])
+    return Prepared(
+        probes=probes,
+        poles=fem.Poles(**{name: entry[name] for name in POLES}),
+        effort=replace(effort, seconds=clock.seconds, peak_memory=peak_memory()),
+        **{name: entry[name] for name in ARRAYS},
+    )
+
+
+def _prepared_anew(
+    body: Body,
+    build: Build,
+    probes: Floats,
+    clock: Clock,
+    report: Progress,
+    solver: str,
+    tolerance: float,
+    name: str,
+) -> Prepared:
+    report("mesh", 1.0)
+    mesh, operators = build.mesh, assembled(build, clock, report)
+    with clock("factorise and reduce"):
+        report("factorise", 0.0)
+        P, points = surface_load(build)
+        model = fem.reduce(
+            operators,
+            fem.probe_operator(mesh, _mirrored(probes, build.symmetry)),
+            BAND,
+            tolerance,
+            loads=P @ typical_spots(body, points),
+            solver=solver,
+            progress=lambda fraction: report("reduce", fraction),
+        )
+    with clock("diagonalise"):
+        poles = fem.poles(model, outputs=np.eye(len(model.K)))
+        arrays = {
+            "damping": model.C, "radiation": model.R, "read": model.outputs,
+            "load": P.T @ model.basis, "points": points,
+        }  # fmt: skip
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        reduced_dofs=len(model.K),
+        peak_memory=peak_memory(),
+        solver=model.solver,
+        estimate=model.estimate,
+        versions=versions(),
+    )
+    cache.store(name, asdict(effort), **asdict(poles), **arrays)
+    return Prepared(probes=probes, poles=poles, effort=effort, **arrays)
+
+
+def _mirrored(probes: Floats, symmetry: str) -> Floats:
+    """The probes where they are seen in the part that is modelled."""
+    kept = probes.copy()
+    for axis in ("xy".index(a) for a in symmetry):
+        kept[:, axis] = np.abs(kept[:, axis])
+    return kept
+
+
+def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -> Response:
+    """Motion of the prepared probes under a scene's Tacton, from rest: every line of the load,
+    and the free vibration that its start leaves.
+    """
+    clock, times = Clock(), sample_times(scene)
+    if progress:
+        progress("lines", 0.0)
+    with clock("lines"):
+        frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
+        motion, start = fem.line_response(prepared.poles, forces, frequencies)
+        damping = prepared.damping, prepared.radiation
+        power = fem.mean_power(*damping, forces, motion, frequencies)
+        imbalance, radiated = energy_balance(power)
+        lines, start = motion @ prepared.read.T, start @ prepared.read.T
+        strength = np.abs(lines).max(axis=1)
+        heard = strength > NEGLIGIBLE_LINE * strength.max()
+        rates = np.concatenate([2j * np.pi * frequencies[heard], prepared.poles.values])
+        displacement = fem.exponential_sum(rates, np.vstack([lines[heard], start]), times)
+    effort = replace(
+        prepared.effort,
+        seconds={**prepared.effort.seconds, **clock.seconds},
+        steps=int(heard.sum()),
+        energy_imbalance=imbalance,
+        radiated=radiated,
+        peak_memory=peak_memory(),
+    )
+    return Response(
+        model="fem",
+        times=times,
+        probes=prepared.probes,
+        displacement=displacement,
+        effort=effort,
+    )
+
+
+def reduced_lines(
+    pressure: MovingPressure, points: Floats, load: Floats
+) -> tuple[Floats, fem.Complex]:
+    """Frequencies (f,) in Hz of a load's lines, and the reduced force (f, r) of each."""
+    lines = load_lines(pressure)
+    knots, reach = path_knots(pressure), spot_reach(pressure.height, pressure.focus)
+    forces = []
+    for part in np.array_split(knots, len(knots) // 64 + 1):
+        low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
+        near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
+        forces.append(pressure.spot(points[near], part) @ load[near])
+    weighted = np.vstack(forces) * path_weights(pressure)[:, None]
+    return lines.gather(along_path(weighted.T).T)
+
+
+def typical_spots(body: Body, points: Floats) -> Floats:
+    """Unit Gaussian spots (n, 12) where palm-sized paths run, to judge a reduction by."""
+    reach = min(20e-3, body.width / 3, body.height / 3)
+    centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
+    squared = ((points[:, None, :2] - centres) ** 2).sum(axis=2)
+    return np.exp(-squared / (2 * spot_width(0.2) ** 2))

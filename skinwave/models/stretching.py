@@ -1,0 +1,229 @@
+"""Answers of a sheet that stretches as it bends: about its rest under the mean pressure.
+
+A sheet is meshed as the linear models do it, with a solid some ten times too thick that bends and
+weighs as the true one. Solids so thick resist stretching d^2 / h^2 times too little, so that a
+membrane half way through makes up for what is missing: bending stiffness, mass and resistance to
+stretching are all those of the true sheet, and no element is flat.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import islice
+from math import pi
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+import fem
+from fem import nonlinear
+from meshes import middle_plane
+from meshes.tetmesh import Floats
+from simple_model import Effort, MovingPressure, Response
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from skinwave.effort import Clock, Progress, peak_memory, versions
+from skinwave.models.bodies import Build, build, surface_load
+from skinwave.models.full import TRANSIENT_RATE, marched, step_count
+from skinwave.models.prepared import reduced_lines
+from skinwave.models.speeds import bending_wavenumber
+from skinwave.scene import Body, Scene
+
+# Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
+# as much as elements of this side raise them. At 7 elements a wave 0.3 % are left of 5 %.
+STOCKY, STOUTEST = 0.48, 0.05
+FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
+COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
+HIGHEST_MODE = 1500.0  # Hz, of the modes that are kept
+FEWEST_MODES, MOST_MODES = 40, 160
+
+
+def sheet_only(body: Body, model: str) -> None:
+    """Refuse a body that is no sheet held at its edges.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    if body.kind != "sheet" or body.sides != "clamped":
+        raise ValueError(
+            f"{model} answers a sheet with clamped sides, not a {body.kind} with {body.sides} "
+            "sides; give it one, or use --model fem"
+        )
+    if body.placement.is_tilted:
+        raise ValueError(
+            f"{model} answers a sheet that lies across the beam, not a tilted one; leave out its "
+            "tilt, or use --model fem"
+        )
+
+
+def stretching_size(body: Body, *, reduced: bool) -> float:
+    """Element size in metre of a sheet whose user asks for none."""
+    return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)
+
+
+def expected_error(body: Body, h: float) -> float:
+    """Relative error of a waveform with elements of h in metre, as measured on a sheet of paper."""
+    return min(1.0, COARSE_ERROR * (h * FULL_CELLS / min(body.width, body.height)) ** ERROR_ORDER)
+
+
+def meshed_sheet(body: Body, h: float) -> Build:
+    """The sheet in cells of h in metre, as thick as suits them."""
+    thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
+    return build(body, h, thickness=thickness)
+
+
+def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membrane:
+    """What a meshed sheet lacks of its resistance to stretching, or a given share of the whole."""
+    ratio = body.depth / float(np.ptp(made.mesh.points[:, 2]))
+    share = 1 - ratio**2 if share is None else share
+    triangles = middle_plane(made.mesh)
+    return fem.Membrane(triangles=triangles, thickness=share * body.depth, material=body.solid)
+
+
+def stretching_body(body: Body, made: Build) -> fem.Elastic:
+    """The meshed sheet with all its unknowns."""
+    missing = membrane(body, made)
+    return fem.finite_strain(
+        made.mesh,
+        made.material,
+        fixed=made.fixed,
+        membrane=missing if missing.thickness > 1e-9 * body.depth else None,
+    )
+
+
+def mean_pressure(pressure: MovingPressure, points: Floats) -> Floats:
+    """Pressure (n,) in Pa at surface points (n, 2 or 3), averaged over all time."""
+    lines = load_lines(pressure)
+    mean = lines.frequencies < 1e-9
+    weighted = pressure.spot(points, path_knots(pressure)) * path_weights(pressure)[:, None]
+    along = along_path(weighted.T)
+    return (along[:, lines.harmonics[mean]] @ lines.coefficients[mean]).real
+
+
+def full_answer(
+    scene: Scene,
+    times: Floats,
+    report: Progress,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+) -> Response:
+    """Every unknown and every step, from rest under the mean pressure."""
+    sheet_only(scene.body, "fem-nonlinear-transient")
+    clock = Clock()
+    with clock("assemble"):
+        report("assemble", 0.0)
+        made = meshed_sheet(scene.body, h or stretching_size(scene.body, reduced=False))
+        body = stretching_body(scene.body, made)
+    P, points = surface_load(made)
+    S = fem.probe_operator(made.mesh, scene.probe_points)
+    dt = dt or 1 / TRANSIENT_RATE
+    return _about_rest(
+        "fem-nonlinear-transient", scene, times, report, clock,
+        body=body,
+        mean=P @ mean_pressure(scene.pressure, points),
+        force=lambda t: P @ scene.pressure(points, t, over=dt),
+        read=lambda u: S @ u,
+        dt=dt, solver=solver,
+        effort=Effort(dofs=len(body.operators.free)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Reduced:
+    """A sheet in its bending modes."""
+
+    made: Build
+    modes: fem.StretchingModes
+    load: Floats  # (n, r), modal forces of unit pressure at the points (n, 3)
+    points: Floats
+    dofs: int
+
+
+def reduced_answer(
+    scene: Scene,
+    times: Floats,
+    report: Progress,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+) -> Response:
+    """The sheet's bending modes, step by step, from rest under the mean pressure."""
+    sheet_only(scene.body, "fem-nonlinear")
+    clock = Clock()
+    with clock("reduce"):
+        report("reduce", 0.0)
+        sheet = _reduced(scene.body, h, solver)
+        hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
+        read = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
+
+    def force(t: float) -> Floats:
+        return (np.exp(2j * pi * hz * t) @ forces).real
+
+    return _about_rest(
+        "fem-nonlinear", scene, times, report, clock,
+        body=sheet.modes.elastic,
+        mean=forces[hz < 1e-9].real.sum(axis=0),
+        force=force,
+        read=lambda z: read @ z,
+        dt=dt or 1 / TRANSIENT_RATE, solver=solver,
+        effort=Effort(
+            dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
+        ),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def _reduced(body: Body, h: float | None, solver: str) -> _Reduced:
+    """The sheet reduced, once for many Tactons in a row."""
+    made = meshed_sheet(body, h or stretching_size(body, reduced=True))
+    operators = stretching_body(body, made).operators
+    modes = fem.stretching_modes(
+        made.mesh, operators, membrane(body, made, 1.0), mode_count(body), solver=solver
+    )
+    P, points = surface_load(made)
+    return _Reduced(
+        made=made, modes=modes, load=P.T @ modes.basis, points=points, dofs=len(operators.free)
+    )
+
+
+def mode_count(body: Body) -> int:
+    """Modes of a sheet below `HIGHEST_MODE`: its area times k^2 / 4 pi (Courant and Hilbert)."""
+    squared = bending_wavenumber(body, HIGHEST_MODE) ** 2
+    found = round(body.width * body.height * squared / 4 / pi)
+    return min(max(found, FEWEST_MODES), MOST_MODES)
+
+
+def _about_rest(
+    model: str, scene: Scene, times: Floats, report: Progress, clock: Clock, *,
+    body: fem.Elastic, mean: Floats, force: Callable[[float], Floats],
+    read: Callable[[Floats], Floats], dt: float, solver: str, effort: Effort,
+) -> Response:  # fmt: skip
+    """The motion from rest under the mean load."""
+    steps = step_count(float(times[-1]), dt)
+    kept = lru_cache(maxsize=2)(force)
+    with clock("preload"):
+        report("preload", 0.0)
+        rest = nonlinear.static(body, mean, solver=solver)
+    start = replace(fem.at_rest(len(rest)), displacement=rest)
+    at_start = nonlinear.total_energy(body, start)
+    with clock("march"):
+        states = nonlinear.dynamic(body, lambda t, u: kept(t), dt, initial=start, solver=solver)
+        stepped, (imbalance, _) = marched(
+            nonlinear.audited(body, islice(states, steps + 1), kept), steps, read,
+            lambda state: nonlinear.total_energy(body, state) - at_start, report,
+        )  # fmt: skip
+    return Response(
+        model=model,
+        times=times,
+        probes=scene.probe_points,
+        displacement=CubicSpline(np.arange(steps + 1) * dt, stepped)(times),
+        effort=replace(
+            effort, seconds=clock.seconds, steps=steps, peak_memory=peak_memory(),
+            solver=fem.available()[0] if solver == "auto" else solver,
+            energy_imbalance=imbalance, versions=versions(),
+        ),
+    )  # fmt: skip

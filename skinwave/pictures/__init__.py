@@ -1,0 +1,1 @@
+"""Pictures: figures, maps, views in three dimensions, films."""

@@ -1,0 +1,193 @@
+"""Figures for print and page (matplotlib): waveforms, spectra and spread, models overlaid."""
+
+import warnings
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from meshes.tetmesh import Floats
+from simple_model import spectrum
+from skinwave.comparison import moving_rms
+from skinwave.run import Run
+
+# Okabe and Ito's colours, told apart by every kind of colour vision; one model, one colour.
+COLOURS = {"none": "#000000", "paper-sheet": "#D55E00", "skin-slab": "#0072B2"}
+SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+LABELS = {
+    "none": "point kernel",
+    "paper-sheet": "paper sheet (fem)",
+    "skin-slab": "skin slab (fem)",
+}
+FLOOR = -80.0  # dB
+HIGHEST = 650.0  # Hz shown
+SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
+
+
+def png(figure: Figure, dpi: int = 110) -> bytes:
+    """The figure as a PNG file in memory."""
+    buffer = BytesIO()
+    with warnings.catch_warnings():  # a name in letters that the font lacks is shown as boxes
+        warnings.filterwarnings("ignore", "Glyph")
+        figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
+
+
+def tacton_figure(title: str, runs: list[Run]) -> Figure:
+    """Waveform and spectrum at each probe, all models overlaid."""
+    probes = runs[0].response.probes
+    figure = Figure(figsize=(10.5, 1.6 * len(probes) + 1.3))
+    axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
+    for p, (x, y) in enumerate(probes):
+        _waveforms(axes[p, 0], runs, p)
+        _spectra(axes[p, 1], runs, p, named=p == 0)
+        axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
+    axes[0, 0].set_title(
+        f"{title}: waveform about its mean, in units of the model", fontsize=10, parse_math=False
+    )
+    axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize=10)
+    axes[-1, 0].set_xlabel("time, ms")
+    axes[-1, 1].set_xlabel("frequency, Hz")
+    _legend(figure, runs, scales=True)
+    inch = 1 / figure.get_figheight()  # fixed margins: a computed layout takes twice as long
+    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - 0.65 * inch, wspace=0.1, hspace=0.13)
+    return figure
+
+
+def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
+    """A few Tactons side by side: waveform, spectrum at one probe, and spread over all."""
+    figure = Figure(figsize=(4.0 * len(columns) + 0.5, 8.2), layout="constrained")
+    axes = figure.subplots(3, len(columns), sharey="row", squeeze=False)
+    for k, (title, runs) in enumerate(columns.items()):
+        where = 1e3 * np.hypot(*runs[0].response.probes[probe])
+        axes[0, k].set_title(title, parse_math=False)
+        _waveforms(axes[0, k], runs, probe)
+        _spectra(axes[1, k], runs, probe, named=True)
+        _spread(axes[2, k], runs)
+        axes[0, k].set_xlabel("time, ms")
+        axes[1, k].set_xlabel("frequency, Hz")
+        axes[2, k].set_xlabel("distance from the centre of the path, mm")
+    axes[0, 0].set_ylabel(f"motion at {where:g} mm\n/ largest of the model")
+    axes[1, 0].set_ylabel(f"spectrum at {where:g} mm,\ndB re largest line of the model")
+    axes[2, 0].set_ylabel("RMS motion,\ndB re strongest probe")
+    _legend(figure, next(iter(columns.values())), scales=False)
+    return figure
+
+
+def colour(body: str) -> str:
+    """The colour of a body in every picture."""
+    return COLOURS.get(body) or SPARE[sum(map(ord, body)) % len(SPARE)]
+
+
+def marker(body: str) -> str:
+    """The marker of a body in every picture."""
+    return {"none": "o", "paper-sheet": "s"}.get(body, "^")
+
+
+def label(body: str) -> str:
+    """The name of a body in every legend."""
+    return LABELS.get(body, f"{body} (fem)")
+
+
+def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
+    """One entry a model, with what 1 on the waveform axis stands for if that is one number."""
+    handles, labels = [], []
+    for run in runs:
+        style: dict[str, Any] = {"color": colour(run.body), "marker": marker(run.body), "lw": 2}
+        handles.append(figure.axes[0].plot([], [], **style)[0])
+        labels.append(label(run.body) + (f", 1 = {_scale_text(run)}" if scales else ""))
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper center" if figure.get_layout_engine() else "upper center",
+        ncols=len(runs),
+        frameon=False,
+    )
+
+
+def _scale_text(run: Run) -> str:
+    scale = _largest(run)
+    if run.response.unit == "Pa":
+        return f"{scale:.3g} Pa"
+    return f"{1e6 * scale:.3g} µm"
+
+
+def _shown(run: Run) -> slice:
+    times = run.response.times
+    return slice(max(0, len(times) - 1 - round(SHOWN / times[1])), None)
+
+
+def _largest(run: Run) -> float:
+    """Largest excursion about the mean at any probe in the part that is shown."""
+    return float(np.abs(_centred(run)).max()) or 1.0
+
+
+def _centred(run: Run) -> Floats:
+    shown = run.response.displacement[_shown(run)]
+    return shown - (shown.max(axis=0) + shown.min(axis=0)) / 2
+
+
+def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
+    for run in runs:
+        centred = _centred(run)[:, p] / _largest(run)
+        times = 1e3 * run.response.times[_shown(run)]
+        ax.plot(times, centred, color=colour(run.body), lw=_width(run), zorder=_depth(run))
+    ax.margins(x=0)
+    ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
+    ax.set_ylim(-1.1, 1.1)
+    ax.grid(alpha=0.25)
+
+
+def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
+    for run in runs:
+        f, amplitude = spectrum(run.response, "blackmanharris")
+        moving = f > 8.0  # the mean and its leakage are no vibration
+        top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
+        level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
+        style: dict[str, Any] = {"color": colour(run.body), "zorder": _depth(run)}
+        ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
+        lines = np.array([[run.frequencies[n], run.lines[n][p]] for n in run.frequencies])
+        lines = lines.reshape(-1, 2)  # a constant pressure has none
+        height = 20 * np.log10(np.maximum(lines[:, 1] / top, 1e-12))
+        seen = height > FLOOR
+        ax.plot(lines[seen, 0], height[seen], ls="", marker=marker(run.body), ms=4, **style)
+    ax.set_xlim(0, HIGHEST)
+    ax.set_ylim(FLOOR, 14)
+    ax.set_yticks(np.arange(FLOOR, 1, 20))
+    ax.grid(alpha=0.25)
+    if named:
+        for name, frequency in runs[0].frequencies.items():
+            if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
+                text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
+                ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize=8,
+                        bbox={"fc": "white", "ec": "none", "pad": 0.5})  # fmt: skip
+
+
+def _spread(ax: Axes, runs: list[Run]) -> None:
+    for run in runs:
+        level = moving_rms(run.response)
+        radius = 1e3 * np.hypot(*run.response.probes.T)
+        decibel = 20 * np.log10(np.maximum(level / max(level.max(), 1e-300), 1e-12))
+        ax.plot(
+            radius, decibel, color=colour(run.body), marker=marker(run.body), lw=_width(run), ms=5
+        )
+    for drop in (-6, -20):
+        ax.axhline(drop, color="0.6", lw=0.8, ls="--", zorder=0)
+    path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
+    if path:
+        ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
+        ax.text(path, -58, " focus path", fontsize=8, color="0.4", va="bottom")
+    ax.set_ylim(-60, 4)
+    ax.grid(alpha=0.25)
+
+
+def _width(run: Run) -> float:
+    return 1.0 if run.body == "none" else 1.4
+
+
+def _depth(run: Run) -> int:
+    return 4 if run.body == "none" else 3

@@ -1,0 +1,108 @@
+"""Films of a period of motion: GIF, or MP4 where an encoder is installed."""
+
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skinwave.effort import Progress, silent
+from skinwave.models.speeds import period
+from skinwave.pictures.figures import COLOURS, SPARE
+from skinwave.pictures.render import Image, stage
+from skinwave.pictures.styles import Style
+from skinwave.pictures.views import View
+
+LASTS = 4.0  # s that a period lasts on the screen
+FORMATS = (".gif", ".mp4")
+ENCODER = ("imageio", "imageio_ffmpeg")
+SHADES = 240  # colours of a GIF that are found in its frames; the rest are those of the page
+
+
+def film(
+    path: Path,
+    views: Sequence[View],
+    style: Style,
+    progress: Progress | None = None,
+    *,
+    camera: str = "tilted",
+    panel: tuple[int, int] | None = None,
+) -> None:
+    """Write the views' frames, one period in the steady state, which repeats without a seam where
+    the load is periodic.
+
+    Raises
+    ------
+    ValueError
+        If the ending is neither .gif nor .mp4, or there is no encoder for the latter.
+    """
+    check_format(path)
+    frames = _frames(views, style, progress or silent, camera, panel)
+    if path.suffix == ".gif":
+        _write_gif(path, list(frames), style)
+    else:
+        _write_mp4(path, frames, len(views[0].times))
+
+
+def check_format(path: Path) -> None:
+    """Refuse a film that cannot be written, before anything is computed for it.
+
+    Raises
+    ------
+    ValueError
+        As `film` does.
+    """
+    if path.suffix not in FORMATS:
+        raise ValueError(f"film '{path.name}' ends in none of {', '.join(FORMATS)}; name it .gif")
+    if path.suffix == ".mp4" and not all(map(find_spec, ENCODER)):
+        raise ValueError(
+            "MP4 needs imageio and imageio-ffmpeg, which are not installed; install the extra "
+            "[film], or name it .gif"
+        )
+
+
+def seam(view: View) -> str:
+    """What part of a view's motion is shown, and whether it repeats without a seam, in words."""
+    span = f"{1e3 * view.period:.3g} ms"
+    if period(view.scene.pressure) is not None:
+        return f"one period of {span}, which repeats without a seam"
+    return f"{span}, a period of the slowest tone; the load as a whole has none and leaves a seam"
+
+
+def _frames(
+    views: Sequence[View], style: Style, report: Progress, camera: str,
+    panel: tuple[int, int] | None,
+) -> Iterator[Image]:  # fmt: skip
+    with stage(views, style, camera=camera, panel=panel) as show:
+        for k in range(len(views[0].times)):
+            report("film", k / len(views[0].times))
+            yield show(k)
+
+
+def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
+    """With one palette for all frames, so that still parts do not flicker."""
+    from PIL import Image as Pillow
+
+    some = Pillow.fromarray(np.concatenate(frames[:: max(1, len(frames) // 4)]))
+    page = [style.paper, style.ink, *COLOURS.values(), *SPARE]
+    exact = [int(colour[k : k + 2], 16) for colour in page for k in (1, 3, 5)]
+    palette = Pillow.new("P", (1, 1))
+    palette.putpalette(exact + (some.quantize(SHADES, kmeans=1).getpalette() or []))
+    shown = [
+        Pillow.fromarray(frame).quantize(palette=palette, dither=Pillow.Dither.NONE)
+        for frame in frames
+    ]
+    shown[0].save(
+        path, save_all=True, append_images=shown[1:], loop=0, optimize=False,
+        duration=round(1e3 * LASTS / len(frames) / 10) * 10,  # ms, in steps of ten
+    )  # fmt: skip
+
+
+def _write_mp4(path: Path, frames: Iterator[Image], count: int) -> None:
+    import imageio.v2 as imageio
+
+    writer: Any
+    with imageio.get_writer(path, fps=count / LASTS, macro_block_size=16) as writer:
+        for frame in frames:
+            writer.append_data(frame)

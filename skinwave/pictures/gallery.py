@@ -1,0 +1,195 @@
+"""Every picture of an album, drawn once: as files, and as parts of a page."""
+
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image as Pillow
+from PIL import features
+
+from skinwave.effort import Progress
+from skinwave.pictures import maps, render
+from skinwave.pictures.album import Album
+from skinwave.pictures.figures import label, png, tacton_figure
+from skinwave.pictures.films import film, seam
+from skinwave.pictures.levels import levels_figure, strongest_probe
+from skinwave.pictures.renderer import renderer
+from skinwave.pictures.styles import Style
+from skinwave.pictures.turntable import EXTRA, turntable
+from skinwave.pictures.views import View
+from skinwave.reports import report
+from skinwave.run import Run
+
+FORMATS = ("png", "svg", "pdf")
+FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
+QUALITY = 88  # of pictures inside a page
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Where pictures go, and how: `folder`, `style`, `formats` of vector figures beside PNG."""
+
+    folder: Path
+    style: Style
+    formats: Sequence[str] = ("png",)
+
+    def figure(self, name: str, figure: Figure, caption: str) -> str:
+        """A figure as files, and as a part of the page."""
+        drawn = png(figure, self.style.dpi)
+        (self.folder / f"{name}.png").write_bytes(drawn)
+        for ending in self.formats:
+            if ending != "png":
+                figure.savefig(self.folder / f"{name}.{ending}", dpi=self.style.dpi)
+        return _part(np.asarray(Pillow.open(io.BytesIO(drawn)).convert("RGB")), caption, name)
+
+    def image(self, name: str, image: render.Image, caption: str) -> str:
+        """A view in three dimensions as a PNG, and as a part of the page."""
+        Pillow.fromarray(image).save(self.folder / f"{name}.png", optimize=True)
+        return _part(image, caption, name)
+
+
+def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
+    """Parts of a page that show an album's views, and why any of them is missing."""
+    views = list(album.views.values())
+    if not views:
+        return [report.paragraph(NO_VIEWS)]
+    if renderer().found:
+        parts = _spatial(album, views, gallery, progress)
+    else:
+        said = f"Views in three dimensions and the film are left out: {renderer().said}."
+        parts = [report.paragraph(said)]
+    for name, draw, caption in _flat(views, gallery.style):
+        progress(f"draw {name}", 0.0)
+        parts.append(gallery.figure(name, draw(), caption))
+    return parts
+
+
+def _spatial(
+    album: Album, views: Sequence[View], gallery: Gallery, progress: Progress
+) -> list[str]:
+    """Views in three dimensions, the film and what can be turned."""
+    style = gallery.style
+    parts: list[str] = []
+    own = _own(album, views)
+    frame = int(np.abs(own.pushed).max(axis=1).argmax())
+    progress("draw side by side", 0.0)
+    beside = render.picture(views, style, frame)
+    parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
+    path = gallery.folder / "film.gif"
+    film(path, views, style, progress, panel=FILM_PANEL)
+    parts.append(report.picture(path.read_bytes(), f"Film: {seam(own)}.", "film", "gif"))
+    if len(own.tets):
+        progress("draw cut open", 0.0)
+        cut = render.picture([own], style, frame, camera="front", cut=True)
+        caption = (
+            f"{label(own.body)} cut open along y = 0, the section below the black line: "
+            f"{render.shown_scale(own)}. {MARKS}"
+        )
+        parts.append(gallery.image("cut-open", cut, caption))
+    progress("draw from above", 0.0)
+    above = render.picture(views, style, frame, camera="top")
+    parts.append(gallery.image("from-above", above, f"The same from above. {COMPARED}"))
+    progress("draw to be turned", 0.0)
+    page = turntable(own, frame)
+    if page is None:
+        parts.append(report.paragraph(f"The view that can be turned is left out: {EXTRA}."))
+    else:
+        caption = (
+            f"To be turned with the mouse: {label(own.body)}, {render.shown_scale(own)}; red into "
+            f"the body, blue out of it, both by up to {maps.peak_text(own)}."
+        )
+        parts.append(report.inner_page(page, caption))
+    return parts
+
+
+def _flat(
+    views: Sequence[View], style: Style
+) -> Iterable[tuple[str, Callable[[], Figure], str]]:  # fmt: skip
+    """Name, how it is drawn and caption of every map."""
+    bodies = [view for view in views if view.unit == "m"]
+    kernel = next((view for view in views if view.unit == "Pa"), None)
+    yield "rms", lambda: maps.rms_figure(views, style), RMS
+    if kernel and bodies:
+        yield "difference", lambda: maps.difference_figure(kernel, bodies, style), DIFFERENCE
+    yield "snapshots", lambda: maps.snapshots_figure(views, style), SNAPSHOTS
+    yield "waves", lambda: maps.waves_figure(views, style), WAVES
+
+
+def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
+    """Waveforms, spectra and what is felt, for every Tacton of an album."""
+    parts: list[str] = []
+    for name, runs in tactons(album).items():
+        progress(f"draw {name}", 0.0)
+        caption = "Waveforms and spectra. Rows are probes."
+        parts.append(gallery.figure(f"waveforms-{len(parts)}", tacton_figure(name, runs), caption))
+        if any(run.response.unit == "m" for run in runs):
+            drawn = levels_figure(runs, strongest_probe(runs), gallery.style)
+            parts.append(gallery.figure(f"felt-{len(parts)}", drawn, f"{name}. {FELT}"))
+    return parts
+
+
+def tactons(album: Album) -> dict[str, list[Run]]:
+    """Runs by Tacton."""
+    groups: dict[str, list[Run]] = {}
+    for run in album.runs:
+        groups.setdefault(run.tacton, []).append(run)
+    return groups
+
+
+def _own(album: Album, views: Sequence[View]) -> View:
+    """The view of the scene's own body, or the last."""
+    same = [view for view in views if view.scene.body == album.scene.body]
+    return same[-1] if same and same[-1].unit == "m" else views[-1]
+
+
+def _drawn(views: Sequence[View]) -> str:
+    scales = (f"{label(view.body)}: {render.shown_scale(view)}" for view in views)
+    peaks = (f"{label(view.body)} {maps.peak_text(view)}" for view in views)
+    return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
+
+
+def _part(image: render.Image, caption: str, name: str) -> str:
+    """A picture in as few bytes as a browser needs."""
+    buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
+    Pillow.fromarray(image).save(buffer, format=kind, quality=QUALITY, method=4)
+    return report.picture(buffer.getvalue(), caption, name, kind)
+
+
+NO_VIEWS = (
+    "No motion of whole bodies is kept here, and so there is no picture of a surface; "
+    "skinwave report SCENE computes it."
+)
+MARKS = "Black: path and focus; yellow: probes."
+COMPARED = (
+    "Colour: motion into the body about its mean over each model's largest, and the point "
+    "kernel's pressure likewise: a pressure and a motion have no common unit."
+)
+RMS = (
+    "RMS motion about its mean over the whole steady state, relative to each model's largest; "
+    "spread is the distance of the outermost -6 and -20 dB from the centre of the path. Just "
+    "felt: a body's strongest line at its threshold for a focal spot; the point kernel's peak "
+    "pressure at the 4.4 Pa that is felt with AM at 200 Hz."
+)
+DIFFERENCE = (
+    "Where waves carry motion that the point kernel knows nothing of (red), and where it "
+    "promises more than there is (blue). Levels are each relative to the model's own largest; "
+    "below -40 dB they count as -40 dB."
+)
+SNAPSHOTS = (
+    "The surface through a period. Behind a focus that is faster than the surface wave, the Mach "
+    "angle asin(c/v); no clean cone forms on a circle smaller than a wavelength."
+)
+WAVES = (
+    "Motion over place and time in the steady state. Above: outwards along x from the path's "
+    "outermost point; the dashed lines x = c t are those of a surface wave far from its source in "
+    "a deep or endless body. Near the path and in thin slabs the phase runs ahead of them, a "
+    "clamped sheet stands rather than runs, and in the point kernel nothing runs at all. "
+    "Below: along the path; the focus runs along the black lines."
+)
+FELT = (
+    "Lines of the motion at the probe that moves most, beside the threshold of detection (a focal "
+    "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."
+)

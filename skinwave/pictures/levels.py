@@ -1,0 +1,90 @@
+"""The lines of a motion beside what is felt of them (matplotlib)."""
+
+import re
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from simple_model import sensation_level, threshold
+from simple_model.threshold import BAND, HIGHEST, LOWEST
+from skinwave.pictures.figures import colour, label, marker
+from skinwave.pictures.styles import Style
+from skinwave.run import Run
+
+LOWEST_LEVEL = -30.0  # dB re threshold, below which lines are left out
+MOST_NAMED = 9  # lines of a panel
+APART = 0.13  # of the frequency, within which two names would be drawn over each other
+
+
+def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
+    """Amplitudes of the lines at one probe, named, over the threshold of detection by frequency;
+    a panel for each run that moves a body.
+    """
+    runs = [run for run in runs if run.response.unit == "m"]
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=(5.2 * max(len(runs), 1), 4.4), layout="constrained")
+        axes = figure.subplots(1, max(len(runs), 1), sharex=True, sharey=True, squeeze=False)[0]
+        for ax, run in zip(axes, runs, strict=False):
+            _draw(ax, run, probe)
+        x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
+        axes[0].set_ylabel(f"displacement at ({x:g}, {y:g}) mm, µm peak")
+    return figure
+
+
+def strongest_probe(runs: Sequence[Run]) -> int:
+    """The probe that moves most, over the largest of each run."""
+    level = [np.ptp(run.response.displacement, axis=0) for run in runs]
+    return int(np.argmax(sum(x / max(float(x.max()), 1e-300) for x in level)))
+
+
+def felt_lines(run: Run, probe: int) -> dict[str, float]:
+    """Names of lines and their levels in dB above threshold at a probe, the highest first."""
+    levels = {
+        name: float(sensation_level(run.lines[name][probe], frequency))
+        for name, frequency in run.frequencies.items()
+    }
+    return dict(sorted(levels.items(), key=lambda item: -item[1]))
+
+
+def _draw(ax: Axes, run: Run, probe: int) -> None:
+    f = np.geomspace(LOWEST, HIGHEST, 300)
+    curve = 1e6 * threshold(f)
+    ax.plot(f, curve, color="0.45", lw=1.5, label="threshold for a focal spot")
+    factor = 10 ** (BAND / 20)
+    ax.fill_between(f, curve / factor, curve * factor, color="0.5", alpha=0.25, lw=0,
+                    label=f"±{BAND:g} dB between people")  # fmt: skip
+    shown = {n: level for n, level in felt_lines(run, probe).items() if level > LOWEST_LEVEL}
+    frequencies = np.array([run.frequencies[n] for n in shown])
+    heights = np.array([1e6 * run.lines[n][probe] for n in shown])
+    ax.vlines(frequencies, 1e-4, heights, color=colour(run.body), lw=1.2)
+    ax.plot(frequencies, heights, ls="none", marker=marker(run.body), color=colour(run.body))
+    for name in _named(run, shown):
+        ax.annotate(
+            written(name), (run.frequencies[name], 1e6 * run.lines[name][probe]), rotation=90,
+            xytext=(0, 7), textcoords="offset points", ha="center", va="bottom", fontsize="small",
+        )  # fmt: skip
+    ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
+    ax.set_ylim(2e-3, 3e3)
+    ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
+    ax.set_title(label(run.body))
+    ax.grid(alpha=0.25)
+    ax.legend(loc="upper left", fontsize="small", frameon=False)
+
+
+def _named(run: Run, shown: dict[str, float]) -> list[str]:
+    """The highest lines whose names have room."""
+    chosen: list[str] = []
+    for name in shown:
+        near = (abs(np.log(run.frequencies[name] / run.frequencies[other])) for other in chosen)
+        if len(chosen) < MOST_NAMED and all(distance > APART for distance in near):
+            chosen.append(name)
+    return chosen
+
+
+def written(name: str) -> str:
+    """A line's name as it is written in formulas."""
+    name = re.sub(r"f_([A-Za-z0-9]+)", r"f_{\1}", name)
+    return f"${name}$"

@@ -1,0 +1,145 @@
+"""Motion of a whole body, for pictures.
+
+u(x, t) = basis [Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)]
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+import fem
+from meshes import TetMesh, part
+from meshes.tetmesh import Floats
+from simple_model import Effort
+from simple_model.steady import path_knots
+from skinwave.effort import Clock, Progress, peak_memory, silent, versions
+from skinwave.models.bodies import surface_load
+from skinwave.models.full import assembled, energy_balance, meshed
+from skinwave.models.prepared import BAND, reduced_lines
+from skinwave.scene import Scene
+from skinwave.simulation import check_knobs
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Field:
+    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s."""
+
+    mesh: TetMesh
+    times: Floats
+    displacement: Floats
+    effort: Effort
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Waves:
+    """All of a body's motion under a load, in the reduced coordinates that its nodes share.
+
+    `basis` (3 n, r) of the nodes of `mesh`; complex `lines` (f, r) at `frequencies` (f,) in Hz;
+    the free vibration that the start leaves, complex `start` (m, r) at `poles` (m,) in 1/s.
+    """
+
+    mesh: TetMesh
+    basis: Floats
+    frequencies: Floats
+    lines: fem.Complex
+    poles: fem.Complex
+    start: fem.Complex
+    effort: Effort
+
+
+def field(
+    scene: Scene,
+    times: Floats,
+    tolerance: float = 0.02,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> Field:
+    """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
+
+    The body is reduced to the subspace of the load along the path: what it takes grows with the
+    length of the path, and another path needs another reduction.
+
+    Raises
+    ------
+    ValueError
+        If the scene has no body, a number is out of range or the tolerance is out of reach.
+    """
+    moved = waves(scene, tolerance, progress, h=h, solver=solver)
+    displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
+    return Field(mesh=moved.mesh, times=times, displacement=displacement, effort=moved.effort)
+
+
+def waves(
+    scene: Scene,
+    tolerance: float = 0.02,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> Waves:
+    """What `field` is made of, for as many times as one likes; raises what `field` does."""
+    check_knobs(solver, h=h)
+    clock, report = Clock(), progress or silent
+    build = meshed(scene.body, h, clock, report)
+    operators = assembled(build, clock, report)
+    P, points = surface_load(build)
+    with clock("factorise and reduce"):
+        report("factorise", 0.0)
+        spots = scene.pressure.spot(points, path_knots(scene.pressure))
+        seeds = fem.load_subspace(P @ spots.T, tolerance / 10)
+        model = fem.reduce(
+            operators, sparse.csr_array(seeds.T), BAND, tolerance,
+            solver=solver, progress=lambda fraction: report("reduce", fraction),
+        )  # fmt: skip
+    with clock("lines"):
+        poles = fem.poles(model, outputs=np.eye(len(model.K)))
+        frequencies, forces = reduced_lines(scene.pressure, points, P.T @ model.basis)
+        lines, start = fem.line_response(poles, forces, frequencies)
+        power = fem.mean_power(model.C, model.R, forces, lines, frequencies)
+        imbalance, radiated = energy_balance(power)
+    effort = Effort(
+        seconds=clock.seconds,
+        dofs=len(operators.free),
+        reduced_dofs=len(model.K),
+        steps=len(frequencies),
+        peak_memory=peak_memory(),
+        solver=model.solver,
+        estimate=model.estimate,
+        energy_imbalance=imbalance,
+        radiated=radiated,
+        versions=versions(),
+    )
+    mesh, basis = build.mesh, model.basis
+    if build.drag is not None:  # the layer around a body is none of it
+        mesh, nodes = part(mesh, build.drag == 0)
+        basis = basis.reshape(-1, 3, basis.shape[1])[nodes].reshape(3 * len(nodes), -1)
+    return Waves(
+        mesh=mesh, basis=basis, frequencies=frequencies, lines=lines,
+        poles=poles.values, start=start, effort=effort,
+    )  # fmt: skip
+
+
+def from_rest(moved: Waves, times: Floats) -> Floats:
+    """Reduced coordinates (t, r) after a start from rest at equally spaced times (t,) from 0."""
+    rates = np.concatenate([2j * np.pi * moved.frequencies, moved.poles])
+    return fem.exponential_sum(rates, np.vstack([moved.lines, moved.start]), times)
+
+
+def vibration(moved: Waves, times: Floats) -> Floats:
+    """Reduced coordinates (t, r) of the steady state about its mean at times as in `from_rest`."""
+    moving = moved.frequencies > 0
+    if not moving.any():
+        return np.zeros((len(times), moved.lines.shape[1]))
+    rates = np.asarray(2j * np.pi * moved.frequencies[moving], np.complex128)
+    return fem.exponential_sum(rates, moved.lines[moving], times)
+
+
+def line_amplitudes(moved: Waves, read: sparse.csr_array) -> tuple[Floats, Floats]:
+    """Frequencies (f,) in Hz above 0 and amplitudes (f, p) in metre that an operator (p, 3 n)
+    reads.
+    """
+    moving = moved.frequencies > 0
+    return moved.frequencies[moving], np.abs(moved.lines[moving] @ (read @ moved.basis).T)

@@ -1,0 +1,69 @@
+"""A view that can be turned in a browser: one page that asks no network for anything (vtk.js).
+
+The exporter starts a server of its own, and so it runs in a process of its own.
+"""
+
+import asyncio
+import os
+import subprocess
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+
+from skinwave.pictures.maps import SIGNED
+from skinwave.pictures.render import add_marks, look, place, prepared, scale
+from skinwave.pictures.views import View, load, save
+
+PATIENCE = 120.0  # s
+EXTRA = "the extra [web], trame-pyvista, is not installed"
+
+
+def turntable(view: View, frame: int) -> str | None:
+    """The page of a view at a frame; None if what exports it is not installed, or fails."""
+    if find_spec("trame_pyvista") is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        kept, page = Path(folder, "view.npz"), Path(folder, "page.html")
+        save(kept, view)
+        command = [
+            sys.executable,
+            "-m",
+            "skinwave.pictures.turntable",
+            str(kept),
+            str(frame),
+            str(page),
+        ]
+        # An existing folder keeps the exporter from asking a network for what it does not need.
+        quiet = os.environ | {"VTK_WASM_DIR_OVERRIDE": folder}
+        done = subprocess.run(command, capture_output=True, env=quiet, timeout=PATIENCE)
+        return page.read_text(encoding="utf-8") if done.returncode == 0 else None
+
+
+def _export(view: View, frame: int, path: str) -> None:
+    import pyvista as pv
+    from trame_pyvista.jupyter import launch_server
+
+    async def ready() -> None:
+        await launch_server(pv.global_theme.trame.jupyter_server_name).ready
+
+    plotter = pv.Plotter(off_screen=True, lighting="none", window_size=(800, 500))
+    plotter.set_background("white")
+    limit, _ = scale([view])
+    panel = prepared(view)
+    place([panel], frame, limit)
+    plotter.add_mesh(
+        panel.skin, scalars="motion", cmap=SIGNED, clim=(-limit, limit), show_scalar_bar=False
+    )
+    add_marks(plotter, panel, "black")
+    look(plotter, "tilted", [panel])
+    plotter.camera.parallel_projection = False  # which the page does not take over
+    plotter.reset_camera()
+    plotter.camera.zoom(1.3)
+    asyncio.run(ready())
+    plotter.trame.export_html(path)
+    plotter.close()
+
+
+if __name__ == "__main__":
+    _export(load(Path(sys.argv[1])), int(sys.argv[2]), sys.argv[3])

@@ -1,0 +1,290 @@
+"""What pictures show of one model's answer: its surface through a period, and where it moves most.
+
+Motion is about its mean: a steady push bends a sheet far more than its vibration does.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fem
+from meshes.tetmesh import Floats, Ints
+from simple_model import Effort, MovingPressure, Response, sensation_level
+from simple_model.steady import along_path, load_lines, path_knots, summed
+from simple_model.threshold import PRESSURE
+from skinwave.models.prepared import sample_times
+from skinwave.models.speeds import shown_period, strongest_tone, surface_speed
+from skinwave.pictures.motion import Waves, from_rest, line_amplitudes, vibration
+from skinwave.scene import Scene
+from skinwave.scene_file import dumps, loads
+
+FRAMES = 40  # through a period
+GRID = 121  # points along a side of the point kernel's surface
+ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
+KERNEL_BATCH = 64  # times
+TYPICAL = 140.0  # Hz, where nothing vibrates
+ROOM = 5e-3  # m beside the path that waves can be watched in
+
+Singles = NDArray[np.float32]
+Motion = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t, q)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """Motion (t, q) along a line, in the unit of its view: `places` (q, 2) in metre, `distance`
+    (q,) in metre along it, `times` (t,) in s.
+    """
+
+    places: Floats
+    distance: Floats
+    times: Floats
+    motion: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class View:
+    """One model's answer to a scene, as pictures need it.
+
+    Parameters
+    ----------
+    body : name of the body, by which it has its colour; model, unit ("m" or "Pa"), scene
+    points : (n, 3) float, metre; tets : (m, 10) int, none for the point kernel, which has no body
+    surface : (s,) int, the points of the upper surface; triangles : (k, 3) int, of these
+    times : (f,) float, s, through one period `period` of the steady state
+    motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
+    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the level in
+        dB of its strongest line above the threshold of detection; of the point kernel that of the
+        peak pressure above the pressure that is just felt
+    tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
+    ray : outwards along x from the path's outermost point; track : along the path, None if the
+        focus rests; both in the steady state, about the mean
+    """
+
+    body: str
+    model: str
+    unit: str
+    scene: Scene
+    points: Floats
+    tets: Ints
+    surface: Ints
+    triangles: Ints
+    period: float
+    times: Floats
+    motion: Singles
+    rms: Floats
+    sensation: Floats
+    tone: float
+    speed: float | None
+    ray: Trace
+    track: Trace | None
+    effort: Effort = field(default_factory=Effort)
+
+    @property
+    def places(self) -> Floats:
+        """Where the upper surface is, (s, 2) in metre."""
+        return self.points[self.surface, :2]
+
+    @property
+    def pushed(self) -> Singles:
+        """Motion (f, s) of the upper surface into the body, in the unit."""
+        return -self.motion[:, self.surface, 2]
+
+    @property
+    def peak(self) -> float:
+        """The largest motion into or out of the body anywhere at any time, in the unit."""
+        return float(np.abs(self.pushed).max()) or 1.0
+
+
+def body_view(scene: Scene, body: str, moved: Waves, frames: int = FRAMES) -> View:
+    """A body's view, from all of its motion."""
+    mesh, period = moved.mesh, shown_period(scene.pressure)
+    surface, triangles = _upper(mesh.facets["top"])
+    times = np.arange(frames) * period / frames
+    motion = vibration(moved, times) @ moved.basis.T
+    read = fem.probe_operator(mesh, mesh.points[surface])
+    frequencies, amplitudes = line_amplitudes(moved, read)
+    levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
+    tone = strongest_tone(frequencies, amplitudes)
+
+    def trace(places: Floats, t: Floats) -> Floats:
+        return vibration(moved, t) @ (fem.probe_operator(mesh, places) @ moved.basis).T
+
+    speed = surface_speed(scene.body, tone or TYPICAL)
+    reach = np.array([scene.body.width, scene.body.height]) / 2
+    return View(
+        body=body, model="fem", unit="m", scene=scene, points=mesh.points, tets=mesh.tets,
+        surface=surface, triangles=triangles, period=period, times=times,
+        motion=motion.reshape(frames, -1, 3).astype(np.float32),
+        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2), sensation=levels,
+        tone=tone, speed=speed, effort=moved.effort,
+        ray=_ray(scene, reach, trace), track=_track(scene, trace),
+    )  # fmt: skip
+
+
+def kernel_view(scene: Scene, reach: Floats, frames: int = FRAMES) -> View:
+    """The point kernel's view, on a flat square as far as `reach` (2,) in metre either way."""
+    pressure, period = scene.pressure, shown_period(scene.pressure)
+    points, triangles = _grid(reach)
+    times = np.arange(frames) * period / frames
+    lines = load_lines(pressure)
+    of_path = along_path(pressure.spot(points, path_knots(pressure)).T).T
+    frequencies, patterns = summed(
+        lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics]
+    )
+    still = frequencies == 0
+    mean = patterns[still].real.sum(axis=0)
+    amplitudes = np.abs(patterns[~still])
+    motion = np.zeros((frames, len(points), 3), np.float32)
+    motion[:, :, 2] = mean - pressure(points, times)
+
+    with np.errstate(divide="ignore"):
+        sensation = 20 * np.log10(_highest(pressure, points, scene.tacton.duration) / PRESSURE)
+    return View(
+        body="none", model="point-kernel", unit="Pa", scene=scene, points=points,
+        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
+        period=period, times=times, motion=motion,
+        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2), sensation=sensation,
+        tone=strongest_tone(frequencies[~still], amplitudes),
+        speed=None, ray=_ray(scene, reach, pressure), track=_track(scene, pressure),
+    )  # fmt: skip
+
+
+def probe_response(scene: Scene, moved: Waves) -> Response:
+    """What the probes of a scene see of its body's motion."""
+    times, points = sample_times(scene), scene.probe_points
+    read = fem.probe_operator(moved.mesh, points) @ moved.basis
+    return Response(
+        model="fem", times=times, probes=points, displacement=from_rest(moved, times) @ read.T,
+        effort=moved.effort,
+    )  # fmt: skip
+
+
+def spread_radius(view: View, drop: float) -> float:
+    """Distance in metre from the centre of the path to the furthest place whose RMS motion is
+    within `drop` (below 0) dB of the largest.
+    """
+    moving = view.rms >= view.rms.max() * 10 ** (drop / 20)
+    return float(np.linalg.norm(view.places[moving], axis=1).max())
+
+
+def path_points(scene: Scene, count: int = 241) -> Floats:
+    """The path (count, 2) in metre, closed; one point if the focus rests."""
+    path = scene.tacton.trajectory
+    return path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, count))
+
+
+def starting_time(scene: Scene, place: Floats) -> float:
+    """When, in s, the focus first comes by a place (2,) on its path."""
+    path = scene.tacton.trajectory
+    phases = np.linspace(0, 1, 720, endpoint=False)
+    nearest = np.argmin(np.linalg.norm(path.at_phase(phases) - place, axis=1))
+    return 0.0 if path.is_static else float(phases[nearest] / path.drawing_frequency)
+
+
+def save(path: Path, view: View) -> None:
+    """A view as one npz file."""
+    arrays: dict[str, Any] = {n: getattr(view, n) for n in ARRAYS}
+    for name in ("ray", "track"):
+        if (trace := getattr(view, name)) is not None:
+            arrays |= {f"{name}_{key}": value for key, value in asdict(trace).items()}
+    meta = {n: getattr(view, n) for n in META} | {
+        "scene": dumps(view.scene), "effort": asdict(view.effort)
+    }  # fmt: skip
+    np.savez_compressed(path, meta=np.array(json.dumps(meta)), **arrays)
+
+
+def load(path: Path) -> View:
+    """A view from its file.
+
+    Raises
+    ------
+    ValueError
+        If the file is none of these.
+    """
+    try:
+        with np.load(path) as file:
+            arrays = {name: file[name] for name in file.files}
+        meta = json.loads(str(arrays["meta"]))
+        meta |= {"scene": loads(meta["scene"]), "effort": Effort(**meta["effort"])}
+        meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
+        return View(**{n: arrays[n] for n in ARRAYS}, **meta)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
+
+
+ARRAYS = (
+    "points", "tets", "surface", "triangles", "times", "motion", "rms", "sensation",
+)  # fmt: skip
+META = ("body", "model", "unit", "period", "tone", "speed")
+
+
+def _trace(arrays: Mapping[str, Any], name: str) -> Trace | None:
+    keys = ("places", "distance", "times", "motion")
+    if f"{name}_places" not in arrays:
+        return None
+    return Trace(**{key: arrays[f"{name}_{key}"] for key in keys})
+
+
+def _upper(facets: Ints) -> tuple[Ints, Ints]:
+    """Points (s,) of six-node facets and the flat triangles (k, 3), four a facet, of these."""
+    surface, local = np.unique(facets, return_inverse=True)
+    return surface, split(local.reshape(facets.shape))
+
+
+def split(facets: Ints) -> Ints:
+    """Six-node facets (k, 6) as flat triangles (4 k, 3)."""
+    return facets[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]].reshape(-1, 3)
+
+
+def _grid(reach: Floats) -> tuple[Floats, Ints]:
+    """A flat rectangle of points (n, 3) and triangles (k, 3)."""
+    x, y = (np.linspace(-r, r, GRID) for r in reach)
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    a = (np.arange(GRID - 1)[:, None] * GRID + np.arange(GRID - 1)).ravel()
+    b = a + GRID
+    triangles = np.vstack([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
+    return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
+
+
+def _highest(pressure: MovingPressure, points: Floats, duration: float) -> Floats:
+    """The highest pressure (n,) in Pa at points, in a part of the Tacton that has all of it."""
+    times = np.linspace(0, min(duration, 0.1), 32 * KERNEL_BATCH)
+    highest = np.zeros(len(points))
+    for start in range(0, len(times), KERNEL_BATCH):
+        part = pressure(points, times[start : start + KERNEL_BATCH])
+        np.maximum(highest, np.abs(part).max(axis=0), out=highest)
+    return highest
+
+
+def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
+    path = path_points(scene)
+    origin = path[np.argmax(path[:, 0])]
+    room, way = 0.98 * reach[0] - origin[0], 1.0
+    if room < ROOM:  # the path ends where the body does
+        room, way = 0.98 * reach[0] + origin[0], -1.0
+    distance = np.linspace(0, room, ALONG)
+    return _traced(
+        scene, origin + way * np.column_stack([distance, 0 * distance]), distance, motion
+    )
+
+
+def _track(scene: Scene, motion: Motion) -> Trace | None:
+    path = scene.tacton.trajectory
+    if path.is_static:
+        return None
+    phases = np.linspace(0, 1, ALONG)
+    return _traced(scene, path.at_phase(phases), phases * path.length, motion)
+
+
+def _traced(scene: Scene, places: Floats, distance: Floats, motion: Motion) -> Trace:
+    """Motion about its mean through two periods, of the load or of the path if that is longer."""
+    f_d = scene.tacton.trajectory.drawing_frequency
+    span = 2 * max(shown_period(scene.pressure), 1 / f_d if f_d else 0.0)
+    times = np.arange(INSTANTS) / INSTANTS * span
+    moved = motion(places, times)
+    return Trace(places=places, distance=distance, times=times, motion=moved - moved.mean(axis=0))

@@ -1,0 +1,1 @@
+"""What a scene requires, and how wrong an answer will be."""

@@ -1,0 +1,86 @@
+"""How much of a body a scene requires, and what of its physics stays out."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model.focus import spot_width
+from skinwave.models.speeds import air_mass
+from skinwave.planning.estimates import FAR, REFLECTED, mean_gain, waves_returned
+from skinwave.scene import FLAT, Body, Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One thing that was decided, and why."""
+
+    what: str
+    value: str
+    reason: str
+
+
+def symmetry(scene: Scene) -> str:
+    """Axes across whose middle plane the load is its own mirror image at all times."""
+    if scene.body.kind not in ("sheet", "slab") or scene.body.placement != FLAT:
+        return ""
+    path = scene.tacton.trajectory
+    path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
+    return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
+
+
+def half_widths(body: Body) -> Floats:
+    """Half of width and height in metre."""
+    return np.array([body.width, body.height]) / 2
+
+
+def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
+    """The body as far as waves come back from, and the reason if that is not all of it."""
+    body = scene.body
+    if body.kind != "slab" or body.base != "clamped" or not body.is_plain:
+        return body, []
+    half = half_widths(body)
+    cut = half.copy()
+    for axis in (0, 1):
+        alone = np.where(np.arange(2) == axis, half, FAR)
+        for shorter in np.arange(0.03, min(0.8 * half[axis], FAR), 0.01):
+            alone[axis] = shorter
+            if waves_returned(scene, alone, highest, REFLECTED) <= tolerance / 10:
+                cut[axis] = shorter
+                break
+    if (cut == half).all():
+        return body, []
+    width, height = map(float, 2 * cut)
+    row = Row(
+        what="extent",
+        value=f"{1e3 * width:.0f} x {1e3 * height:.0f} mm",
+        reason=f"what comes back from further away is below {10 * tolerance:.2g} %; absorbing "
+        f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
+    )
+    return replace(body, width=width, height=height, sides="absorbing"), [row]
+
+
+def left_out(scene: Scene, highest: float) -> list[Row]:
+    """What the model leaves out, with the estimate behind that."""
+    body = scene.body
+    if body.kind != "sheet":
+        return []
+    air = air_mass(body, max(highest / 2, 20.0)) / body.mass_per_area
+    force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
+    sag = 0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness / body.depth
+    shift = 1 - 1 / np.sqrt(1 + air)
+    return [
+        Row(
+            what="left out: air",
+            value=f"+{100 * air:.0f} % mass",
+            reason=f"2 rho_air/k at half the highest line would lower resonances by "
+            f"{100 * shift:.1f} %: take the answer as that of a sheet in vacuum",
+        ),
+        Row(
+            what="left out: stretching",
+            value=f"sag {sag:.1f} thicknesses",
+            reason="a linear sheet; a real one stiffens beyond about half a thickness"
+            if sag > 0.5
+            else "the mean deflection is small",
+        ),
+    ]

@@ -1,0 +1,261 @@
+"""What a scene requires and no more: model, extent, element size, cost, and a reason for each."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from simple_model.focus import spot_width
+from skinwave.effort import Progress
+from skinwave.models.bodies import check_mesh
+from skinwave.models.full import TRANSIENT_RATE, step_count
+from skinwave.models.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
+from skinwave.models.stretching import expected_error, sheet_only, stretching_size
+from skinwave.planning.estimates import (
+    highest_line,
+    is_flat,
+    motion_lines,
+    waves_returned,
+)
+from skinwave.planning.extent import Row, extent, half_widths, left_out, symmetry
+from skinwave.planning.refinement import AIM, ORDER, Refined, refined
+from skinwave.planning.sensitivity import sensitivity
+from skinwave.scene import FLAT, Body, Scene
+
+WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
+KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What to run.
+
+    `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
+    element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
+    expected relative `error`; predicted `seconds` and bytes of `memory` of the first answer;
+    a reason for each; `warnings` of what was asked for and is not enough; and the body `prepared`
+    on the mesh that was found.
+    """
+
+    model: str
+    body: Body
+    symmetry: str = ""
+    h: float | None = None
+    highest: float = 0.0
+    error: float = 0.0
+    seconds: float = 0.1
+    memory: float = 1e8
+    rows: tuple[Row, ...] = ()
+    warnings: tuple[str, ...] = ()
+    prepared: Prepared | None = field(default=None, repr=False)
+
+
+def plan(
+    scene: Scene,
+    tolerance: float = 0.05,
+    *,
+    model: str | None = None,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+    progress: Progress | None = None,
+) -> Plan:
+    """What answers a scene within a relative error of `tolerance` in its probes' waveforms.
+
+    Parameters
+    ----------
+    model, h, dt : what is decided already: a model's name, element size in metre, time step in s
+    solver, progress : for the meshes that are tried where the scene needs elements
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is not between 0 and 1, there is no body for the model, or h or dt
+        cannot be computed with.
+    """
+    if not 0 < tolerance < 1:
+        raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    if dt is not None:
+        step_count(float(sample_times(scene)[-1]), dt)
+    if scene.body.kind == "none":
+        if model not in (None, "point-kernel"):
+            raise ValueError(f"a scene without a body has no {model} answer; use --model auto")
+        row = Row(what="model", value="point-kernel", reason="there is no body to move")
+        return Plan(model="point-kernel", body=scene.body, rows=(row,))
+    if model == "point-kernel":
+        return _kernel(scene, tolerance)
+    if model in ("fem-nonlinear", "fem-nonlinear-transient"):
+        return _nonlinear(scene, tolerance, model, h)
+    spectrum = motion_lines(scene, tolerance)
+    highest = highest_line(*spectrum, tolerance)
+    rows = [
+        Row(
+            what="highest line",
+            value=f"{highest:.0f} Hz",
+            reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
+            f"than {100 * tolerance / 3:.2g} % of the whole",
+        )
+    ]
+    returned = waves_returned(scene, half_widths(scene.body), highest) if is_flat(scene) else 1.0
+    if model == "flat-body" or (model is None and returned <= WAVES_SHARE * tolerance):
+        return _without_mesh(scene, tolerance, highest, returned, rows)
+    body, cut = extent(scene, tolerance, highest)
+    if h:
+        check_mesh(body, h)  # refuses what cannot be meshed before anything is computed
+    rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *cut]
+    axes = symmetry(scene) if model in (None, "fem") else ""
+    found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
+    scene = replace(scene, body=body)
+    step_error, start_error = _march_errors(scene, model, dt)
+    return Plan(
+        model=model or "fem", body=body, symmetry=axes, h=found.h, highest=highest,
+        error=found.error + step_error + start_error,
+        seconds=sum(found.prepared.effort.seconds.values()),
+        memory=found.prepared.effort.peak_memory,
+        rows=(*rows, *_element_rows(scene, tolerance, axes, found, highest, h)),
+        warnings=(
+            *_unknown(found),
+            *_exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
+                      f"about {1e3 * _enough(found, tolerance):.2g} mm is"),
+            *_exceeds(f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
+                      "a smaller one is"),
+            *_exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
+                      tolerance, "fem is"),
+            *_under_resolved(found.h, spot_width(scene.pressure.height)),
+        ),
+        prepared=found.prepared,
+    )  # fmt: skip
+
+
+def _kernel(scene: Scene, tolerance: float) -> Plan:
+    row = Row(what="model", value="point-kernel", reason="as asked; nothing propagates in it")
+    warning = _exceeds("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
+    return Plan(
+        model="point-kernel", body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning
+    )
+
+
+def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> Plan:
+    """A sheet with large deflection, whose element size does not come from the linear answer: what
+    stretching stiffens has longer waves and fewer resonances than the linear sheet.
+    """
+    sheet_only(scene.body, model)
+    size = h or stretching_size(scene.body, reduced=model == "fem-nonlinear")
+    check_mesh(scene.body, size)
+    error = expected_error(scene.body, size)
+    rows = (
+        Row(what="model", value=model, reason="as asked: large deflection about a static preload"),
+        Row(
+            what="element size", value=f"{1e3 * size:.2f} mm",
+            reason="as asked" if h else "by measured convergence of the default sheet",
+        ),
+        *(row for row in left_out(scene, 0.0) if row.what != "left out: stretching"),
+    )  # fmt: skip
+    warnings = _exceeds(f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are")
+    return Plan(model=model, body=scene.body, h=size, error=error, rows=rows, warnings=warnings)
+
+
+def _without_mesh(
+    scene: Scene, tolerance: float, highest: float, returned: float, rows: list[Row]
+) -> Plan:
+    reason = "a homogeneous flat slab without sides that reflect: exact waves, no mesh"
+    if scene.body.sides != "absorbing":
+        reason = f"waves that come back from the sides are {100 * returned:.2g} %: take none"
+    warnings = _exceeds(
+        "flat-body, which lets no wave return from the sides,", returned, tolerance, "fem is"
+    )
+    rows = [
+        *rows,
+        Row(what="model", value="flat-body", reason="as asked" if warnings else reason),
+        *left_out(scene, highest),
+    ]
+    return Plan(
+        model="flat-body", body=scene.body, highest=highest, error=returned, seconds=2.0,
+        memory=3e8, rows=tuple(rows), warnings=warnings,
+    )  # fmt: skip
+
+
+def _element_rows(
+    scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
+) -> list[Row]:
+    effort = found.prepared.effort
+    return [
+        Row(
+            what="symmetry",
+            value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[axes],
+            reason=f"the load is its own mirror image across {' and '.join(axes)} = 0"
+            if axes
+            else "the path of the focus leaves the middle planes",
+        ),
+        Row(
+            what="element size",
+            value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} unknowns",
+            reason=f"{'as asked' if h else 'refined until good enough'}: {1e3 * found.coarser:.2f} "
+            f"mm differ by so much that an error of {100 * found.error:.2g} % is left",
+        ),
+        Row(
+            what="reduction",
+            value=f"{effort.reduced_dofs} unknowns, {effort.estimate:.0e} up to {BAND:.0f} Hz",
+            reason=f"asked for {min(REDUCTION_TOLERANCE, tolerance / 50):.1g}: it costs little",
+        ),
+        *left_out(scene, highest),
+        Row(
+            what="cost",
+            value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
+            reason="the last mesh; 0.05 s for each further Tacton on the same body",
+        ),
+    ]
+
+
+def _march_errors(scene: Scene, model: str | None, dt: float | None) -> tuple[float, float]:
+    """Expected relative errors of a time step, and of leaving out how the motion starts."""
+    if model not in ("fem-transient", "fem-harmonic"):
+        return 0.0, 0.0
+    known = sensitivity(scene)
+    # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
+    step = known.value * (2 * np.pi * known.frequency * (dt or 1 / TRANSIENT_RATE)) ** 2 / 12
+    return (min(1.0, step), 0.0) if model == "fem-transient" else (0.0, known.start)
+
+
+def _enough(found: Refined, tolerance: float) -> float:
+    aim = AIM * tolerance
+    return found.h * (aim / max(aim, found.error)) ** (1 / ORDER)
+
+
+def _unknown(found: Refined) -> tuple[str, ...]:
+    if np.isfinite(found.error):
+        return ()
+    return (
+        "how wrong this mesh makes the answer is not known, because its file has only one; give a "
+        "finer one and compare",
+    )
+
+
+def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
+    if not error > tolerance:
+        return ()
+    return (
+        f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
+        f"{100 * tolerance:g} %; {cure} enough",
+    )
+
+
+def _why_elements(scene: Scene) -> str:
+    body = scene.body
+    if scene.pressure.focus != "gaussian":
+        return f"exact waves need a Gaussian focus, not '{scene.pressure.focus}'"
+    if body.kind in ("palm", "mesh"):
+        return "a body that is not flat"
+    if len(body.strata) > 1:
+        return f"{len(body.strata)} layers; exact waves are for one material"
+    if body.placement != FLAT:
+        return "the body is tilted or moved; exact waves are for a flat one across the beam"
+    return f"the {body.sides} sides of this {body.kind} reflect; exact waves are endless"
+
+
+def _under_resolved(h: float, width: float) -> tuple[str, ...]:
+    if h <= 2 * width:
+        return ()
+    return (
+        f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focus, "
+        f"{1e3 * width:.2g} mm: they keep its force but not its shape; make them smaller",
+    )

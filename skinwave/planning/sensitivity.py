@@ -1,0 +1,69 @@
+"""How much a scene's answer depends on its body's frequencies, found on a coarse mesh.
+
+Elements and time steps make every natural frequency a little wrong. Near a resonance that moves
+the waveform many times as much as elsewhere, so that no error law holds for all scenes; but the
+poles of a coarse reduced model, moved by a thousandth, tell.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import fem
+from meshes.tetmesh import Floats
+from skinwave.models.bodies import default_size
+from skinwave.models.prepared import SAMPLE_RATE as RATE
+from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.scene import Scene
+
+COARSENING = {"sheet": 2.0, "slab": 2.0}  # of the default element size
+# Natural frequencies of the coarse mesh are too high by this much, and are put right first.
+DETUNING = {"sheet": 0.010, "slab": 0.010}
+MOVED = 1e-3
+LONGEST = 1.0  # s of the answers that are compared
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensitivity:
+    """`value`: relative change of the worst probe's waveform per relative change of all natural
+    frequencies; `frequency` in Hz: that of the motion, root mean square; `start`: the share of
+    the waveform that is not its steady state.
+    """
+
+    value: float
+    frequency: float
+    start: float
+
+
+def sensitivity(scene: Scene) -> Sensitivity:
+    """Found from two answers of a coarse reduced model, which takes seconds once per body."""
+    kind = scene.body.kind
+    coarse = prepare(scene.body, scene.probe_points, h=COARSENING[kind] * default_size(scene.body))
+    values = coarse.poles.values * (1 - DETUNING[kind])
+    frequencies, forces = reduced_lines(scene.pressure, coarse.points, coarse.load)
+    times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE
+
+    def parts(moved: float) -> tuple[Floats, Floats]:
+        """Steady state and start (t, p) where all natural frequencies are higher by this much."""
+        higher = np.asarray(values * (1 + moved), np.complex128)
+        poles = replace(coarse.poles, values=higher)
+        lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
+        return (
+            fem.exponential_sum(np.asarray(2j * np.pi * frequencies), lines, times),
+            fem.exponential_sum(higher, start, times),
+        )
+
+    steady, start = parts(0.0)
+    whole = steady + start
+    moving = whole - whole.mean(axis=0)
+    speed = float(np.linalg.norm(np.diff(moving, axis=0))) * RATE
+    return Sensitivity(
+        value=_share(sum(parts(MOVED)) - whole, whole) / MOVED,
+        frequency=speed / max(float(np.linalg.norm(moving)), 1e-300) / (2 * np.pi),
+        start=_share(start, whole),
+    )
+
+
+def _share(part: Floats, whole: Floats) -> float:
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    return float((np.linalg.norm(part, axis=0) / size).max())

@@ -1,0 +1,229 @@
+"""The report of a scene: one page that needs no network, built from a folder of results alone."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from skinwave.effort import Progress, versions
+from skinwave.exports import write_field, write_probes, write_sound
+from skinwave.pictures.album import Album, open_album
+from skinwave.pictures.figures import label
+from skinwave.pictures.gallery import Gallery, pictures, run_figures, tactons
+from skinwave.pictures.levels import felt_lines, strongest_probe
+from skinwave.pictures.renderer import renderer
+from skinwave.pictures.styles import Style
+from skinwave.reports import report
+from skinwave.run import Run
+from skinwave.scene import Scene
+from skinwave.scene_file import dumps
+from skinwave.studies.claims import evaluate
+from skinwave.studies.study import modelled
+
+TABLED = 12  # lines in the table of lines
+ROUND_OFF = 1e-9  # of the strongest line
+JUDGED = 0.5  # s that a Tacton must last for statements about its lines to be judged
+
+
+def write_report(
+    results: Path,
+    out: Path,
+    style: Style,
+    progress: Progress,
+    *,
+    formats: Sequence[str] = ("png",),
+) -> None:
+    """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder.
+
+    No model is run.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no result.
+    """
+    album = open_album(results)
+    (out / "pictures").mkdir()
+    gallery = Gallery(folder=out / "pictures", style=style, formats=formats)
+    shown = pictures(album, gallery, progress)
+    drawn = run_figures(album, gallery, progress)
+    progress("write data", 0.0)
+    _write_data(out / "data", album)
+    groups = tactons(album)
+    parts = [
+        _asked(album),
+        report.section("What was modelled, and what was left out", *_modelled(album)),
+        report.section("What comes out", *shown),
+        report.section("What the probes see", *drawn, *map(_lines, groups.values())),
+        report.section("How far the models agree", *_comparison(album)),
+        report.section("Effort", _effort(album)),
+        report.section("How far to trust it", *_trust(album)),
+        report.section("Do it again", *_again(album)),
+    ]
+    (out / "index.html").write_text(report.page(album.title, *parts), encoding="utf-8")
+
+
+def _write_data(folder: Path, album: Album) -> None:
+    """Probes, their sound and, of every view, a few frames of its field."""
+    folder.mkdir()
+    for name, runs in tactons(album).items():
+        for k, run in enumerate(runs):
+            stem = run.body if len(tactons(album)) == 1 else f"{name}-{run.body}"
+            write_probes(folder / f"{stem}_probes", run.response)
+            if k == len(runs) - 1:
+                write_sound(folder, run.response, strongest_probe([run]))
+    for view in album.views.values():
+        write_field(folder, view)
+
+
+def _asked(album: Album) -> str:
+    rows = _asked_rows(album.scene)
+    text = escape(dumps(album.scene))
+    scene = (
+        f'<details class="screen"><summary>The scene in full</summary><pre>{text}</pre></details>'
+    )
+    return report.section("What was asked", report.table(["", ""], rows), scene)
+
+
+def _asked_rows(scene: Scene) -> list[list[str]]:
+    tacton, path, pressure, body = (
+        scene.tacton, scene.tacton.trajectory, scene.pressure, scene.body,
+    )  # fmt: skip
+    moved = f"{path.shape} of {1e3 * path.size:g} mm at {path.speed:g} m/s"
+    f_d = path.drawing_frequency
+    size = f"{1e3 * body.width:g} x {1e3 * body.height:g} x {1e3 * body.depth:g} mm"
+    return [
+        ["focus", f"{moved}, drawn {f_d:.3f} times a second" if f_d else "at rest"],
+        ["amplitude modulation", f"{tacton.am_frequency:g} Hz" if tacton.am_frequency else "none"],
+        ["drive", f"{pressure.drive}, {pressure.peak_pressure:g} Pa at full drive, "
+                  f"{1e3 * pressure.height:g} mm above the array"],
+        ["body", "none" if body.kind == "none" else f"{body.kind} of {size}, base {body.base}, "
+                 f"sides {body.sides}"],
+        ["duration", f"{tacton.duration:g} s"],
+        ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
+    ]  # fmt: skip
+
+
+def _modelled(album: Album) -> list[str]:
+    parts = [report.paragraph(text) for text in modelled(list(album.runs))]
+    if album.planned is None:
+        return [*parts, report.paragraph("No plan was kept with these results; skinwave plan "
+                                         "scene.toml makes one.")]  # fmt: skip
+    planned = album.planned
+    rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
+    heading = (
+        f"What the scene requires for a relative error of {100 * planned['tolerance']:g} % at its "
+        "probes, and why. Pictures need the motion of the whole body, and so are by finite "
+        "elements whatever is planned."
+    )
+    warned = [report.paragraph(f"Warning: {text}.") for text in planned["warnings"]]
+    return [*parts, report.paragraph(heading), report.table(["", "", "reason"], rows), *warned]
+
+
+def _lines(runs: Sequence[Run]) -> str:
+    """Lines of each model at the probe that moves most, the strongest of any first."""
+    probe = strongest_probe(runs)
+    if not runs[0].lines:
+        return report.paragraph("A constant pressure on a focus at rest has no line.")
+    share = {name: max(_share(run, name, probe) for run in runs) for name in runs[0].lines}
+    names = sorted(share, key=lambda name: -share[name])[:TABLED]
+    felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
+    rows = [
+        [name, f"{runs[0].frequencies[name]:.2f}"]
+        + [cell for run, levels in zip(runs, felt, strict=True)
+           for cell in _amplitude(run, name, probe, levels)]
+        for name in names
+    ]  # fmt: skip
+    header = ["line", "frequency, Hz"]
+    for run in runs:
+        pascal = run.response.unit == "Pa"
+        header += [f"{label(run.body)}, {'Pa' if pascal else 'µm'} peak"]
+        header += [] if pascal else ["dB re threshold"]
+    x, y = 1e3 * runs[0].response.probes[probe]
+    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + report.table(header, rows)
+
+
+def _share(run: Run, name: str, probe: int) -> float:
+    """A line's amplitude over that of the strongest."""
+    strongest = max(float(x[probe]) for x in run.lines.values())
+    return float(run.lines[name][probe]) / strongest if strongest else 0.0
+
+
+def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
+    """A line's amplitude and, of a body, its level above threshold; 0 if it is round-off."""
+    if _share(run, name, probe) < ROUND_OFF:
+        return ["0"] if run.response.unit == "Pa" else ["0", ""]
+    if run.response.unit == "Pa":
+        return [f"{run.lines[name][probe]:.3g}"]
+    return [f"{1e6 * run.lines[name][probe]:.3g}", _level(levels.get(name))]
+
+
+def _level(level: float | None) -> str:
+    return "" if level is None or level < -200 else f"{round(level):+d}"
+
+
+def _comparison(album: Album) -> list[str]:
+    groups = tactons(album)
+    parts = []
+    if any(len(runs) > 1 for runs in groups.values()):
+        parts.append(report.agreement_table(groups))
+    long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
+    verdicts = evaluate(long)
+    if verdicts:
+        parts.append(report.paragraph("What Lim, Seifi and Park state, evaluated on these runs:"))
+        parts.append(report.claims_table(verdicts))
+    return parts or [report.paragraph("There is one model only.")]
+
+
+def _effort(album: Album) -> str:
+    efforts = {run.body: run.response.effort for run in album.runs if run.response.unit == "m"}
+    return report.effort_table(efforts, len(tactons(album)))
+
+
+def _trust(album: Album) -> list[str]:
+    bodies = [run for run in album.runs if run.response.unit == "m"]
+    found = []
+    for run in bodies:
+        effort = run.response.effort
+        if effort.dofs:
+            found.append(
+                f"{label(run.body)}: the work of the load and what has become of it differ by "
+                f"{effort.energy_imbalance:.0e} of either (refused beyond 1e-2); reduction leaves "
+                f"an estimated {100 * effort.estimate:.2g} %."
+            )
+    trust: Mapping[str, Any] = album.trust or {}
+    if "misfit" in trust:
+        found.append(
+            f"The waveforms drawn here differ from those of the planned model, {trust['model']}, "
+            f"by {100 * trust['misfit']:.2g} % over all probes."
+        )
+    found.append("The pressure of a device is uncertain by a factor of 2, and all motion with it.")
+    parts = [report.paragraph(text) for text in dict.fromkeys(found)]
+    if trust.get("cases"):
+        parts.append(report.paragraph(
+            "Cases of skinwave verify as this installation answered them; the whole suite holds "
+            "the program against closed forms, series and published tables."))  # fmt: skip
+        parts.append(_cases(trust["cases"]))
+    return parts
+
+
+def _cases(cases: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        [case["title"], f"{case['value']:.5g}", f"{case['reference']:.5g}", f"{case['error']:.1e}",
+         f"{case['bar']:.1e}", "passed" if case["passed"] else "FAILED", case["source"]]
+        for case in cases
+    ]  # fmt: skip
+    header = ["case, by its check nearest to the bar", "value", "reference", "error", "bar", ""]
+    return report.table([*header, "source"], rows)
+
+
+def _again(album: Album) -> list[str]:
+    made = album.runs[-1].response.effort.versions or versions()
+    named = ", ".join(f"{name} {version}" for name, version in made.items())
+    command = (album.trust or {}).get("command") or "skinwave report scene.toml"
+    said = renderer().said if renderer().found else "none"
+    return [
+        f"<p><code>{escape(command)}</code></p>",
+        report.paragraph(f"Computed with {named}; drawn with {said}. The scene:"),
+        f"<pre>{escape(dumps(album.scene))}</pre>",
+    ]

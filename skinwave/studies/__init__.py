@@ -1,0 +1,1 @@
+"""Studies: Tactons compared, accuracy against cost, assumptions dropped."""

@@ -1,0 +1,275 @@
+"""What Lim, Seifi and Park state about lines, evaluated on any model's answers.
+
+S1 to S5 are statements about their simulation, M1 to M5 about their measurement on paper.
+Nothing here knows which model should fulfil which.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import spectrum
+from skinwave.run import Run
+
+PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
+ABSENT = -120.0  # dB
+MUCH_LOWER = -20.0  # dB: a tenth
+ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """Whether a statement holds for a body and a model, by which number against which bar."""
+
+    claim: str
+    body: str
+    model: str
+    holds: bool
+    value: float
+    bar: float
+    sentence: str
+
+
+def evaluate(runs: Iterable[Run]) -> list[Verdict]:
+    """Every statement on every body and model for which there are runs to judge it by."""
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in filter(_is_single, runs):
+        groups.setdefault((run.body, run.model), []).append(run)
+    verdicts = []
+    for (body, model), group in groups.items():
+        for claim, (applies, judge) in STATEMENTS.items():
+            if chosen := [run for run in group if applies(run)]:
+                holds, value, bar, sentence = judge(chosen)
+                verdicts.append(
+                    Verdict(
+                        claim=claim, body=body, model=model, holds=bool(holds),
+                        value=float(value), bar=bar, sentence=sentence,
+                    )
+                )  # fmt: skip
+    return verdicts
+
+
+Judgement = tuple[bool, float, float, str]
+
+
+def _is_single(run: Run) -> bool:
+    """Whether a run is of the kind that was measured: one focus, modulated evenly throughout."""
+    tacton = run.scene.tacton
+    plain = len(tacton.foci) == 1 and not tacton.is_sampled
+    return plain and tacton.trajectory.shape != "recorded"
+
+
+def _single_line(runs: list[Run]) -> Judgement:
+    worst = max(_others(run).max() for run in runs)
+    return worst < ABSENT, worst, ABSENT, f"the strongest line beside f_AM is at {worst:.1f} dB"
+
+
+def _am_harmonics(runs: list[Run]) -> Judgement:
+    second = min(_strongest(run, ["2f_AM"]) for run in runs)
+    third = max(_strongest(run, ["3f_AM"]) for run in runs)
+    return (
+        second > PRESENT,
+        second,
+        PRESENT,
+        f"2 f_AM is at {second:.1f} dB or above, 3 f_AM at {third:.1f} dB or below, re f_AM",
+    )
+
+
+def _drawn_lines(runs: list[Run]) -> Judgement:
+    offset = max(
+        abs(_peak(run, f"{n}f_d".lstrip("1")) - n * _drawing(run))
+        for run in runs
+        for n in (1, 2, 3)
+    )
+    return (
+        offset <= ON_BIN,
+        offset,
+        ON_BIN,
+        f"the peaks next to 1, 2 and 3 f_d are at most {offset:.2f} Hz away from them",
+    )
+
+
+def _same_places(runs: list[Run]) -> Judgement:
+    names = ("f_d", "2f_d", "3f_d")
+    places = np.array([[_peak(run, name) for name in names] for run in runs])
+    drift = float(np.ptp(places, axis=0).max())
+    first = 20 * np.log10([run.lines["f_d"].max() for run in runs])
+    return (
+        drift <= ON_BIN,
+        drift,
+        ON_BIN,
+        f"the lines of {len(runs)} paths lie within {drift:.2f} Hz of each other; "
+        f"their f_d amplitudes differ by {np.ptp(first):.1f} dB",
+    )
+
+
+def _pairs_only(runs: list[Run]) -> Judgement:
+    pairs = ["f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM"]
+    drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
+    weakest = min(min(_strongest(run, [name], "f_AM") for name in pairs) for run in runs)
+    return (
+        drawn < ABSENT and weakest > PRESENT,
+        drawn,
+        ABSENT,
+        f"the strongest line at n f_d is at {drawn:.1f} dB re f_AM, the weakest of the pairs "
+        f"n f_d +- f_AM (n = 1, 2) at {weakest:.1f} dB",
+    )
+
+
+def _both_multiples(runs: list[Run]) -> Judgement:
+    drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
+    double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
+    return (
+        drawn > PRESENT,
+        drawn,
+        PRESENT,
+        f"f_d is at {drawn:.1f} dB re f_AM or above in every Tacton, 2 f_AM at {double:.1f} dB "
+        "or above",
+    )
+
+
+def _am_highest(runs: list[Run]) -> Judgement:
+    worst = max(runs, key=lambda run: _others(run).max())
+    value = _others(worst).max()
+    name, probe = _rival(worst)
+    sentence = (
+        f"the strongest rival of f_AM is {name} at {value:+.1f} dB "
+        f"({worst.tacton}, probe at {probe:g} mm)"
+    )
+    return value < 0, value, 0.0, sentence
+
+
+def _am_highest_measured(runs: list[Run]) -> Judgement:
+    holds, value, bar, sentence = _am_highest(runs)
+    beaten = [run.tacton for run in runs if _others(run).max() >= 0]
+    if beaten:
+        sentence += f"; f_AM is beaten in {', '.join(beaten)}"
+    if runs[0].response.unit == "m":  # a vibrometer reads velocity; the point kernel has none
+        velocity = max(_others(run, velocity=True).max() for run in runs)
+        sentence += f"; as velocity the strongest rival is at {velocity:+.1f} dB"
+        value = max(value, velocity)
+    return holds and value < 0, value, bar, sentence
+
+
+def _much_lower(runs: list[Run]) -> Judgement:
+    value = max(_others(run).max() for run in runs)
+    lower = sum(bool(_others(run).max() < MUCH_LOWER) for run in runs)
+    return (
+        value < MUCH_LOWER,
+        value,
+        MUCH_LOWER,
+        f"the strongest other line is at {value:+.1f} dB re f_AM; in {lower} of {len(runs)} "
+        f"Tactons all are below {MUCH_LOWER:g} dB at every probe",
+    )
+
+
+def _exact_frequencies(runs: list[Run]) -> Judgement:
+    offsets = [
+        abs(_peak(run, name) - run.frequencies[name])
+        for run in runs
+        for name in (["f_AM"] if run.is_am else ["f_d"])
+    ]
+    worst = max(offsets)
+    return (
+        worst <= ON_BIN,
+        worst,
+        ON_BIN,
+        f"the spectral peaks are at most {worst:.2f} Hz from the commanded f_AM and f_d",
+    )
+
+
+def _pure_am(run: Run) -> bool:
+    return run.is_am and not run.is_stm
+
+
+def _pure_stm(run: Run) -> bool:
+    return run.is_stm and not run.is_am
+
+
+def _both(run: Run) -> bool:
+    return run.is_am and run.is_stm
+
+
+STATEMENTS: dict[str, tuple[Callable[[Run], bool], Callable[[list[Run]], Judgement]]] = {
+    "S1": (_pure_am, _single_line),
+    "S2": (_pure_stm, _drawn_lines),
+    "S3": (_both, _pairs_only),
+    "S4": (_both, _am_highest),
+    "S5": (lambda run: run.is_am != run.is_stm, _exact_frequencies),
+    "M1": (_pure_am, _am_harmonics),
+    "M2": (_pure_stm, _same_places),
+    "M3": (_both, _both_multiples),
+    "M4": (_both, _am_highest_measured),
+    "M5": (_both, _much_lower),
+}
+TEXTS = {
+    "S1": "Simulated, AM alone: a single line at f_AM.",
+    "S2": "Simulated, STM alone: lines at multiples of f_d.",
+    "S3": "Simulated, AM+STM: f_AM and the pairs n f_d +- f_AM, no line at n f_d.",
+    "S4": "Simulated, AM+STM: f_AM is the highest line, whatever the path.",
+    "S5": "Both: lines exactly at the commanded f_AM and f_d.",
+    "M1": "Measured, AM alone: lines at multiples of f_AM.",
+    "M2": "Measured, STM alone: lines at the same places for every path with the same f_d.",
+    "M3": "Measured, AM+STM: lines at multiples of both f_AM and f_d.",
+    "M4": "Measured, AM+STM: f_AM is the highest line, whatever the path.",
+    "M5": "Measured, AM+STM: all other lines are much lower than f_AM.",
+}
+
+
+def _decibel(ratio: Floats) -> Floats:
+    return 20 * np.log10(np.maximum(ratio, 1e-15))
+
+
+def _probe_levels(run: Run, names: Iterable[str], reference: str, velocity: bool = False) -> Floats:
+    """(line, probe) levels in dB re a reference line at the same probe."""
+    names = list(names)
+    weight = {name: run.frequencies[name] if velocity else 1.0 for name in [*names, reference]}
+    base = np.maximum(run.lines[reference] * weight[reference], np.finfo(float).tiny)
+    return _decibel(np.array([run.lines[name] * weight[name] for name in names]) / base)
+
+
+def _rivals(run: Run) -> list[str]:
+    """Lines that are told apart from f_AM itself."""
+    f_am = run.frequencies["f_AM"]
+    return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
+
+
+def _others(run: Run, velocity: bool = False) -> Floats:
+    """Level of the strongest line beside f_AM at each probe, dB re f_AM there."""
+    return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
+
+
+def _rival(run: Run) -> tuple[str, float]:
+    """The strongest line beside f_AM, and the radius in mm of the probe where it is."""
+    names = _rivals(run)
+    levels = _probe_levels(run, names, "f_AM")
+    line, probe = np.unravel_index(np.argmax(levels), levels.shape)
+    return names[line], 1e3 * float(np.hypot(*run.response.probes[probe]))
+
+
+def _strongest(run: Run, names: list[str], reference: str = "f_AM") -> float:
+    """Level of the strongest of these lines at any probe, dB re the reference at that probe."""
+    return float(_probe_levels(run, names, reference).max())
+
+
+def _drawing(run: Run) -> float:
+    return run.scene.tacton.trajectory.drawing_frequency
+
+
+def _peak(run: Run, line: str, reach: float = 6.0) -> float:
+    """Frequency in Hz of the spectral peak next to a line, at the probe where it is strongest.
+
+    Interpolated between bins on the logarithm; infinitely far if there is no peak in reach.
+    """
+    f, amplitude = spectrum(run.response)
+    x = amplitude[:, int(np.argmax(run.lines[line]))]
+    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= reach)
+    if len(near) < 3:  # too short a Tacton for its spectrum to tell
+        return np.inf
+    top = near[np.argmax(x[near])]
+    if top in (near[0], near[-1]) or x[top] <= 0:
+        return np.inf
+    left, centre, right = np.log(np.maximum(x[top - 1 : top + 2], np.finfo(float).tiny))
+    return float(f[top] + (left - right) / (left - 2 * centre + right) / 2 * f[1])

@@ -1,0 +1,289 @@
+"""Assumption by assumption from the paper's model to the richest one: what each changes, and costs.
+
+Rungs of the ladder drop one assumption after another; beside them stand those that drop all but
+one. Each is answered in a process of its own, with nothing kept from before, so that its seconds
+and its memory are its own.
+"""
+
+import csv
+import json
+import os
+import time
+from collections.abc import Iterable
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from simple_model import Response, lines, tacton_lines
+from skinwave.comparison import compare
+from skinwave.effort import Progress, apart, peak_memory
+from skinwave.models.bodies import default_size
+from skinwave.pictures.figures import png
+from skinwave.reports import report
+from skinwave.scene import Scene
+from skinwave.simulation import simulate
+from skinwave.studies.assumptions import ASSUMPTIONS, ladder, relaxed
+
+HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
+FIRST = "as published"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rung:
+    """What was dropped, and the answer or the `error` that came instead of one."""
+
+    name: str
+    dropped: tuple[str, ...]
+    model: str
+    response: Response | None = None
+    seconds: float = 0.0
+    memory: int = 0
+    error: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """What one assumption changes where it changes most.
+
+    `waveform` relative L2 at probe `where` (x, y) in metre, `decibel` by line, both of the rung
+    without it against the rung with it (after the factor that fits best where units differ);
+    `alone` the waveform's change if it is the only assumption kept; `seconds` that dropping costs.
+    """
+
+    name: str
+    waveform: float
+    where: tuple[float, float]
+    decibel: dict[str, float]
+    alone: float | None
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ladder:
+    """Rungs in order, the first as published and the last the richest; and all but one of them."""
+
+    scene: Scene
+    rungs: tuple[Rung, ...]
+    but_one: tuple[Rung, ...]
+
+    def effects(self) -> list[Effect]:
+        """What each assumption changes, the greatest first; rungs that failed are passed over."""
+        answered = [rung for rung in self.rungs if rung.response]
+        kept = {set(self.rungs[-1].dropped).difference(r.dropped).pop(): r for r in self.but_one}
+        found = [
+            effect(self.scene, before, rung, answered[-1], kept.get(rung.name))
+            for before, rung in pairwise(answered)
+        ]
+        return sorted(found, key=lambda e: -e.waveform)
+
+
+def climb(scene: Scene, progress: Progress, *, h: float | None = None) -> Ladder:
+    """Answer a scene on every rung.
+
+    Parameters
+    ----------
+    h : float, metre, element size of all rungs; the default of the scene's body if not given
+
+    Raises
+    ------
+    ValueError
+        If the scene has no body.
+    """
+    names = ladder(scene)
+    up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
+    asked = {tuple(dropped) for _, dropped in up}
+    but_one = [
+        (f"all but: {name}", tuple(n for n in names if n != name))
+        for name in names
+        if tuple(n for n in names if n != name) not in asked
+    ]
+    found = []
+    for k, (name, dropped) in enumerate([*up, *but_one]):
+        progress(name, k / (len(up) + len(but_one)))
+        found.append(_answered(scene, name, dropped, h))
+    return Ladder(scene=scene, rungs=tuple(found[: len(up)]), but_one=tuple(found[len(up) :]))
+
+
+def _answered(scene: Scene, name: str, dropped: tuple[str, ...], h: float | None) -> Rung:
+    changed, model = relaxed(scene, dropped)
+    rung = {"name": name, "dropped": dropped, "model": model}
+    size = (h or default_size(scene.body)) if model == "fem" else None
+    try:
+        response, seconds, memory = apart(_timed, changed, model, size)
+    except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
+        return Rung(**rung, error=str(error))  # type: ignore[arg-type]
+    return Rung(**rung, response=response, seconds=seconds, memory=memory)  # type: ignore[arg-type]
+
+
+def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, int]:
+    if scene.body.kind != "palm":  # a palm is meshed once per machine
+        os.environ["SKINWAVE_CACHE"] = ""
+    started = time.perf_counter()
+    response = simulate(scene, model, h=h)
+    return response, time.perf_counter() - started, peak_memory()
+
+
+def effect(
+    scene: Scene, before: Rung, after: Rung, richest: Rung, kept_alone: Rung | None
+) -> Effect:
+    """What the assumption named by a rung changes."""
+    assert before.response
+    assert after.response
+    change = compare(after.response, before.response)
+    worst = int(np.argmax(change.relative_l2))
+    alone = None
+    if kept_alone and kept_alone.response and richest.response:
+        alone = float(compare(richest.response, kept_alone.response).relative_l2.max())
+    return Effect(
+        name=after.name,
+        waveform=float(change.relative_l2[worst]),
+        where=scene.probes[worst],
+        decibel=line_changes(scene, before.response, after.response, change.scale),
+        alone=alone,
+        seconds=after.seconds - before.seconds,
+    )
+
+
+def line_changes(
+    scene: Scene, before: Response, after: Response, scale: float = 1.0
+) -> dict[str, float]:
+    """By how many dB each line that counts grows, at the probe where it is strongest."""
+    names = {name: f for name, f in tacton_lines(scene.tacton, 3).items() if f < HIGHEST}
+    if not names:
+        return {}
+    old, new = (lines(r, list(names.values())) for r in (before, after))
+    old = abs(scale) * old
+    least = FAINTEST * max(old.max(), new.max())
+    changes = {}
+    for k, name in enumerate(names):
+        probe = int(np.argmax(np.maximum(old[k], new[k])))
+        if max(old[k, probe], new[k, probe]) > least:
+            floor = 1e-3 * least
+            ratio = max(new[k, probe], floor) / max(old[k, probe], floor)
+            changes[name] = float(20 * np.log10(ratio))
+    return changes
+
+
+def sentence(e: Effect) -> str:
+    """What a user is told about an assumption."""
+    x, y = (1e3 * v for v in e.where)
+    text = (
+        f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at ({x:g}, {y:g}) mm by "
+    )
+    text += f"{100 * e.waveform:.3g} %"
+    if e.decibel:
+        line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
+        text += f" and the {line} line by {e.decibel[line]:+.1f} dB"
+    cost = f"costs {e.seconds:.1f} s more" if e.seconds > 0.05 else "costs nothing"
+    return f"{text}, and {cost}."
+
+
+def write(folder: Path, found: Ladder) -> None:
+    """index.html, relax.png, relax.csv, relax.json and the waveforms, responses.npz."""
+    effects = found.effects()
+    record = {
+        "effects": [asdict(e) for e in effects],
+        "rungs": [_record(rung) for rung in (*found.rungs, *found.but_one)],
+    }
+    (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
+    _write_lines(folder / "relax.csv", found)
+    answered = [r for r in (*found.rungs, *found.but_one) if r.response]
+    arrays = {r.name: r.response.displacement for r in answered if r.response}
+    first = next(r.response for r in answered if r.response)
+    arrays |= {"t": first.times, "probes": first.probes}
+    np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
+    drawn = png(figure(effects), dpi=130)
+    (folder / "relax.png").write_bytes(drawn)
+    parts = [
+        report.paragraph(
+            "From the published model to the richest one that this scene has, one assumption after "
+            "another. Waveforms are compared after the factor that fits best where one is a "
+            "pressure and the other a displacement."
+        ),
+        report.section(
+            "What each assumption changes", *map(report.paragraph, map(sentence, effects))
+        ),
+        report.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
+        report.table(*effect_table(effects)),
+        report.section("Rungs", report.table(*rung_table(found))),
+    ]
+    title = f"{found.scene.name}: assumptions, one by one"
+    (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+
+
+def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]:
+    """Header and rows, the greatest effect first."""
+    rows = [
+        [
+            e.name, f"{100 * e.waveform:.3g}", f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
+            "" if e.alone is None else f"{100 * e.alone:.3g}", f"{e.seconds:+.1f}",
+            ", ".join(f"{name} {value:+.1f}" for name, value in e.decibel.items()),
+        ]
+        for e in effects
+    ]  # fmt: skip
+    header = ["assumption dropped", "waveform changes by, %", "at, mm"]
+    header += ["if it is the only one kept, %", "costs, s", "lines change by, dB"]
+    return header, rows
+
+
+def rung_table(found: Ladder) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of what was answered, in the order of the ladder."""
+    rows = []
+    for rung in (*found.rungs, *found.but_one):
+        dofs = f"{rung.response.effort.dofs:,}" if rung.response else ""
+        memory = f"{rung.memory / 2**30:.2f}" if rung.response else ""
+        rows.append([rung.name, rung.model, dofs, f"{rung.seconds:.1f}", memory, rung.error])
+    return ["rung", "model", "unknowns", "seconds, all from the start", "GiB", "why not"], rows
+
+
+def figure(effects: list[Effect]) -> Figure:
+    """Effect against cost, one point an assumption, its name beside it."""
+    drawn = Figure(figsize=(8, 4.6), layout="constrained")
+    axes = drawn.add_subplot()
+    for e in effects:
+        axes.plot(max(e.seconds, 0.01), 100 * e.waveform, "o", color="#0072B2")
+    changes = [100 * e.waveform for e in effects] or [1.0]
+    axes.set(xscale="log", yscale="log", xlabel="cost of dropping it, s (0.01 or less at the left)",
+             ylabel="change of the worst probe's waveform, %")  # fmt: skip
+    axes.set_ylim(max(min(changes) / 2, 1e-6), 2 * max(changes))
+    axes.margins(x=0.35)
+    for e in effects:
+        axes.annotate(e.name, (max(e.seconds, 0.01), 100 * e.waveform), (6, 5),
+                      textcoords="offset points", fontsize=9)  # fmt: skip
+    axes.grid(alpha=0.3)
+    return drawn
+
+
+def _record(rung: Rung) -> dict[str, object]:
+    effort = asdict(rung.response.effort) if rung.response else {}
+    kept = ("name", "dropped", "model", "seconds", "memory", "error")
+    return {name: getattr(rung, name) for name in kept} | {"effort": effort}
+
+
+def _write_lines(path: Path, found: Ladder) -> None:
+    """Every line's change at each probe, from the rung before and from the richest."""
+    names = {n: f for n, f in tacton_lines(found.scene.tacton, 3).items() if f < HIGHEST}
+    answered = [r for r in found.rungs if r.response]
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz",
+                         "from_rung_before_db", "from_richest_db"])  # fmt: skip
+        for before, rung in pairwise(answered):
+            ratios = [_ratios(rung, other, names) for other in (before, answered[-1])]
+            for k, (name, f) in enumerate(names.items()):
+                for p, (x, y) in enumerate(found.scene.probes):
+                    changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
+                    row = [rung.name, rung.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
+                    writer.writerow(row)
+
+
+def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:
+    assert rung.response
+    assert other.response
+    found = compare(other.response, rung.response, tuple(names.values()))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return 20 * np.log10(found.line_ratios)

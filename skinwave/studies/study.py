@@ -1,0 +1,290 @@
+"""The main job: Tactons on several bodies, compared, in one folder."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from html import escape
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from skinwave.effort import Progress, peak_memory
+from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
+from skinwave.models.bodies import check_mesh, default_size
+from skinwave.models.prepared import Prepared, answer, prepare
+from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
+from skinwave.reports import report
+from skinwave.run import Run
+from skinwave.scene import BODIES, Body, Scene, with_body
+from skinwave.scene_file import dumps
+from skinwave.simulation import check_knobs, simulate
+from skinwave.studies import paper15
+from skinwave.studies.claims import Verdict, evaluate
+
+EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What a comparison left: its verdicts, what it cost, and how much of it was done."""
+
+    verdicts: list[Verdict]
+    runs: int
+    planned: int
+    seconds: float
+    peak_memory: int
+
+
+def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str, Scene]]:
+    """Tacton -> body -> scene of the paper's 15 Tactons, on bodies by name or on paper and skin."""
+    return {name: paper15.scenes(name, tacton, bodies) for name, tacton in paper15.tactons()}
+
+
+def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
+    """The same for one scene: as published, and on its own body or, if it has none, on both."""
+    published = with_body(scene, BODIES["none"], drive="linear", focus="main_lobe")
+    if scene.body.kind != "none":
+        known = (label for label, body in BODIES.items() if body == scene.body)
+        return {name: {"none": published, next(known, scene.body.kind): scene}}
+    physical = {"drive": "pressure_squared", "focus": "gaussian"}
+    bodies = {k: with_body(scene, BODIES[k], **physical) for k in paper15.MEASURED_ON}
+    return {name: {"none": published, **bodies}}
+
+
+def run_study(
+    scenes: Mapping[str, Mapping[str, Scene]],
+    folder: Path,
+    progress: Progress,
+    *,
+    title: str,
+    command: str,
+    h: float | None = None,
+    solver: str = "auto",
+) -> Outcome:
+    """Answer every scene, writing each run as it is finished, then the tables and the page.
+
+    An interrupt ends the answering early; what is finished is still compared and written.
+    """
+    check_knobs(solver, h=h)
+    for solid in {s.body for group in scenes.values() for s in group.values()}:
+        if solid.kind != "none":
+            check_mesh(
+                solid, h or default_size(solid)
+            )  # refuses what cannot be meshed before any run
+    started = time.perf_counter()
+    runs: list[Run] = []
+    prepared: dict[str, Prepared] = {}
+    planned = sum(map(len, scenes.values()))
+    try:
+        for body in dict.fromkeys(body for group in scenes.values() for body in group):
+            for name, group in scenes.items():
+                if body in group:
+                    runs.append(_answer(name, body, group[body], prepared, progress, h, solver))
+                    write_run(folder / name / body, runs[-1])
+                    progress(f"answer {name} on {body}", len(runs) / planned)
+    except KeyboardInterrupt:
+        if not runs:
+            raise
+    outcome = Outcome(
+        verdicts=evaluate(runs),
+        runs=len(runs),
+        planned=planned,
+        seconds=time.perf_counter() - started,
+        peak_memory=peak_memory(),
+    )
+    progress("write tables", 0.0)
+    write_claims(folder / "claims.csv", outcome.verdicts)
+    write_lines(folder / "lines.csv", runs)
+    write_responses(folder / "responses.npz", {f"{r.tacton}/{r.body}/{r.model}": r for r in runs})
+    _write_page(folder, runs, outcome, prepared, progress, title, command)
+    return replace(outcome, seconds=time.perf_counter() - started, peak_memory=peak_memory())
+
+
+def write_single(folder: Path, run: Run) -> None:
+    """The folder of one run, with its page."""
+    fill(folder, run)
+    figure = tacton_figure(run.tacton, [run])
+    parts = [
+        report.picture(png(figure), caption(run.tacton, [run]), "tacton"),
+        *(report.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
+        report.section("Effort", report.effort_table({run.body: run.response.effort}, 1)),
+        report.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
+    ]
+    title = f"{run.tacton} on {run.body}: {run.model}"
+    (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+
+
+def _answer(
+    name: str,
+    body: str,
+    scene: Scene,
+    prepared: dict[str, Prepared],
+    progress: Progress,
+    h: float | None,
+    solver: str,
+) -> Run:
+    """One run; a body is prepared when it is first met."""
+    if scene.body.kind == "none":
+        return Run(tacton=name, body=body, scene=scene, response=simulate(scene, "point-kernel"))
+    if body not in prepared:
+
+        def named(phase: str, fraction: float) -> None:
+            progress(f"{body}: {phase}", fraction)
+
+        prepared[body] = prepare(scene.body, scene.probe_points, named, h=h, solver=solver)
+    return Run(tacton=name, body=body, scene=scene, response=answer(prepared[body], scene))
+
+
+def _write_page(
+    folder: Path,
+    runs: list[Run],
+    outcome: Outcome,
+    prepared: dict[str, Prepared],
+    progress: Progress,
+    title: str,
+    command: str,
+) -> None:
+    """index.html, and a PNG of each figure in it."""
+    groups: dict[str, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(run.tacton, []).append(run)
+    (folder / "figures").mkdir()
+    pictures = []
+    for k, (name, group) in enumerate(groups.items()):
+        progress("draw", k / len(groups))
+        figure = tacton_figure(name, group)
+        pictures.append(_picture(folder, name, figure, caption(name, group)))
+    shown = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
+    overview = overview_figure(shown, min(2, len(runs[0].scene.probes) - 1))
+    shown_first = _picture(folder, "overview", overview, OVERVIEW_CAPTION)
+    efforts = {
+        body: replace(
+            p.effort,
+            **{
+                name: max(getattr(r.response.effort, name) for r in runs if r.body == body)
+                for name in ("energy_imbalance", "radiated")
+            },
+        )
+        for body, p in prepared.items()
+    }
+    parts = [
+        *_introduction(outcome, groups),
+        shown_first,
+        report.section(
+            "Which of the paper's statements hold where",
+            report.claims_table(outcome.verdicts),
+            *map(report.paragraph, _disagreements(outcome.verdicts)),
+        ),
+        report.section("What was modelled, and what was left out",
+                       *map(report.paragraph, modelled(runs))),
+        report.section("Every Tacton", *pictures),
+        report.section("How far the models agree", report.agreement_table(groups)),
+        report.section("Effort", report.effort_table(efforts, len(groups), outcome.seconds)),
+        report.section("Do it again", report.paragraph(
+            f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder.")),
+    ]  # fmt: skip
+    (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+
+
+def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
+    """A figure drawn once: as a file, and inside the page."""
+    drawn = png(figure)
+    (folder / "figures" / f"{name}.png").write_bytes(drawn)
+    return report.picture(drawn, caption, name)
+
+
+def _introduction(outcome: Outcome, groups: dict[str, list[Run]]) -> list[str]:
+    if outcome.runs == outcome.planned:
+        state = f"{len(groups)} Tactons, {outcome.runs} runs."
+    else:
+        state = f"Interrupted: {outcome.runs} of {outcome.planned} runs are finished and shown."
+    return [
+        report.paragraph(
+            f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
+            "doi 10.1145/3613905.3650981) beside finite elements of the bodies that the same "
+            "Tactons drive. Amplitudes of every line are in lines.csv, waveforms in "
+            "responses.npz; each run's folder has the scene that reproduces it."
+        )
+    ]
+
+
+def _disagreements(verdicts: list[Verdict]) -> list[str]:
+    """Where the linear physics of a body contradicts what was measured on paper, in words."""
+    texts = []
+    for verdict in verdicts:
+        if verdict.body != "none" and verdict.claim.startswith("M") and not verdict.holds:
+            texts.append(
+                f"Linear waves on the {verdict.body} contradict {verdict.claim}, which was "
+                f"measured on paper: {verdict.sentence}."
+            )
+    return texts
+
+
+OVERVIEW_CAPTION = (
+    "Top: motion about its mean at one probe, relative to each model's largest motion at any "
+    "probe. Middle: its spectrum; markers are the Tacton's own lines, unmarked peaks are pairs "
+    "with 2 f_AM and the free vibration that the start of the Tacton leaves in the sheet. "
+    "Bottom: how far the motion spreads."
+)
+LEFT_OUT = (
+    "The point kernel is drawn as published: linear drive law q = A M(t) S(D) with "
+    "S = sinc^2(D/D0) and no propagation. What it predicts is a stimulation in Pa. The bodies "
+    "are linear and elastic with viscous loss, on 10-node tetrahedra, with few unknowns left. "
+    "Their lines at 2 f_AM and, in AM+STM, at n f_d come from their drive law as much as from "
+    "waves: pressure_squared, because a device that modulates its sound pressure pushes with "
+    "the square of it.",
+    "The pressure at the focus is uncertain by a factor of 2, and all displacements with it.",
+)
+
+
+def modelled(runs: list[Run]) -> list[str]:
+    """What the bodies are, and what that leaves out, in sentences."""
+    sentences = [LEFT_OUT[0]]
+    for body in dict.fromkeys(run.body for run in runs if run.scene.body.kind != "none"):
+        mine = [run for run in runs if run.body == body]
+        sentences.append(f"{label(body)}: {_body_sentence(mine)}")
+    return [*sentences, LEFT_OUT[1]]
+
+
+def _body_sentence(runs: list[Run]) -> str:
+    body, solid = runs[0].scene.body, runs[0].scene.body.solid
+    text = (
+        f"{1e3 * body.width:g} x {1e3 * body.height:g} x {1e3 * body.depth:g} mm, base "
+        f"{body.base}, sides {body.sides}; density {solid.density:g} kg/m3, shear modulus "
+        f"{solid.shear_modulus / 1e3:.4g} kPa, Poisson's ratio {solid.poisson:g}, viscosity "
+        f"{solid.viscosity:g} Pa s, loss factor {solid.loss_factor:g}"
+    )
+    if solid.loss_factor:
+        text += " (as Rayleigh damping that fits it over 50-600 Hz)"
+    if body.kind == "slab":
+        return text + ". Left out: layers and curvature."
+    sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
+    return (
+        f"{text}. The mesh is a thicker sheet of the same bending stiffness and mass per area. "
+        "Left out: the air that moves along, a fifth to a third of the mass of office paper; and "
+        f"stretching: under its mean load this sheet sags by up to {sag:.1f} times its "
+        "thickness, and beyond about half a thickness a real one stiffens and its lowest modes "
+        "lie higher. Neither size nor support of the sheet that was measured is published."
+    )
+
+
+def caption(name: str, group: list[Run]) -> str:
+    """What a Tacton's figure shows."""
+    tacton = group[0].scene.tacton
+    path = tacton.trajectory
+    parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency else []
+    if path.shape == "recorded":
+        parts.append(f"a path recorded for {path.times[-1]:g} s")
+    elif path.drawing_frequency:
+        size = path.size or path.length
+        parts.append(
+            f"{path.shape} of {1e3 * size:g} mm at {path.speed:g} m/s, "
+            f"f_d = {path.drawing_frequency:.3f} Hz"
+        )
+    if len(tacton.foci) > 1:
+        parts.append(f"{len(tacton.foci)} foci")
+    if tacton.rhythm:
+        parts.append(f"{len(tacton.rhythm.pulses)} pulses in {1e3 * tacton.rhythm.period:g} ms")
+    if tacton.signal:
+        parts.append(f"a sampled {tacton.signal.role}")
+    return f"{name}: {', '.join(parts) or 'constant pressure'}. Rows are probes."

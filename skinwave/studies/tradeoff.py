@@ -1,0 +1,286 @@
+"""What accuracy costs on one scene: every model over its knobs, against the finest fem run."""
+
+import json
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from math import inf, isfinite
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from simple_model import Response, lines, tacton_lines
+from skinwave.comparison import compare
+from skinwave.effort import Progress, apart, peak_memory
+from skinwave.models.bodies import default_size
+from skinwave.models.prepared import answer, prepare
+from skinwave.pictures.figures import png
+from skinwave.planning.estimates import is_flat
+from skinwave.reports import report
+from skinwave.scene import Scene
+from skinwave.simulation import simulate
+
+REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
+FINEST = (0.6, 0.5)  # of the two runs that the reference is accepted by
+BARS = (0.01, 0.05, 0.20)
+COLOURS = {
+    "point-kernel": "#000000", "flat-body": "#009E73", "fem": "#0072B2",
+    "fem-transient": "#D55E00", "fem-harmonic": "#CC79A7",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A model with its knobs: element size in metre, reduction tolerance, time step in s, and
+    whether the body is taken as infinitely deep.
+    """
+
+    model: str
+    endless: bool = False
+    h: float | None = None
+    tolerance: float | None = None
+    dt: float | None = None
+
+    @property
+    def name(self) -> str:
+        """What a table calls it."""
+        knobs = ["half-space"] if self.endless else []
+        knobs += [f"h = {1e3 * self.h:.2f} mm"] if self.h else []
+        knobs += [f"reduced to {self.tolerance:g}"] if self.tolerance else []
+        knobs += [f"dt = {1e3 * self.dt:g} ms"] if self.dt else []
+        return ", ".join([self.model, *knobs])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """A candidate's errors against the reference and its cost.
+
+    `errors` relative L2 per probe, `line_errors` dB per line at the probe where it is strongest,
+    `lag` in s at the worst probe; `cold` and `warm` wall s; `memory` peak bytes; unknowns `dofs`.
+    """
+
+    candidate: Candidate
+    errors: tuple[float, ...]
+    line_errors: dict[str, float]
+    lag: float
+    cold: float
+    warm: float
+    memory: int
+    dofs: int
+
+    @property
+    def error(self) -> float:
+        """The worst probe's."""
+        return max(self.errors)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """All candidates, by cost, and how far the reference itself is converged."""
+
+    measured: tuple[Measured, ...]
+    reference: Candidate
+    self_convergence: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether two refinements differ by less than a tenth of the smallest error reported."""
+        return self.self_convergence < 0.1 * min(m.error for m in self.measured)
+
+    def front(self) -> list[Measured]:
+        """Candidates that none is both cheaper and better than."""
+        best, kept = np.inf, []
+        for m in self.measured:
+            if m.error < best:
+                best = m.error
+                kept.append(m)
+        return kept
+
+    def cheapest(self, bar: float) -> Measured | None:
+        """The cheapest candidate with an error of at most the bar."""
+        return next((m for m in self.measured if m.error <= bar), None)
+
+
+def candidates(scene: Scene) -> list[Candidate]:
+    """Every model that can answer the scene, over the knobs that matter to it."""
+    h = default_size(scene.body)
+    sizes = [round(h * factor, 6) for factor in REFINEMENTS]
+    found = [Candidate(model="point-kernel")]
+    if is_flat(scene):
+        found.append(Candidate(model="flat-body"))
+        if isfinite(scene.body.depth):
+            found.append(Candidate(model="flat-body", endless=True))
+    found += [Candidate(model="fem", h=size) for size in sizes]
+    found += [Candidate(model="fem", h=sizes[2], tolerance=t) for t in (0.3, 0.03)]
+    found += [Candidate(model="fem-transient", h=sizes[2], dt=dt) for dt in (1e-3, 5e-4, 2e-4)]
+    found += [Candidate(model="fem-harmonic", h=sizes[1])]
+    return found
+
+
+def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None = None) -> Study:
+    """Measure candidates on a scene, each in a process of its own so that memory is its own.
+
+    Raises
+    ------
+    ValueError
+        If the scene has no body.
+    """
+    if scene.body.kind == "none":
+        raise ValueError("a scene without a body has one model only; give it a sheet or a slab")
+    todo = list(chosen or candidates(scene))
+    fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]
+    results = {}
+    for k, candidate in enumerate([*fine, *todo]):
+        progress(candidate.name, k / (len(todo) + len(fine)))
+        results[candidate.name] = apart(_run, scene, candidate)
+    reference = results[fine[-1].name][0]
+    measured = [_measure(scene, c, reference, *results[c.name]) for c in todo]
+    check = compare(reference, results[fine[0].name][0])
+    return Study(
+        measured=tuple(sorted(measured, key=lambda m: m.cold)),
+        reference=fine[-1],
+        self_convergence=float(check.relative_l2.max()),
+    )
+
+
+def write(folder: Path, scene: Scene, found: Study) -> None:
+    """index.html, tradeoff.png and tradeoff.json of a study."""
+    (folder / "tradeoff.json").write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
+    drawn = png(figure(found), dpi=130)
+    (folder / "tradeoff.png").write_bytes(drawn)
+    front = {m.candidate.name for m in found.front()}
+    rows = [
+        [
+            m.candidate.name + (" *" if m.candidate.name in front else ""),
+            f"{100 * m.error:.3g}", f"{max(map(abs, m.line_errors.values()), default=0):.2f}",
+            f"{1e3 * m.lag:+.2f}", f"{m.cold:.2g}", f"{m.warm:.2g}",
+            f"{m.memory / 2**20:.0f}", f"{m.dofs:,}",
+        ]
+        for m in found.measured
+    ]  # fmt: skip
+    header = ["candidate (* on the front)", "waveform error, %", "largest line error, dB"]
+    header += ["lag, ms", "cold, s", "warm, s", "peak memory, MiB", "unknowns"]
+    (folder / "index.html").write_text(
+        report.page(
+            f"Speed against accuracy: {scene.name}",
+            report.picture(drawn, CAPTION, "tradeoff"),
+            report.table(header, rows),
+            *map(report.paragraph, sentences(found)),
+        ),
+        encoding="utf-8",
+    )
+
+
+CAPTION = (
+    "Worst probe's waveform error against the reference, and the time of the first answer. The "
+    "area of a marker is the peak memory; the line is the front that nothing beats on both."
+)
+
+
+def sentences(found: Study) -> list[str]:
+    """What the study says, in words."""
+    own = f"{100 * found.self_convergence:.2g} %"
+    if found.accepted:
+        said = f"The reference, {found.reference.name}, differs from the next coarser by {own}."
+    else:
+        said = (
+            f"There is no reference for the smallest errors: {found.reference.name} differs from "
+            f"the next coarser by {own}; take errors below {1000 * found.self_convergence:.2g} % "
+            "as upper estimates."
+        )
+    texts = [said]
+    if any(m.candidate.model == "flat-body" for m in found.measured):
+        texts.append(
+            "flat-body is exact for an endless body; its difference is that of the meshed body's "
+            "sides, which absorb most of a wave but not all."
+        )
+    for bar in BARS:
+        m = found.cheapest(bar)
+        texts.append(
+            f"Within {100 * bar:g} %: {m.candidate.name}, {m.cold:.2g} s (error "
+            f"{100 * m.error:.2g} %)."
+            if m
+            else f"Within {100 * bar:g} %: none of these."
+        )
+    return texts
+
+
+def figure(found: Study) -> Figure:
+    """Error against seconds, one colour a model, memory as size."""
+    drawing = Figure(figsize=(7.5, 5.2), layout="constrained")
+    ax = drawing.subplots()
+    front = found.front()
+    ax.plot([m.cold for m in front], [100 * m.error for m in front], color="0.75", lw=4, zorder=1)
+    for model, colour in COLOURS.items():
+        mine = [m for m in found.measured if m.candidate.model == model]
+        if mine:
+            ax.scatter(
+                [m.cold for m in mine], [100 * m.error for m in mine],
+                s=[20 + m.memory / 2**22 for m in mine], color=colour, alpha=0.75, label=model,
+            )  # fmt: skip
+    ax.axhline(100 * found.self_convergence, color="0.5", ls=":", lw=1)
+    ax.text(
+        0.01, 100 * found.self_convergence, "finest two runs differ", fontsize=8, va="bottom",
+        color="0.4", transform=ax.get_yaxis_transform(),
+    )  # fmt: skip
+    ax.set(xscale="log", yscale="log", xlabel="first answer, s", ylabel="worst probe's error, %")
+    ax.grid(alpha=0.3, which="both")
+    legend = ax.legend(title="area: peak memory")
+    for handle in legend.legend_handles:
+        if handle is not None:
+            handle.set_sizes([50])  # type: ignore[attr-defined]
+    return drawing
+
+
+def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, int]:
+    """A candidate's response, its first and second time, and the peak memory of its process."""
+    import os
+
+    os.environ["SKINWAVE_CACHE"] = ""  # cold means cold
+    started = time.perf_counter()
+    if candidate.model == "fem":
+        knobs = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
+        prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **knobs)  # type: ignore[arg-type]
+        response = answer(prepared, scene)
+        cold = time.perf_counter() - started
+        again = time.perf_counter()
+        answer(prepared, scene)
+        return response, cold, time.perf_counter() - again, peak_memory()
+    if candidate.endless:
+        scene = replace(scene, body=replace(scene.body, depth=inf))
+    response = simulate(scene, candidate.model, h=candidate.h, dt=candidate.dt)
+    cold = time.perf_counter() - started
+    return response, cold, cold, peak_memory()
+
+
+def _measure(
+    scene: Scene,
+    candidate: Candidate,
+    reference: Response,
+    response: Response,
+    cold: float,
+    warm: float,
+    memory: int,
+) -> Measured:
+    names = {n: f for n, f in tacton_lines(scene.tacton, 3).items() if f < 600}
+    found = compare(reference, response)
+    truth = lines(reference, list(names.values())) if names else np.zeros((0, 1))
+    given = abs(found.scale) * lines(response, list(names.values())) if names else truth
+    strongest = truth.argmax(axis=1)
+    matters = truth.max(axis=1) > 0.01 * truth.max(initial=0.0)
+    decibel = {
+        name: float(20 * np.log10(max(given[k, p], 1e-300) / truth[k, p]))
+        for k, (name, p) in enumerate(zip(names, strongest, strict=True))
+        if matters[k]
+    }
+    return Measured(
+        candidate=candidate,
+        errors=tuple(map(float, found.relative_l2)),
+        line_errors=decibel,
+        lag=float(found.lag[np.argmax(np.abs(found.lag))]),
+        cold=cold,
+        warm=warm,
+        memory=memory,
+        dofs=response.effort.dofs,
+    )

@@ -1,0 +1,144 @@
+"""One row of a sweep: what was commanded, what came out of it, and what that cost."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import Response, lines, point_kernel, sensation_level, tacton_lines
+from skinwave.comparison import Agreement, compare, moving_rms
+from skinwave.models.prepared import sample_times
+from skinwave.run import Run
+from skinwave.scene import Scene
+from skinwave.sweeps.variation import Case
+
+SETTLE = 0.25  # of a response, before which it is not looked at
+TEXTS = (
+    "key", "status", "error", "model", "asked_model", "version", "name", "scene",
+    "felt_line", "solver", "warnings",
+)  # fmt: skip
+NUMBERS = (
+    "tolerance", "asked_h_mm", "h_mm", "expected_error", "drawing_frequency_hz",
+    "rayleigh_speed_m_per_s", "spread_6db_mm", "spread_20db_mm", "kernel_spread_6db_mm",
+    "kernel_spread_20db_mm", "seconds", "dofs", "reduced_dofs", "steps", "reduction_error",
+    "energy_imbalance", "radiated", "peak_memory_gib",
+)  # fmt: skip
+AT_PROBES = (
+    "probe_x_mm", "probe_y_mm", "peak_um", "rms_um", "level_db", "kernel_peak_pa", "kernel_rms_pa",
+    "kernel_misfit", "kernel_lag_ms",
+)  # fmt: skip
+COSTS = ("seconds", "peak_memory_gib")  # which differ from run to run
+
+
+def columns(cases: Iterable[Case]) -> dict[str, str]:
+    """The columns of a sweep and whether each is "text", "number" or, at each probe, "numbers"."""
+    found = dict.fromkeys(TEXTS, "text")
+    of_lines: dict[str, str] = {}
+    for case in cases:
+        for key, value in case.keys.items():
+            found.setdefault(key, "text" if isinstance(value, str) else "number")
+        for name in tacton_lines(case.scene.tacton) if case.scene else ():
+            of_lines[f"{name}_hz"] = "number"
+            of_lines |= {f"{name}_{unit}": "numbers" for unit in ("um", "db", "kernel_pa", "ratio")}
+    return (
+        found
+        | dict.fromkeys(NUMBERS, "number")
+        | dict.fromkeys(AT_PROBES, "numbers")
+        | dict(sorted(of_lines.items()))
+    )
+
+
+def commanded(case: Case) -> dict[str, Any]:
+    """The part of a row that is known before the run."""
+    row: dict[str, Any] = {"status": "failed", "error": case.error, "scene": case.text, **case.keys}
+    if case.scene:
+        body = case.scene.body
+        row |= {
+            "name": case.scene.name,
+            "drawing_frequency_hz": case.scene.tacton.trajectory.drawing_frequency,
+            "probe_x_mm": [1e3 * x for x, _ in case.scene.probes],
+            "probe_y_mm": [1e3 * y for _, y in case.scene.probes],
+        }
+        if body.kind not in ("none", "sheet"):
+            row["rayleigh_speed_m_per_s"] = body.solid.rayleigh_speed
+    return row
+
+
+def measured(scene: Scene, response: Response) -> dict[str, Any]:
+    """The part of a row that an answer gives: what it is, beside the point kernel, and its cost."""
+    kernel = response
+    if response.unit == "m":
+        kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
+    frequencies = Run(
+        tacton=scene.name, body=scene.body.kind, scene=scene, response=response
+    ).frequencies
+    agreement = compare(kernel, response)
+    row: dict[str, Any] = {"status": "done", "model": response.model}
+    # Both at once: the fit of the lines costs more than what it is applied to.
+    both = replace(response, displacement=np.hstack([kernel.displacement, response.displacement]))
+    published, found = np.split(lines(both, list(frequencies.values())), 2, axis=1)
+    for k, (name, frequency) in enumerate(frequencies.items()):
+        row[f"{name}_hz"] = frequency
+        row[f"{name}_kernel_pa"] = published[k]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            row[f"{name}_ratio"] = abs(agreement.scale) * found[k] / published[k]
+    row |= _kernel(kernel, agreement) | _effort(response)
+    if response.unit == "m":
+        row |= _motion(response, agreement) | _felt(frequencies, found)
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in row.items()}  # fmt: skip
+
+
+def _kernel(kernel: Response, agreement: Agreement) -> dict[str, Any]:
+    return {
+        "kernel_peak_pa": _peak(kernel),
+        "kernel_rms_pa": moving_rms(kernel),
+        "kernel_misfit": agreement.relative_l2,
+        "kernel_lag_ms": 1e3 * agreement.lag,
+        "kernel_spread_6db_mm": 1e3 * agreement.spread_reference[-6],
+        "kernel_spread_20db_mm": 1e3 * agreement.spread_reference[-20],
+    }
+
+
+def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
+    return {
+        "peak_um": 1e6 * _peak(response),
+        "rms_um": 1e6 * moving_rms(response),
+        "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
+        "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
+    }
+
+
+def _felt(frequencies: Mapping[str, float], amplitudes: Floats) -> dict[str, Any]:
+    """Lines in micrometre and above threshold, and the one that is felt most."""
+    row: dict[str, Any] = {}
+    levels = {n: sensation_level(a, f) for (n, f), a in zip(frequencies.items(), amplitudes,
+                                                            strict=True)}  # fmt: skip
+    for (name, level), amplitude in zip(levels.items(), amplitudes, strict=True):
+        row[f"{name}_um"], row[f"{name}_db"] = 1e6 * amplitude, level
+    if levels:
+        row["level_db"] = np.max(list(levels.values()), axis=0)
+        row["felt_line"] = max(levels, key=lambda name: levels[name].max())
+    return row
+
+
+def _effort(response: Response) -> dict[str, Any]:
+    effort = response.effort
+    return {
+        "dofs": effort.dofs,
+        "reduced_dofs": effort.reduced_dofs,
+        "steps": effort.steps,
+        "solver": effort.solver,
+        "reduction_error": effort.estimate,
+        "energy_imbalance": effort.energy_imbalance,
+        "radiated": effort.radiated,
+        "peak_memory_gib": effort.peak_memory / 2**30,
+        "warnings": "; ".join(effort.warnings),
+    }
+
+
+def _peak(response: Response) -> Any:
+    kept = response.displacement[int(SETTLE * len(response.times)) :]
+    return np.abs(kept).max(axis=0)

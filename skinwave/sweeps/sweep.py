@@ -1,0 +1,287 @@
+"""Many scenes in one table: which runs, each body prepared once, each run once."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from importlib.metadata import version
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simple_model import Response, tacton_lines
+from skinwave.effort import Progress, silent
+from skinwave.models.prepared import REDUCTION_TOLERANCE, Prepared, answer, prepare
+from skinwave.planning.estimates import is_flat
+from skinwave.planning.refinement import error_left, refined
+from skinwave.scene import Body, Scene
+from skinwave.simulation import MODELS, check_knobs, simulate
+from skinwave.sweeps import dataset, engine
+from skinwave.sweeps.measures import columns, commanded, measured
+from skinwave.sweeps.variation import Case
+
+BATCH = 8  # runs of one body that are handed out together, at most
+KEPT = 4  # bodies that a worker keeps in memory, on two meshes each
+
+
+@dataclass(frozen=True, kw_only=True)
+class Knobs:
+    """How every run is answered; h in metre."""
+
+    model: str = "auto"
+    tolerance: float = 0.05
+    h: float | None = None
+    solver: str = "auto"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """The element size in metre that the runs on a body share, that of the `coarser` mesh which
+    tells each how wrong it is, or the `error` why there is none.
+    """
+
+    h: float | None = None
+    coarser: float | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What a sweep left: rows `planned`, `found` there before, `done` and `failed` now."""
+
+    planned: int
+    found: int
+    done: int
+    failed: int
+    interrupted: bool
+    seconds: float
+
+    @property
+    def missing(self) -> int:
+        """Runs that are not in the table yet."""
+        return self.planned - self.found - self.done - self.failed
+
+
+def sweep(
+    wanted: Sequence[Case],
+    folder: Path,
+    knobs: Knobs,
+    progress: Progress | None = None,
+    *,
+    scheduler: str = "processes",
+    workers: int | None = None,
+) -> Outcome:
+    """Answer every case that the folder has no row of, and append a row for each.
+
+    Parameters
+    ----------
+    wanted : cases of `variation.cases`
+    folder : a new one, or that of a sweep, which is gone on with
+    scheduler : "processes", "threads", or the address of a Dask scheduler
+    workers : how many runs go on at a time on this machine; all cores if not given
+
+    An interrupt ends it early; the rows that are written stay. An error of a run is its row.
+
+    Raises
+    ------
+    ValueError
+        If a knob is wrong, an extra is not installed, no scheduler answers, or the folder is not
+        that of a sweep.
+    """
+    started = time.perf_counter()
+    report = progress or silent
+    _check(knobs)
+    engine.check(scheduler)
+    count = engine.workers(scheduler, workers)
+    there = dataset.names(dataset.open_folder(folder))
+    release = version("skinwave")
+    named = {case.name(release, knobs): case for case in wanted}
+    left = {name: case for name, case in named.items() if name not in there}
+    types = columns(wanted)
+    tally = {"done": 0, "failed": 0}
+    constant = {
+        "version": release, "asked_model": knobs.model, "tolerance": knobs.tolerance,
+        "asked_h_mm": 1e3 * knobs.h if knobs.h else None,
+    }  # fmt: skip
+
+    def written(rows: Sequence[dict[str, Any]]) -> None:
+        if rows:
+            dataset.append(folder, [constant | row for row in rows], types)
+        for row in rows:
+            tally[row["status"]] += 1
+        report("run", (len(named) - len(left) + sum(tally.values())) / len(named))
+
+    interrupted = False
+    try:
+        written([{"key": k} | commanded(case) for k, case in left.items() if not case.scene])
+        runs = {name: case for name, case in left.items() if case.scene}
+        meshes = _shared_meshes(runs, knobs, scheduler, count, report)
+        batches = _batches(runs, knobs, meshes, count)
+        engine.run_all(
+            partial(_rows, knobs), batches, scheduler, count, lambda k, rows: written(rows)
+        )
+    except KeyboardInterrupt:
+        interrupted = True
+    return Outcome(
+        planned=len(named),
+        found=len(named) - len(left),
+        **tally,
+        interrupted=interrupted,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def model_of(scene: Scene, asked: str) -> str:
+    """The model that answers a scene: as asked, or the cheapest that leaves nothing out.
+
+    That is the point kernel without a body, exact waves for a flat body whose sides send nothing
+    back, and else finite elements.
+    """
+    if asked != "auto":
+        return asked
+    if scene.body.kind == "none":
+        return "point-kernel"
+    endless = scene.body.sides == "absorbing" or not isfinite(scene.body.depth)
+    return "flat-body" if is_flat(scene) and endless else "fem"
+
+
+def _check(knobs: Knobs) -> None:
+    check_knobs(knobs.solver, h=knobs.h)
+    if knobs.model not in MODELS or not 0 < knobs.tolerance < 1:
+        raise ValueError(
+            f"model '{knobs.model}' and tolerance {knobs.tolerance} must be one of "
+            f"{', '.join(MODELS)} and between 0 and 1"
+        )
+
+
+Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
+
+
+def _solid(case: Case, knobs: Knobs) -> Solid | None:
+    """What a run shares with others, if it does."""
+    scene = case.scene
+    if scene is None or model_of(scene, knobs.model) != "fem" or scene.body.kind == "none":
+        return None
+    return scene.body, scene.probes
+
+
+def _shared_meshes(
+    runs: dict[str, Case], knobs: Knobs, scheduler: str, count: int, report: Progress
+) -> dict[Solid, Mesh]:
+    """Find a mesh for each body that several runs share, and prepare it, each body once."""
+    hardest: dict[Solid, Scene] = {}
+    for case in runs.values():
+        if (solid := _solid(case, knobs)) and case.scene:
+            before = hardest.get(solid, case.scene)
+            hardest[solid] = max(before, case.scene, key=_highest)
+    found: dict[Solid, Mesh] = {}
+    solids = list(hardest)
+
+    def done(k: int, mesh: Mesh) -> None:
+        found[solids[k]] = mesh
+        report("prepare bodies", len(found) / len(solids))
+
+    report("prepare bodies", 0.0)
+    engine.run_all(partial(_mesh, knobs), list(hardest.values()), scheduler, count, done)
+    lost = Mesh(error="its worker was killed each time; give it more memory or larger elements")
+    return {solid: found.get(solid, lost) for solid in solids}
+
+
+def _highest(scene: Scene) -> float:
+    """The highest line in Hz that a Tacton makes."""
+    return max(tacton_lines(scene.tacton).values(), default=0.0)
+
+
+def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
+    """The mesh that is right for the hardest scene of a body; kept on disk for all workers."""
+    try:
+        if knobs.h:
+            _prepared(scene.body, scene.probes, knobs.h, knobs)
+            return Mesh(h=knobs.h)
+        found = refined(scene, scene.body, knobs.tolerance, solver=knobs.solver)
+        return Mesh(h=found.h, coarser=found.coarser)
+    except Exception as error:  # any: it is that of every run on this body
+        return Mesh(error=_said(error))
+
+
+@lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
+def _prepared(
+    body: Body, probes: tuple[tuple[float, float], ...], h: float, knobs: Knobs
+) -> Prepared:
+    tolerance = min(REDUCTION_TOLERANCE, knobs.tolerance / 50)
+    return prepare(body, np.array(probes), h=h, solver=knobs.solver, tolerance=tolerance)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Runs by name that are handed out together, and the mesh that they share."""
+
+    runs: dict[str, Case]
+    mesh: Mesh | None
+
+
+def _batches(
+    runs: dict[str, Case], knobs: Knobs, meshes: dict[Solid, Mesh], count: int
+) -> list[Batch]:
+    """Runs on one body follow each other; others are alone."""
+    groups: dict[Solid | None, list[str]] = {}
+    for name, case in runs.items():
+        groups.setdefault(_solid(case, knobs), []).append(name)
+    # Several batches for each worker, so that none waits long for the last.
+    size = max(1, min(BATCH, len(runs) // (4 * count)))
+    return [
+        Batch(runs={n: runs[n] for n in names[k : k + step]}, mesh=solid and meshes[solid])
+        for solid, names in groups.items()
+        for step in [size if solid else 1]
+        for k in range(0, len(names), step)
+    ]
+
+
+def _rows(knobs: Knobs, batch: Batch) -> list[dict[str, Any]]:
+    """Run a batch, on a worker."""
+    return [{"key": name} | _row(case, knobs, batch.mesh) for name, case in batch.runs.items()]
+
+
+def _row(case: Case, knobs: Knobs, mesh: Mesh | None) -> dict[str, Any]:
+    row, started = commanded(case), time.perf_counter()
+    assert case.scene
+    try:
+        if mesh is None:
+            model = model_of(case.scene, knobs.model)
+            response = simulate(case.scene, model, knobs.tolerance, h=knobs.h, solver=knobs.solver)
+        else:
+            response, of_mesh = _on_mesh(case.scene, knobs, mesh)
+            row |= of_mesh
+        row |= measured(case.scene, response)
+    except Exception as error:  # any: one run's failure is its row, not the end of the others
+        row["error"] = _said(error)
+    return row | {"seconds": time.perf_counter() - started}
+
+
+def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> tuple[Response, dict[str, Any]]:
+    """An answer of the body prepared, and how wrong its mesh makes it."""
+    if mesh.error or mesh.h is None:
+        raise ValueError(mesh.error)
+    found = answer(_prepared(scene.body, scene.probes, mesh.h, knobs), scene)
+    row = {"h_mm": 1e3 * mesh.h}
+    if mesh.coarser is None:
+        return found, row
+    coarse = answer(_prepared(scene.body, scene.probes, mesh.coarser, knobs), scene)
+    if coarse.effort.dofs != found.effort.dofs:
+        row["expected_error"] = error = error_left(coarse, found, mesh.coarser / mesh.h)
+        if error > knobs.tolerance:
+            said = (
+                f"elements of {1e3 * mesh.h:.3g} mm will be wrong by about {100 * error:.2g} %, "
+                f"more than the tolerance of {100 * knobs.tolerance:g} %; give a smaller --h"
+            )
+            found = replace(found, effort=replace(found.effort, warnings=(said,)))
+    return found, row
+
+
+def _said(error: Exception) -> str:
+    """An error as a cell of the table; its kind, too, where it is not a refusal."""
+    text = " ".join(str(error).split())
+    refusal = isinstance(error, ValueError | ArithmeticError) and text
+    return text if refusal else f"{type(error).__name__}: {text}"

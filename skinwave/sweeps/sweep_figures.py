@@ -1,0 +1,205 @@
+"""Pictures of a sweep: one column over one or two varied keys (matplotlib)."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from simple_model.choices import choose
+from simple_model.threshold import BAND
+from skinwave.pictures.styles import Style
+
+Row = Mapping[str, Any]
+SPEED = "tacton.speed_m_per_s"
+MARKERS = "osD^vP*X"
+UNITS = {  # by the end of a column's name
+    "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
+    "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB",
+    "_kg_m3": "kg/m³", "_pa_s": "Pa s", "seconds": "s", "_ratio": "µm/Pa, scaled",
+}  # fmt: skip
+NAMES = {
+    "peak_um": "largest displacement", "rms_um": "RMS displacement about its mean",
+    "level_db": "sensation level", "tacton.speed_m_per_s": "drawing speed",
+    "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
+    "body.depth_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
+    "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
+    "kernel_lag_ms": "lag behind the point kernel", "expected_error": "expected error of the mesh",
+}  # fmt: skip
+
+
+def varied(rows: Sequence[Row]) -> list[str]:
+    """Keys of scenes that differ between rows, those with most values first."""
+    keys = [key for key in dict.fromkeys(k for row in rows for k in row) if "." in key]
+    counts = {key: len({row.get(key) for row in rows}) for key in keys}
+    return sorted((k for k in keys if counts[k] > 1), key=lambda k: -counts[k])
+
+
+def finished(rows: Sequence[Row]) -> list[Row]:
+    """The rows that have an answer.
+
+    Raises
+    ------
+    ValueError
+        If none has.
+    """
+    found = [row for row in rows if row["status"] == "done"]
+    if not found:
+        raise ValueError(f"none of {len(rows)} runs has an answer: {rows[0]['error']}")
+    return found
+
+
+def value(row: Row, column: str) -> float:
+    """A cell as a number: what is told at each probe by the largest, `name[2]` by that of one."""
+    name, probe = _at_probe(column)
+    cell = row.get(name)
+    if isinstance(cell, list):
+        if probe is not None:
+            return _number(cell[probe]) if probe < len(cell) else np.nan
+        return float(np.max([_number(x) for x in cell])) if cell else np.nan
+    return _number(cell)
+
+
+def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
+    """A column over one key, a curve for each value of another."""
+    _check(rows, (column, x, *([by] if by else [])))
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+        ax = figure.subplots()
+        curves(ax, rows, column, x, by)
+        ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
+    return figure
+
+
+def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
+    """A column over two keys, of what they share the mean; cells without a run stay empty."""
+    _check(rows, (column, x, y))
+    across, up = _levels(rows, x), _levels(rows, y)
+    cells: dict[tuple[int, int], list[float]] = {}
+    for row in rows:
+        where = up.index(_plain(row.get(y))), across.index(_plain(row.get(x)))
+        cells.setdefault(where, []).append(value(row, column))
+    table = np.full((len(up), len(across)), np.nan)
+    for where, values in cells.items():
+        table[where] = np.mean(values)
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+        ax = figure.subplots()
+        drawn = np.where(np.isfinite(table), table, np.nan)
+        image = ax.pcolormesh(drawn, cmap="viridis", edgecolors="face", linewidth=0.3)
+        _ticks(ax, across, up)
+        ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
+        figure.colorbar(image, ax=ax, label=axis_label(column))
+    return figure
+
+
+def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
+    """Displacement and sensation level over the drawing speed, and the speed of surface waves."""
+    _check(rows, (SPEED, "peak_um"))
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=(6.4, 6.6), layout="constrained")
+        axes = figure.subplots(2, 1, sharex=True)
+        for ax, column in zip(axes, ("peak_um", "level_db"), strict=True):
+            curves(ax, rows, column, SPEED, by)
+            waves = {value(row, "rayleigh_speed_m_per_s") for row in rows}
+            for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
+                said = "Rayleigh speed $c_R$ without loss" if k == 0 else None
+                ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
+            ax.set_ylabel(axis_label(column))
+        axes[0].set_ylim(bottom=0)
+        axes[0].legend(fontsize="small", frameon=False)
+        band = axes[1].axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0)
+        said = f"threshold, ±{BAND:g} dB between people"
+        axes[1].legend([band], [said], fontsize="small", frameon=False)
+        axes[1].set_xlabel(axis_label(SPEED))
+    return figure
+
+
+def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -> None:
+    """A curve for each value of a key; where other keys differ, the mean and the range."""
+    groups = _levels(rows, by) if by else [None]
+    words = not isinstance(_levels(rows, x)[0], float)
+    colours = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(groups)))
+    for k, group in enumerate(groups):
+        mine = [row for row in rows if by is None or _plain(row.get(by)) == group]
+        at = _levels(mine, x)
+        found = [[value(r, column) for r in mine if _plain(r.get(x)) == level] for level in at]
+        places = np.arange(len(at)) if words else np.array(at)
+        mean = np.array([np.mean(values) for values in found])
+        label = None if by is None else _with_unit(by, group)
+        ax.plot(places, np.where(np.isfinite(mean), mean, np.nan), color=colours[k],
+                marker=MARKERS[k % len(MARKERS)], ms=4, lw=1.5, label=label)  # fmt: skip
+        if max(map(len, found)) > 1:
+            low, high = (np.array([f(v) for v in found]) for f in (np.min, np.max))
+            ax.fill_between(places, low, high, color=colours[k], alpha=0.15, lw=0)
+    if words:
+        ax.set_xticks(range(len(at)), [str(level) for level in at])
+    if by is not None:
+        ax.legend(fontsize="small", frameon=False)
+    ax.grid(alpha=0.25)
+
+
+def axis_label(column: str) -> str:
+    """What a column is, and its unit."""
+    name, probe = _at_probe(column)
+    words = NAMES.get(name)
+    if words is None:
+        words = name.split(".", 1)[-1] if re.match(r"[a-z]+\.[a-z]", name) else name
+        for end in UNITS:
+            words = words.removesuffix(end) if words != end else words
+        words = words.replace("_kernel", " of the point kernel").replace("f_AM", "$f_{AM}$")
+        words = words.replace("f_d", "$f_d$").replace("_", " ") if "$" not in words else words
+        words = re.sub(r"(?<![_$])f_d", "$f_d$", words)
+    where = "" if probe is None else f" at probe {probe}"
+    unit = _unit(name)
+    return f"{words}{where}, {unit}" if unit else f"{words}{where}"
+
+
+def _unit(name: str) -> str:
+    ends = sorted((end for end in UNITS if name.endswith(end)), key=len)
+    return UNITS[ends[-1]] if ends else ""
+
+
+def _with_unit(key: str, level: Any) -> str:
+    name = axis_label(key).rpartition(", ")[0] or axis_label(key)
+    text = f"{level:g}" if isinstance(level, float) else str(level)
+    return f"{name} {text} {_unit(key)}".strip()
+
+
+def _at_probe(column: str) -> tuple[str, int | None]:
+    found = re.fullmatch(r"(.+)\[(\d+)\]", column)
+    return (found[1], int(found[2])) if found else (column, None)
+
+
+def _check(rows: Sequence[Row], columns: Sequence[str]) -> None:
+    known = list(dict.fromkeys(name for row in rows for name in row))
+    for column in columns:
+        choose("column", _at_probe(column)[0], known)
+    shown = columns[0]
+    if not any(np.isfinite(value(row, shown)) for row in rows):
+        raise ValueError(f"column '{shown}' has no finite number to draw; choose another")
+
+
+def _levels(rows: Sequence[Row], key: str | None) -> list[Any]:
+    found = {_plain(row.get(key)) for row in rows} if key else set()
+    return sorted(found, key=lambda level: (not isinstance(level, float), level))
+
+
+def _plain(cell: Any) -> Any:
+    return "none" if cell is None else cell
+
+
+def _number(cell: Any) -> float:
+    return float(cell) if isinstance(cell, int | float) else np.nan
+
+
+def _ticks(ax: Axes, across: Sequence[Any], up: Sequence[Any]) -> None:
+    """Names in the middle of cells, as many as there is room for."""
+    for axis, levels, most in ((ax.xaxis, across, 10), (ax.yaxis, up, 14)):
+        step = -(-len(levels) // most)
+        shown = np.arange(0, len(levels), step) + 0.5
+        names = [f"{x:g}" if isinstance(x, float) else str(x) for x in levels[::step]]
+        axis.set_ticks(shown, names)

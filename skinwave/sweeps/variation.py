@@ -1,0 +1,297 @@
+"""What a sweep varies: keys of a scene file, their values, and which of them meet."""
+
+import difflib
+import hashlib
+import itertools
+import json
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from simple_model.choices import choose
+from skinwave.scene import BODIES, Scene, solid_of, with_body
+from skinwave.scene_file import dumps, loads, read
+from skinwave.scene_keys import MATERIAL, SECTIONS
+
+DESIGNS = ("factorial", "zip", "lhs")
+MOST_RUNS = 100_000
+BODY = "body"  # the key of a whole body: the name of a preset, or a file
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """A key of a scene file, and its `values` or, for a Latin hypercube, the `bounds` of them."""
+
+    key: str
+    values: tuple[Any, ...] = ()
+    bounds: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One run that is wanted: its `varied` keys, the scene that they make or the `error` why they
+    make none, the `keys` of that scene's file, and its `text`.
+    """
+
+    varied: Mapping[str, Any]
+    keys: Mapping[str, float | str]
+    text: str
+    scene: Scene | None = None
+    error: str = ""
+
+    def name(self, *knobs: object) -> str:
+        """A hash of the complete scene, of the file of its body, and of how it is answered."""
+        digest = hashlib.sha256(repr((self.text, *knobs)).encode())
+        if self.scene and self.scene.body.file:
+            digest.update(_content(self.scene.body.file))
+        return digest.hexdigest()[:24]
+
+
+def parse(text: str) -> Variation:
+    """What `key=v1,v2`, `key=start:stop:n` or, within bounds, `key=start:stop` varies.
+
+    Raises
+    ------
+    ValueError
+        If the key is none of a scene, or there is no value.
+    """
+    key, equals, right = text.partition("=")
+    key = _known(key.strip())
+    if not equals or not right.strip():
+        raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
+    numbers = [_number(part) for part in right.split(":")]
+    if len(numbers) == 1 or None in numbers:
+        return Variation(key=key, values=tuple(map(_value, _split(right))))
+    if len(numbers) > 3 or not all(math.isfinite(x) for x in numbers if x is not None):
+        raise ValueError(f"--vary {text} is no finite start:stop:n; write three finite numbers")
+    start, stop, *count = (x for x in numbers if x is not None)
+    if not count:
+        return Variation(key=key, bounds=(start, stop))
+    if not (count[0] == int(count[0]) and 1 <= count[0] <= MOST_RUNS):
+        raise ValueError(
+            f"--vary {text} asks for {count[0]:g} values; give a whole number, 1..{MOST_RUNS:,}"
+        )
+    return Variation(key=key, values=tuple(np.linspace(start, stop, int(count[0])).tolist()))
+
+
+def combinations(
+    variations: Sequence[Variation],
+    design: str = "factorial",
+    samples: int | None = None,
+    seed: int = 0,
+) -> list[dict[str, Any]]:
+    """The values that meet in each run, by key.
+
+    Parameters
+    ----------
+    design : "factorial", every value with every other; "zip", first with first; or "lhs", a Latin
+        hypercube of so many `samples` within bounds and over lists, the same for the same `seed`
+
+    Raises
+    ------
+    ValueError
+        If keys are varied twice or not in the way that the design takes.
+    """
+    choose("design", design, DESIGNS)
+    keys = [variation.key for variation in variations]
+    if not keys:
+        raise ValueError("nothing is varied; give --vary key=v1,v2 at least once")
+    if twice := [key for key in dict.fromkeys(keys) if keys.count(key) > 1]:
+        raise ValueError(f"{twice[0]} is varied twice; give all its values at once")
+    if (samples is None) == (design == "lhs"):
+        raise ValueError("--samples belongs to --design lhs, and lhs needs it; give both or none")
+    if design == "lhs":
+        return _hypercube(variations, samples or 0, seed)
+    for variation in variations:
+        if variation.bounds:
+            raise ValueError(f"{variation.key}=start:stop lacks the number of values; add :n")
+    lengths = [len(variation.values) for variation in variations]
+    if design == "zip" and len(set(lengths)) > 1:
+        raise ValueError(
+            f"--design zip pairs lists of one length, not of {', '.join(map(str, lengths))}; "
+            "make them as long or take factorial"
+        )
+    count = lengths[0] if design == "zip" else math.prod(lengths)
+    _check_count(count)
+    values = [variation.values for variation in variations]
+    met = zip(*values, strict=True) if design == "zip" else itertools.product(*values)
+    return [dict(zip(keys, each, strict=True)) for each in met]
+
+
+def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[Case]:
+    """The scenes that a scene file and each combination of values make, each once.
+
+    A combination that makes no scene is a case with its error.
+
+    Raises
+    ------
+    ValueError
+        If the file is no scene, no combination makes one, or a word is refused by each it is in.
+    """
+    base = read(path)
+    table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    if base.body.file:
+        table["body"]["file"] = base.body.file
+    complete = tomllib.loads(dumps(base))
+    found = {case.text: case for case in (_case(table, complete, each) for each in combined)}
+    _refuse_words(list(found.values()))
+    return list(found.values())
+
+
+def _hypercube(variations: Sequence[Variation], samples: int, seed: int) -> list[dict[str, Any]]:
+    from scipy.stats import qmc
+
+    _check_count(samples)
+    points = qmc.LatinHypercube(len(variations), rng=seed).random(samples)
+
+    def placed(variation: Variation, x: float) -> Any:
+        if variation.bounds:
+            low, high = variation.bounds
+            return low + float(x) * (high - low)
+        return variation.values[int(x * len(variation.values))]
+
+    return [
+        {v.key: placed(v, x) for v, x in zip(variations, point, strict=True)} for point in points
+    ]
+
+
+def _check_count(count: int) -> None:
+    if not 1 <= count <= MOST_RUNS:
+        raise ValueError(f"{count:,} runs are outside 1..{MOST_RUNS:,}; vary fewer values")
+
+
+def _known(key: str) -> str:
+    """The key, if a scene has it; parts of a value, as in body.material.poisson, are checked when
+    the scene is read.
+    """
+    known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
+    if key != BODY and ".".join(key.split(".")[:2]) not in known:
+        near = difflib.get_close_matches(key, known, 1, 0.0)
+        raise ValueError(f"'{key}' is no key of a scene; did you mean '{near[0]}'?")
+    return key
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _value(text: str) -> Any:
+    """A value as the scene file would have it; a word needs no quotes."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        number = _number(text)
+        return text.strip() if number is None else number
+
+
+def _split(text: str) -> list[str]:
+    """Parts between commas that are not within brackets or quotes."""
+    parts, depth, quote = [""], 0, ""
+    for letter in text:
+        if quote or letter in "\"'":
+            quote = "" if letter == quote else quote or letter
+        else:
+            depth += (letter in "[{") - (letter in "]}")
+        if letter == "," and not depth and not quote:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts
+
+
+def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> Case:
+    scene, error, changed = None, "", table
+    for key in sorted(varied, key=lambda key: key != BODY):  # the body first, then what is in it
+        if key == BODY:
+            changed = changed | {BODY: _body(varied[key])}
+        else:
+            changed = _with(changed, complete, key.split("."), varied[key])
+    try:
+        text = tomli_w.dumps(changed)
+        scene = loads(text)
+        text = dumps(scene)
+    except ValueError as refused:
+        error = str(refused)
+    keys = _flat(tomllib.loads(text)) | {key: _plain(value) for key, value in varied.items()}
+    return Case(varied=varied, keys=keys, text=text, scene=scene, error=error)
+
+
+def _body(name: Any) -> Any:
+    """The table of a preset, or of a file."""
+    if name in BODIES:
+        scene = with_body(loads(""), BODIES[name])
+        return tomllib.loads(dumps(scene))[BODY]
+    if not Path(str(name)).is_file():
+        raise ValueError(
+            f"body '{name}' is no file and none of {', '.join(BODIES)}; name one of these or a file"
+        )
+    return {"kind": "mesh", "file": str(Path(name).resolve())}
+
+
+def _with(node: Any, complete: Any, path: Sequence[str], value: Any) -> Any:
+    """A copy of a table in which what a path leads to has another value."""
+    if not path:
+        return value
+    head, rest = path[0], path[1:]
+    if isinstance(node, list):
+        if not (head.isdecimal() and int(head) < len(node)):
+            raise ValueError(f"there is no '{head}' in a list of {len(node)}; count from 0")
+        k = int(head)
+        return [*node[:k], _with(node[k], None, rest, value), *node[k + 1 :]]
+    if isinstance(node, str):  # a preset's name stands for its table
+        choose("material", node, _presets())
+        solid = solid_of(node)
+        node = {key: field.write(getattr(solid, field.name)) for key, field in MATERIAL.items()}
+    if not isinstance(node, dict):
+        raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
+    before = complete.get(head) if isinstance(complete, dict) else None
+    inner = node.get(head, before if rest and before is not None else {})
+    return node | {head: _with(inner, before, rest, value)}
+
+
+def _presets() -> Sequence[str]:
+    from fem.materials import PRESETS
+
+    return list(PRESETS)
+
+
+def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:
+    """Keys with their section, and values that fit one cell of a table."""
+    found: dict[str, float | str] = {}
+    for section, values in table.items():
+        if isinstance(values, dict):
+            found |= {f"{section}.{key}": _plain(value) for key, value in values.items()}
+    return found
+
+
+def _plain(value: Any) -> float | str:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _refuse_words(found: Sequence[Case]) -> None:
+    """Numbers may be out of range in some runs; a word that no run can use is a slip."""
+    if all(case.error for case in found):
+        raise ValueError(f"no combination makes a scene: {found[0].error}")
+    accepted = {(k, str(v)) for case in found if not case.error for k, v in case.varied.items()}
+    for case in found:
+        for key, value in case.varied.items():
+            if not isinstance(value, int | float) and (key, str(value)) not in accepted:
+                raise ValueError(f"{key} = {value}: {case.error}")
+
+
+def _content(file: str) -> bytes:
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).digest()
+    except OSError as error:
+        raise ValueError(f"{file}: cannot be read ({error.strerror}); check the path") from None
