@@ -18,9 +18,10 @@ from skinwave import exports
 from skinwave.cli import main
 from skinwave.models import speeds
 from skinwave.models.bodies import compliance
-from skinwave.pictures import album, films, gallery, maps, motion, render, views
+from skinwave.pictures import films, maps, motion, render, views
 from skinwave.pictures.renderer import Renderer, renderer
 from skinwave.pictures.styles import style
+from skinwave.reports import album, gallery
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps
 

@@ -22,12 +22,12 @@ INNER = {
     "models": set(),
     "planning": {"models"},
     "patterns": set(),
-    "pictures": {"models", "planning", "verify"},
-    "studies": {"models", "planning", "pictures", "reports"},
-    "reports": {"models", "planning", "pictures", "studies"},
-    "sweeps": {"models", "planning", "pictures", "studies"},
-    "verify": {"models", "planning", "pictures", "reports", "studies"},
-    "web": {"models", "planning", "pictures", "studies", "reports"},
+    "pictures": {"models"},
+    "verify": {"models", "planning", "pictures"},
+    "studies": {"models", "planning", "pictures"},
+    "reports": {"models", "planning", "pictures", "studies", "verify"},
+    "sweeps": {"models", "planning", "pictures"},
+    "web": {"models", "pictures", "reports", "studies"},
 }
 
 

@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
-    from skinwave.pictures.album import answers, open_album
+    from skinwave.reports.album import answers, open_album
     from skinwave.scene_file import read
 
     if not options.source.is_dir():

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         progress_of(options) as progress,
     ):
         if scene is not None:
-            from skinwave.pictures.album import make
+            from skinwave.reports.album import make
 
             make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,

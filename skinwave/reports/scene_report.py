@@ -5,18 +5,19 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
-from skinwave.pictures.album import Album, open_album
 from skinwave.pictures.figures import label
-from skinwave.pictures.gallery import Gallery, pictures, run_figures, tactons
 from skinwave.pictures.levels import felt_lines, strongest_probe
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
-from skinwave.reports import report
+from skinwave.reports.album import Album, open_album
+from skinwave.reports.gallery import Gallery, pictures, run_figures, tactons
 from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
+from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
 from skinwave.studies.study import modelled
 
@@ -52,15 +53,15 @@ def write_report(
     groups = tactons(album)
     parts = [
         _asked(album),
-        report.section("What was modelled, and what was left out", *_modelled(album)),
-        report.section("What comes out", *shown),
-        report.section("What the probes see", *drawn, *map(_lines, groups.values())),
-        report.section("How far the models agree", *_comparison(album)),
-        report.section("Effort", _effort(album)),
-        report.section("How far to trust it", *_trust(album)),
-        report.section("Do it again", *_again(album)),
+        document.section("What was modelled, and what was left out", *_modelled(album)),
+        document.section("What comes out", *shown),
+        document.section("What the probes see", *drawn, *map(_lines, groups.values())),
+        document.section("How far the models agree", *_comparison(album)),
+        document.section("Effort", _effort(album)),
+        document.section("How far to trust it", *_trust(album)),
+        document.section("Do it again", *_again(album)),
     ]
-    (out / "index.html").write_text(report.page(album.title, *parts), encoding="utf-8")
+    (out / "index.html").write_text(document.page(album.title, *parts), encoding="utf-8")
 
 
 def _write_data(folder: Path, album: Album) -> None:
@@ -82,7 +83,7 @@ def _asked(album: Album) -> str:
     scene = (
         f'<details class="screen"><summary>The scene in full</summary><pre>{text}</pre></details>'
     )
-    return report.section("What was asked", report.table(["", ""], rows), scene)
+    return document.section("What was asked", document.table(["", ""], rows), scene)
 
 
 def _asked_rows(scene: Scene) -> list[list[str]]:
@@ -105,9 +106,9 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
 
 
 def _modelled(album: Album) -> list[str]:
-    parts = [report.paragraph(text) for text in modelled(list(album.runs))]
+    parts = [document.paragraph(text) for text in modelled(list(album.runs))]
     if album.planned is None:
-        return [*parts, report.paragraph("No plan was kept with these results; skinwave plan "
+        return [*parts, document.paragraph("No plan was kept with these results; skinwave plan "
                                          "scene.toml makes one.")]  # fmt: skip
     planned = album.planned
     rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
@@ -116,15 +117,15 @@ def _modelled(album: Album) -> list[str]:
         "probes, and why. Pictures need the motion of the whole body, and so are by finite "
         "elements whatever is planned."
     )
-    warned = [report.paragraph(f"Warning: {text}.") for text in planned["warnings"]]
-    return [*parts, report.paragraph(heading), report.table(["", "", "reason"], rows), *warned]
+    warned = [document.paragraph(f"Warning: {text}.") for text in planned["warnings"]]
+    return [*parts, document.paragraph(heading), document.table(["", "", "reason"], rows), *warned]
 
 
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
     if not runs[0].lines:
-        return report.paragraph("A constant pressure on a focus at rest has no line.")
+        return document.paragraph("A constant pressure on a focus at rest has no line.")
     share = {name: max(_share(run, name, probe) for run in runs) for name in runs[0].lines}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
     felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
@@ -140,7 +141,7 @@ def _lines(runs: Sequence[Run]) -> str:
         header += [f"{label(run.body)}, {'Pa' if pascal else 'µm'} peak"]
         header += [] if pascal else ["dB re threshold"]
     x, y = 1e3 * runs[0].response.probes[probe]
-    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + report.table(header, rows)
+    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows)
 
 
 def _share(run: Run, name: str, probe: int) -> float:
@@ -166,18 +167,18 @@ def _comparison(album: Album) -> list[str]:
     groups = tactons(album)
     parts = []
     if any(len(runs) > 1 for runs in groups.values()):
-        parts.append(report.agreement_table(groups))
+        parts.append(tables.agreement_table(groups))
     long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
     verdicts = evaluate(long)
     if verdicts:
-        parts.append(report.paragraph("What Lim, Seifi and Park state, evaluated on these runs:"))
-        parts.append(report.claims_table(verdicts))
-    return parts or [report.paragraph("There is one model only.")]
+        parts.append(document.paragraph("What Lim, Seifi and Park state, evaluated on these runs:"))
+        parts.append(tables.claims_table(verdicts))
+    return parts or [document.paragraph("There is one model only.")]
 
 
 def _effort(album: Album) -> str:
     efforts = {run.body: run.response.effort for run in album.runs if run.response.unit == "m"}
-    return report.effort_table(efforts, len(tactons(album)))
+    return tables.effort_table(efforts, len(tactons(album)))
 
 
 def _trust(album: Album) -> list[str]:
@@ -198,9 +199,9 @@ def _trust(album: Album) -> list[str]:
             f"by {100 * trust['misfit']:.2g} % over all probes."
         )
     found.append("The pressure of a device is uncertain by a factor of 2, and all motion with it.")
-    parts = [report.paragraph(text) for text in dict.fromkeys(found)]
+    parts = [document.paragraph(text) for text in dict.fromkeys(found)]
     if trust.get("cases"):
-        parts.append(report.paragraph(
+        parts.append(document.paragraph(
             "Cases of skinwave verify as this installation answered them; the whole suite holds "
             "the program against closed forms, series and published tables."))  # fmt: skip
         parts.append(_cases(trust["cases"]))
@@ -214,7 +215,7 @@ def _cases(cases: Sequence[Mapping[str, Any]]) -> str:
         for case in cases
     ]  # fmt: skip
     header = ["case, by its check nearest to the bar", "value", "reference", "error", "bar", ""]
-    return report.table([*header, "source"], rows)
+    return document.table([*header, "source"], rows)
 
 
 def _again(album: Album) -> list[str]:
@@ -224,6 +225,6 @@ def _again(album: Album) -> list[str]:
     said = renderer().said if renderer().found else "none"
     return [
         f"<p><code>{escape(command)}</code></p>",
-        report.paragraph(f"Computed with {named}; drawn with {said}. The scene:"),
+        document.paragraph(f"Computed with {named}; drawn with {said}. The scene:"),
         f"<pre>{escape(dumps(album.scene))}</pre>",
     ]

@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, tacton_lines
+from skinwave import document
 from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
-from skinwave.reports import report
 from skinwave.scene import BODIES, PROBES, Body, Scene
 from skinwave.simulation import simulate
 from skinwave.studies.paper15 import MEASURED_ON, tactons
@@ -211,13 +211,13 @@ def write(folder: Path, found: Findings) -> None:
     drawn = png(figure(found.ratios), dpi=130)
     (folder / "amplitude.png").write_bytes(drawn)
     parts = [
-        *map(report.paragraph, sentences(found)),
-        *(report.paragraph(f"Failed: {said}.") for said in found.failed),
-        report.picture(drawn, "2 f_AM over f_AM at the focus against the amplitude of the drive."),
-        report.section("Lines by mechanism", report.table(*line_table(found))),
-        report.section("Patterns of loads", report.table(*signature_table())),
+        *map(document.paragraph, sentences(found)),
+        *(document.paragraph(f"Failed: {said}.") for said in found.failed),
+        document.picture(drawn, "2 f_AM over f_AM at the focus against the amplitude."),
+        document.section("Lines by mechanism", document.table(*line_table(found))),
+        document.section("Patterns of loads", document.table(*signature_table())),
     ]
-    page = report.page("Paper and skin: which mechanism makes which line", *parts)
+    page = document.page("Paper and skin: which mechanism makes which line", *parts)
     (folder / "index.html").write_text(page, encoding="utf-8")
 
 

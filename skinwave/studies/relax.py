@@ -19,11 +19,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import Response, lines, tacton_lines
+from skinwave import document
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
 from skinwave.pictures.figures import png
-from skinwave.reports import report
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
 from skinwave.studies.assumptions import ASSUMPTIONS, ladder, relaxed
@@ -199,20 +199,20 @@ def write(folder: Path, found: Ladder) -> None:
     drawn = png(figure(effects), dpi=130)
     (folder / "relax.png").write_bytes(drawn)
     parts = [
-        report.paragraph(
+        document.paragraph(
             "From the published model to the richest one that this scene has, one assumption after "
             "another. Waveforms are compared after the factor that fits best where one is a "
             "pressure and the other a displacement."
         ),
-        report.section(
-            "What each assumption changes", *map(report.paragraph, map(sentence, effects))
+        document.section(
+            "What each assumption changes", *map(document.paragraph, map(sentence, effects))
         ),
-        report.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
-        report.table(*effect_table(effects)),
-        report.section("Rungs", report.table(*rung_table(found))),
+        document.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
+        document.table(*effect_table(effects)),
+        document.section("Rungs", document.table(*rung_table(found))),
     ]
     title = f"{found.scene.name}: assumptions, one by one"
-    (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
 
 
 def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]:

@@ -8,17 +8,17 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from skinwave import document
 from skinwave.effort import Progress, peak_memory
 from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
-from skinwave.reports import report
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.simulation import check_knobs, simulate
-from skinwave.studies import paper15
+from skinwave.studies import paper15, tables
 from skinwave.studies.claims import Verdict, evaluate
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
@@ -105,13 +105,13 @@ def write_single(folder: Path, run: Run) -> None:
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
     parts = [
-        report.picture(png(figure), caption(run.tacton, [run]), "tacton"),
-        *(report.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
-        report.section("Effort", report.effort_table({run.body: run.response.effort}, 1)),
-        report.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
+        document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
+        *(document.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
+        document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
+        document.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
     ]
     title = f"{run.tacton} on {run.body}: {run.model}"
-    (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
 
 
 def _answer(
@@ -170,27 +170,27 @@ def _write_page(
     parts = [
         *_introduction(outcome, groups),
         shown_first,
-        report.section(
+        document.section(
             "Which of the paper's statements hold where",
-            report.claims_table(outcome.verdicts),
-            *map(report.paragraph, _disagreements(outcome.verdicts)),
+            tables.claims_table(outcome.verdicts),
+            *map(document.paragraph, _disagreements(outcome.verdicts)),
         ),
-        report.section("What was modelled, and what was left out",
-                       *map(report.paragraph, modelled(runs))),
-        report.section("Every Tacton", *pictures),
-        report.section("How far the models agree", report.agreement_table(groups)),
-        report.section("Effort", report.effort_table(efforts, len(groups), outcome.seconds)),
-        report.section("Do it again", report.paragraph(
+        document.section("What was modelled, and what was left out",
+                       *map(document.paragraph, modelled(runs))),
+        document.section("Every Tacton", *pictures),
+        document.section("How far the models agree", tables.agreement_table(groups)),
+        document.section("Effort", tables.effort_table(efforts, len(groups), outcome.seconds)),
+        document.section("Do it again", document.paragraph(
             f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder.")),
     ]  # fmt: skip
-    (folder / "index.html").write_text(report.page(title, *parts), encoding="utf-8")
+    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
 
 
 def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
     """A figure drawn once: as a file, and inside the page."""
     drawn = png(figure)
     (folder / "figures" / f"{name}.png").write_bytes(drawn)
-    return report.picture(drawn, caption, name)
+    return document.picture(drawn, caption, name)
 
 
 def _introduction(outcome: Outcome, groups: dict[str, list[Run]]) -> list[str]:
@@ -199,7 +199,7 @@ def _introduction(outcome: Outcome, groups: dict[str, list[Run]]) -> list[str]:
     else:
         state = f"Interrupted: {outcome.runs} of {outcome.planned} runs are finished and shown."
     return [
-        report.paragraph(
+        document.paragraph(
             f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
             "doi 10.1145/3613905.3650981) beside finite elements of the bodies that the same "
             "Tactons drive. Amplitudes of every line are in lines.csv, waveforms in "

@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import Response, lines, tacton_lines
+from skinwave import document
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import is_flat
-from skinwave.reports import report
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
 
@@ -162,11 +162,11 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
     header = ["candidate (* on the front)", "waveform error, %", "largest line error, dB"]
     header += ["lag, ms", "cold, s", "warm, s", "peak memory, MiB", "unknowns"]
     (folder / "index.html").write_text(
-        report.page(
+        document.page(
             f"Speed against accuracy: {scene.name}",
-            report.picture(drawn, CAPTION, "tradeoff"),
-            report.table(header, rows),
-            *map(report.paragraph, sentences(found)),
+            document.picture(drawn, CAPTION, "tradeoff"),
+            document.table(header, rows),
+            *map(document.paragraph, sentences(found)),
         ),
         encoding="utf-8",
     )

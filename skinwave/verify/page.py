@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from skinwave import document
 from skinwave.effort import versions
 from skinwave.pictures.figures import SPARE, png
-from skinwave.reports import report
 from skinwave.verify.case import Check, Entry, Plot, Result
 
 HEADER = ("value", "reference", "error", "bar")
@@ -39,13 +39,13 @@ def page(results: list[Result], planned: Sequence[Entry], left_out: int) -> str:
     named = ", ".join(f"{name} {version}" for name, version in versions().items())
     spent = sum(r.seconds for r in results)
     topics = dict.fromkeys(r.entry.topic for r in results)
-    return report.page(
+    return document.page(
         "Verification",
-        report.paragraph(f"{state}. {spent:.0f} s with {named}."),
-        report.paragraph(SCOPE),
+        document.paragraph(f"{state}. {spent:.0f} s with {named}."),
+        document.paragraph(SCOPE),
         _summary(results),
         *(
-            report.section(topic, *(_shown(r) for r in results if r.entry.topic == topic))
+            document.section(topic, *(_shown(r) for r in results if r.entry.topic == topic))
             for topic in topics
         ),
     )
@@ -74,7 +74,7 @@ def _summary(results: list[Result]) -> str:
         ]
         for r in results
     ]
-    return report.table(["case, and its check nearest to the bar", *HEADER, "", "s"], rows)
+    return document.table(["case, and its check nearest to the bar", *HEADER, "", "s"], rows)
 
 
 def _shown(result: Result) -> str:
@@ -84,14 +84,14 @@ def _shown(result: Result) -> str:
     parts = [
         f'<h3 id="{result.entry.name}">{escape(case.title)} {_verdict(case.passed)}</h3>',
         f"<p><small>Source: {escape(case.source)}.<br>Mesh: {escape(case.mesh)}.</small></p>",
-        report.table(["quantity", *HEADER, ""], rows),
+        document.table(["quantity", *HEADER, ""], rows),
     ]
     if case.said:
         parts.append(f"<p>It says: <code>{escape(case.said)}</code></p>")
     if case.note:
-        parts.append(report.paragraph(case.note))
+        parts.append(document.paragraph(case.note))
     if case.plot:
-        parts.append(report.picture(png(_figure(case.plot), 90), case.title))
+        parts.append(document.picture(png(_figure(case.plot), 90), case.title))
     return "\n".join(parts)
 
 

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import features
 
+from skinwave import document
 from skinwave.effort import Progress
 from skinwave.pictures import maps, render
-from skinwave.pictures.album import Album
 from skinwave.pictures.figures import label, png, tacton_figure
 from skinwave.pictures.films import film, seam
 from skinwave.pictures.levels import levels_figure, strongest_probe
@@ -20,7 +20,7 @@ from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
 from skinwave.pictures.turntable import EXTRA, turntable
 from skinwave.pictures.views import View
-from skinwave.reports import report
+from skinwave.reports.album import Album
 from skinwave.run import Run
 
 FORMATS = ("png", "svg", "pdf")
@@ -55,12 +55,12 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
     """Parts of a page that show an album's views, and why any of them is missing."""
     views = list(album.views.values())
     if not views:
-        return [report.paragraph(NO_VIEWS)]
+        return [document.paragraph(NO_VIEWS)]
     if renderer().found:
         parts = _spatial(album, views, gallery, progress)
     else:
         said = f"Views in three dimensions and the film are left out: {renderer().said}."
-        parts = [report.paragraph(said)]
+        parts = [document.paragraph(said)]
     for name, draw, caption in _flat(views, gallery.style):
         progress(f"draw {name}", 0.0)
         parts.append(gallery.figure(name, draw(), caption))
@@ -80,7 +80,7 @@ def _spatial(
     parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
     path = gallery.folder / "film.gif"
     film(path, views, style, progress, panel=FILM_PANEL)
-    parts.append(report.picture(path.read_bytes(), f"Film: {seam(own)}.", "film", "gif"))
+    parts.append(document.picture(path.read_bytes(), f"Film: {seam(own)}.", "film", "gif"))
     if len(own.tets):
         progress("draw cut open", 0.0)
         cut = render.picture([own], style, frame, camera="front", cut=True)
@@ -95,13 +95,13 @@ def _spatial(
     progress("draw to be turned", 0.0)
     page = turntable(own, frame)
     if page is None:
-        parts.append(report.paragraph(f"The view that can be turned is left out: {EXTRA}."))
+        parts.append(document.paragraph(f"The view that can be turned is left out: {EXTRA}."))
     else:
         caption = (
             f"To be turned with the mouse: {label(own.body)}, {render.shown_scale(own)}; red into "
             f"the body, blue out of it, both by up to {maps.peak_text(own)}."
         )
-        parts.append(report.inner_page(page, caption))
+        parts.append(document.inner_page(page, caption))
     return parts
 
 
@@ -155,7 +155,7 @@ def _part(image: render.Image, caption: str, name: str) -> str:
     """A picture in as few bytes as a browser needs."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
     Pillow.fromarray(image).save(buffer, format=kind, quality=QUALITY, method=4)
-    return report.picture(buffer.getvalue(), caption, name, kind)
+    return document.picture(buffer.getvalue(), caption, name, kind)
 
 
 NO_VIEWS = (
