@@ -250,6 +250,26 @@ def test_a_palm_without_relief_is_a_slab_with_round_edges():
     assert np.abs(top[middle, 2]).max() < 1e-9
 
 
+@pytest.mark.slow
+def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
+    """Sides free, ends with dashpots, and cells that do not cut the sharp rim off."""
+    size = {"width": 0.07, "height": 0.07, "depth": 0.01, "material": "forearm"}
+    flat = Relief(
+        cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
+        edge_radius=0.001,
+    )  # fmt: skip
+    palm = simulate(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0028)
+
+    def with_ends(body, h, symmetry):
+        made = build(body, h, symmetry)
+        mesh = meshes.named(made.mesh, ends=lambda _, normals: np.abs(normals[:, 1]) > 0.7)
+        return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
+
+    monkeypatch.setattr("skinwave.models.full.build_body", with_ends)
+    slab = simulate(replace(SKIN, body=Body(kind="slab", sides="free", **size)), "fem", h=0.0022)
+    assert compare(slab, palm).relative_l2.max() < 0.02
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -33,7 +33,9 @@ def hand(body: Body, h: float) -> TetMesh:
         If the body cannot be meshed.
     """
     if body.kind == "palm":
-        sizing = graded(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h))
+        # Cells wider than the rim is round would cut it off, and waves come back from the rim.
+        coarsest = min(COARSEST * h, max(h, body.relief.edge_radius))
+        sizing = graded(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest))
         mesh = palm_mesh(body.palm, h, sizing=sizing)
         cut = [mesh.facets["wrist"], mesh.facets["fingers"]]
     else:
