@@ -5,6 +5,8 @@ import re
 import wave
 from dataclasses import replace
 from hashlib import sha256
+from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -203,6 +205,20 @@ def test_every_frame_of_a_film_differs_and_the_last_leads_to_the_first(seen, tmp
     assert len({sha256(frame.tobytes()).hexdigest() for frame in frames}) == 12
     steps = [np.abs(a - b).mean() for a, b in zip(frames, frames[1:] + frames[:1], strict=True)]
     assert steps[-1] < 1.5 * max(steps[:-1])
+
+
+@draws
+@pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
+def test_a_film_may_be_an_mp4(seen, tmp_path):
+    import imageio.v2 as imageio
+
+    path = tmp_path / "film.mp4"
+    films.film(path, [seen["skin-slab"]], style("report"), panel=(160, 144))
+    with imageio.get_reader(path) as film:
+        frames = [np.asarray(frame, int) for frame in film]
+        assert film.get_meta_data()["fps"] == pytest.approx(12 / films.LASTS)
+    assert len(frames) == 12
+    assert min(np.abs(a - b).max() for a, b in pairwise(frames)) > 60
 
 
 def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch):
