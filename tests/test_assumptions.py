@@ -239,3 +239,22 @@ def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_n
     assert {row["mechanism"] for row in rows} == {
         "linear load", "squared load", "squared load, stretching",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["scene.toml", "--update-rate", "30"], "update_rate = 30 kHz is no device's; take 20 or"),
+        (["scene.toml", "--update-rate", "40", "--points", "999"], "must be 2 to 209"),
+        (["paper-vs-skin", "--points", "9"], "leave them out"),
+    ],
+)
+def test_the_command_line_refuses_such_devices_in_one_sentence(
+    options, said, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(dumps(SKIN))
+    assert main(["relax", *options, "--quiet"]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

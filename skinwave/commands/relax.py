@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.files import output_folder
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
-    from skinwave.studies.assumptions import check_rate
+    from skinwave.studies.assumptions import DEVICE_RATES, check_rate
     from skinwave.studies.relax import climb, sentence, write
 
     h = metre(options.h)
@@ -38,6 +38,11 @@ def run(options: argparse.Namespace) -> int:
     rate = 1e3 * options.update_rate
     check_rate(rate)
     if options.scene == "paper-vs-skin":
+        if options.points is not None or rate != DEVICE_RATES[0]:
+            raise ValueError(
+                "--update-rate and --points are of a scene's path; paper-vs-skin draws its paths "
+                "without jumps, leave them out"
+            )
         return _mechanisms(options, h)
     scene = read(options.scene)
     out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
