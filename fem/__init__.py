@@ -2,6 +2,8 @@
 
     M u'' + C u' + K u = P q(t),  probes = S u
 
+(`relaxation` has what a standard linear solid adds to K.)
+
 Operators are built once, factorised once, and then only solved with. Index letters of every
 einsum in this package: e element, q quadrature point, a b element nodes, i j components,
 n node, p probe, t time, f frequency, l derivative along an element edge.
@@ -17,6 +19,7 @@ from fem.materials import PRESETS, Material, from_young
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
+from fem.relaxation import Branch
 from fem.static import modes, static
 from fem.surface import (
     facet_normals,
@@ -29,6 +32,7 @@ from fem.transient import Diverged, State, at_rest, transient
 
 __all__ = [
     "PRESETS",
+    "Branch",
     "Complex",
     "Diverged",
     "Elastic",

@@ -7,6 +7,7 @@
     R       = int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
                 (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
               + int drag rho N_a N_b dV in a layer before them
+    K_j     = (relaxing modulus/mu) K of the elements that relax in the same time, see `relaxation`
 
 Near incompressibility the part of lam beyond nu = 0.45 acts on the element mean of the
 dilatation (Nagtegaal, Parks and Rice 1974; Hughes 1980), without which displacements some
@@ -23,6 +24,7 @@ from scipy import sparse
 from fem.boundary import dashpots, fixed_dofs
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from fem.materials import Material, rayleigh_damping
+from fem.relaxation import Branch, on_free
 from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import EDGES, Floats, Ints
 
@@ -38,7 +40,7 @@ class Operators:
 
     `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C that takes waves out
     of the body; `free` (n_free,) numbers their rows among the 3 n displacement components of the
-    mesh, component fastest.
+    mesh, component fastest. `branches` pull beside K, which is the stiffness after they relaxed.
     """
 
     K: sparse.csr_array
@@ -47,6 +49,7 @@ class Operators:
     R: sparse.csr_array
     free: Ints
     n_dofs: int
+    branches: tuple[Branch, ...] = ()
 
     def expand(self, values: Floats) -> Floats:
         """Values (n_free, ...) as (n_dofs, ...), 0 where the body is fixed."""
@@ -97,7 +100,10 @@ def assemble(
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
-    K, C, M = _volume_operators(mesh, pattern, rho, mu, lam, a[region], b[region] + lag)
+    shares = {time: share[region] for time, share in _relaxing_shares(materials).items()}
+    K, C, M, branches = _volume_operators(
+        mesh, pattern, rho, mu, lam, a[region], b[region] + lag, shares
+    )
     R = sparse.csr_array(K.shape)
     if absorbing is not None:
         R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
@@ -106,7 +112,19 @@ def assemble(
     C = C + R
     if len(free) < mesh.n_dofs:
         K, C, M, R = (operator[free][:, free] for operator in (K, C, M, R))
-    return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs)
+        branches = on_free(branches, free)
+    return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
+
+
+def _relaxing_shares(materials: list[Material]) -> dict[float, Floats]:
+    """By relaxation time in s: relaxing over lasting modulus (r,) of the materials that have it."""
+    times = sorted({m.relaxation_time for m in materials if m.relaxing_modulus > 0})
+    return {
+        time: np.array(
+            [(m.relaxation_time == time) * m.relaxing_modulus / m.shear_modulus for m in materials]
+        )
+        for time in times
+    }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,16 +173,35 @@ def _volume_operators(
     lam: Floats,
     mass_rate: Floats,
     stiffness_lag: Floats,
-) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-    """K, C and M on all degrees of freedom; C = mass_rate M + stiffness_lag K by element."""
+    relaxing_shares: Mapping[float, Floats],
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
+    """K, C, M and what relaxes in each time, on all degrees of freedom.
+
+    By element C is mass_rate M + stiffness_lag K, and what relaxes its share of K.
+    """
     blocks, masses = element_matrices(mesh, rho, mu, lam)
     K, M = from_blocks(pattern, blocks), _from_masses(pattern, masses)
+    branches = tuple(
+        Branch(K=_scaled(pattern, K, blocks, share), time=time)
+        for time, share in relaxing_shares.items()
+    )
     if np.ptp(mass_rate) == 0 and np.ptp(stiffness_lag) == 0:
         C = stiffness_lag[0] * K if stiffness_lag[0] else sparse.csr_array(K.shape)
-        return K, C + mass_rate[0] * M if mass_rate[0] else C, M
+        return K, C + mass_rate[0] * M if mass_rate[0] else C, M, branches
     blocks *= stiffness_lag[:, None, None]
     masses *= mass_rate[:, None, None]
-    return K, from_blocks(pattern, blocks) + _from_masses(pattern, masses), M
+    return K, from_blocks(pattern, blocks) + _from_masses(pattern, masses), M, branches
+
+
+def _scaled(
+    pattern: Pattern, K: sparse.csr_array, blocks: Floats, share: Floats
+) -> sparse.csr_array:
+    """K, which the blocks sum to, of a share (e,) of each element's stiffness."""
+    if np.ptp(share) == 0:
+        return share[0] * K
+    part = from_blocks(pattern, blocks * share[:, None, None])
+    part.eliminate_zeros()
+    return part
 
 
 def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:

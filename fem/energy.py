@@ -1,19 +1,22 @@
 """Where the work of a load has gone.
 
-    work = kinetic + elastic + dissipated + radiated,  dissipated + radiated = int v^T C v dt
+    work = kinetic + elastic + dissipated + radiated
+    dissipated + radiated = int v^T C v dt + sum_j int d_j^T K_j d_j dt / tau_j
 
-C holds the loss in the material as well as R, what absorbing ends take out of the body. Average
+C holds the loss in the material as well as R, what absorbing ends take out of the body; springs
+that relax, stretched by d_j, hold elastic energy and lose it in their dashpots. Average
 acceleration keeps this balance to round-off (Hughes, The Finite Element Method, 1987, chapter
 9), whatever the time step, so that an imbalance is a mistake in the solution and not in the step.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.assembly import Operators
+from fem.relaxation import Branch
 from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
@@ -44,7 +47,8 @@ class Spent:
 def audited(
     operators: Operators, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, Spent]]:
-    """States from rest, each with what was spent so far, for a product with C and R a step.
+    """States from rest, each with what was spent so far, for a product with C, R and each branch
+    a step.
 
     Parameters
     ----------
@@ -56,7 +60,13 @@ def audited(
         velocity = (state.velocity + before.velocity)[free] / 2
         dt = state.time - before.time
         out = dt * float(velocity @ (R @ velocity))
-        return Spent(dissipated=dt * float(velocity @ (C @ velocity)) - out, radiated=out)
+        viscous = dt * float(velocity @ (C @ velocity)) - out
+        relaxed = 0.0
+        both = zip(before.stretch, state.stretch, strict=True)
+        for branch, (old, new) in zip(operators.branches, both, strict=True):
+            mean = (old + new)[free] / 2
+            relaxed += dt / branch.time * float(mean @ (branch.K @ mean))
+        return Spent(dissipated=viscous + relaxed, radiated=out)
 
     return accounted(states, force, free, lost)
 
@@ -84,7 +94,9 @@ def accounted(
 def stored(operators: Operators, state: State) -> float:
     """Elastic and kinetic energy of a state in J."""
     u, v = state.displacement[operators.free], state.velocity[operators.free]
-    return float(u @ (operators.K @ u) + v @ (operators.M @ v)) / 2
+    stretched = zip(operators.branches, state.stretch, strict=bool(state.stretch))
+    springs = sum(d[operators.free] @ (b.K @ d[operators.free]) for b, d in stretched)
+    return float(u @ (operators.K @ u) + v @ (operators.M @ v) + springs) / 2
 
 
 def imbalance(spent: Spent, stored: float = 0.0) -> float:
@@ -99,6 +111,7 @@ def mean_power(
     forces: NDArray[np.complex128],
     motion: NDArray[np.complex128],
     frequencies: Floats,
+    branches: Sequence[Branch] = (),
 ) -> Spent:
     """What lines put in and what becomes of it, in W.
 
@@ -107,14 +120,20 @@ def mean_power(
     C, R : (n, n) damping, and the part of it in absorbing ends, dense or sparse
     forces, motion : (f, n) complex amplitudes of the load in N and of the displacement in metre
     frequencies : (f,) float, Hz
+    branches : what relaxes, of (n, n) each
     """
     w = 2 * np.pi * frequencies
     supplied = float(w @ np.imag(forces * motion.conj()).sum(axis=1)) / 2
     velocity = w[:, None] * motion
 
-    def taken(D: Floats) -> float:
+    def taken(D: Floats, lag: Floats) -> float:
+        """Mean power of the forces lag (f,) D v."""
         # For a real matrix u^H D u is the sum over the real and the imaginary part.
-        return sum(float(part @ (D @ part)) for v in velocity for part in (v.real, v.imag)) / 2
+        parts = zip(lag, velocity, strict=True)
+        return sum(t * float(x @ (D @ x)) for t, v in parts for x in (v.real, v.imag)) / 2
 
-    radiated = taken(R)
-    return Spent(work=supplied, dissipated=taken(C) - radiated, radiated=radiated)
+    always = np.ones(len(w))
+    radiated = taken(R, always)
+    relaxed = sum(taken(b.K, b.time / (1 + (w * b.time) ** 2)) for b in branches)
+    dissipated = taken(C, always) - radiated + relaxed
+    return Spent(work=supplied, dissipated=dissipated, radiated=radiated)

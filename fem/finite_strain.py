@@ -114,11 +114,16 @@ def finite_strain(
     Raises
     ------
     ValueError
-        If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock; else as
-        `assemble`.
+        If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock, or a
+        material relaxes; else as `assemble`.
     """
     n = len(mesh.points)
     solid, operators = solid_part(mesh, material), assemble(mesh, material, fixed=fixed)
+    if operators.branches:
+        raise ValueError(
+            "a relaxing_modulus above 0 has no answer at large displacement; leave it out, or use "
+            "one of the linear models"
+        )
     free = operators.free
 
     def spread(u: Floats) -> Floats:

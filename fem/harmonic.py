@@ -1,10 +1,13 @@
-"""Steady state at given frequencies: (K + i w C - w^2 M) u = f, time exp(+i w t)."""
+"""Steady state at given frequencies: (K* + i w C - w^2 M) u = f, time exp(+i w t); K* = K and what
+relaxing branches add to it.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
+from fem.relaxation import relaxing_stiffness
 from meshes.tetmesh import Floats
 
 
@@ -21,7 +24,8 @@ def harmonic(
     K, C, M = operators.K, operators.C, operators.M
     answers = []
     for w in 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64)):
-        factor = factorise(K + 1j * w * C - w**2 * M, backend=solver)
+        Z = K + 1j * w * C - w**2 * M + relaxing_stiffness(operators.branches, 1j * w)
+        factor = factorise(Z, backend=solver)
         u = factor.solve(force[operators.free].astype(np.complex128))
         answers.append(operators.expand(u))
     return np.array(answers)

@@ -1,7 +1,13 @@
 """Linear viscoelastic materials and the presets that scenes name.
 
-The complex shear modulus is mu(w) = mu (1 + i loss_factor) + i w viscosity (time exp(+i w t));
-Poisson's ratio stays what it is, so that the whole stiffness scales with mu.
+The complex shear modulus (time exp(+i w t)) is
+
+    mu(w) = mu (1 + i loss_factor) + i w viscosity + relaxing_modulus i w tau / (1 + i w tau)
+
+With viscosity alone that is Kelvin's and Voigt's law, with a relaxing part alone the standard
+linear solid (C. Zener, Elasticity and Anelasticity of Metals, 1948): mu when slow and
+mu + relaxing_modulus when fast. Poisson's ratio stays what it is, so that the whole stiffness
+scales with mu.
 """
 
 from dataclasses import dataclass
@@ -18,15 +24,18 @@ class Material:
     Parameters
     ----------
     density : float, kg/m3
-    shear_modulus : float, Pa
+    shear_modulus : float, Pa, at rest: after all that relaxes has relaxed
     poisson : float, -1 < poisson < 0.5
     viscosity : float, Pa s, Kelvin-Voigt: shear stress per shear rate
     loss_factor : float, hysteretic loss, the same at every frequency
+    relaxing_modulus : float, Pa, standard linear solid: what fast motion meets beside the shear
+        modulus
+    relaxation_time : float, s, tau, in which that part is given up to 1/e
 
     Raises
     ------
     ValueError
-        If a value is not finite or outside these limits.
+        If a value is not finite or outside these limits, or a relaxing part has no time.
     """
 
     density: float
@@ -34,16 +43,23 @@ class Material:
     poisson: float
     viscosity: float = 0.0
     loss_factor: float = 0.0
+    relaxing_modulus: float = 0.0
+    relaxation_time: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("density", "shear_modulus"):
             value = getattr(self, name)
             if not (isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value} must be a finite number above 0")
-        for name in ("viscosity", "loss_factor"):
+        for name in ("viscosity", "loss_factor", "relaxing_modulus", "relaxation_time"):
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
+        if self.relaxing_modulus > 0 and self.relaxation_time == 0:
+            raise ValueError(
+                f"relaxing_modulus = {self.relaxing_modulus:g} Pa has relaxation_time = 0 s, which "
+                "must be above 0; give the time, or leave out the relaxing part"
+            )
         if not -1 < self.poisson < 0.5:
             raise ValueError(
                 f"poisson = {self.poisson} is outside -1 < poisson < 0.5; "
@@ -59,6 +75,12 @@ class Material:
     def first_lame(self) -> float:
         """Lame's first parameter, Pa."""
         return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
+
+    def complex_modulus(self, w: float) -> complex:
+        """Shear modulus in Pa of steady motion exp(+i w t), w in rad/s."""
+        lasting = self.shear_modulus * (1 + 1j * self.loss_factor) + 1j * w * self.viscosity
+        turned = 1j * w * self.relaxation_time
+        return lasting + self.relaxing_modulus * turned / (1 + turned)
 
     @property
     def shear_speed(self) -> float:
@@ -111,6 +133,17 @@ PRESETS = {
     "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
     "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
     "palm-stiff": Material(density=1000, shear_modulus=50e3, poisson=0.4999, viscosity=10.0),
+    # The palm as a standard linear solid, the law that fits forearms best (Kearney et al., Phys Med
+    # Biol 60:6975 (2015)). No constants of a palm are published: these give it the modulus of
+    # "palm" at rest, and loss factors of 0.06, 0.14 and 0.16 at 50, 140 and 200 Hz, where "palm"
+    # has 0.06, 0.18 and 0.25.
+    "palm-zener": Material(
+        density=1000,
+        shear_modulus=25e3,
+        poisson=0.4999,
+        relaxing_modulus=10e3,
+        relaxation_time=0.5e-3,
+    ),
     # Layers of a hand. Moduli are those of fingertip models (Maeno, Kobayashi and Yamazaki 1998:
     # Young's modulus 136, 80 and 34 kPa) and, for muscle, the middle of 5 to 30 kPa; published
     # values spread over a factor of ten and more with method and strain. Losses as in the palm.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import linalg, signal
 
 from fem.reduced import ReducedModel
+from fem.relaxation import factors
 from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
@@ -37,15 +38,23 @@ class Poles:
 def poles(model: ReducedModel, outputs: Floats | None = None) -> Poles:
     """Diagonalise the model in first-order form, once; one of each conjugate pair is kept.
 
+    What has relaxed is part of that form: z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
+
     Parameters
     ----------
     outputs : (p, r), what is read off the reduced coordinates: the model's probes if not given
     """
     r = len(model.K)
-    companion = np.block([[np.zeros((r, r)), np.eye(r)], [-model.K, -model.C]])
+    fast = model.K + sum(branch.K for branch in model.branches)
+    companion = np.block([[np.zeros((r, r)), np.eye(r)], [-fast, -model.C]])
+    for L, time in map(factors, model.branches):
+        size, k = len(companion), L.shape[1]
+        pulled, followed = np.zeros((size, k)), np.zeros((k, size))
+        pulled[r : 2 * r], followed[:, :r] = L, L.T / time
+        companion = np.block([[companion, pulled], [followed, -np.eye(k) / time]])
     values, vectors = linalg.eig(companion)
     kept = values.imag >= 0
-    inverse = np.linalg.inv(vectors)[kept, r:]
+    inverse = np.linalg.inv(vectors)[kept, r : 2 * r]
     # A real pole stands alone, so that twice the real part counts it double.
     weight = np.where(values[kept].imag > 0, 1.0, 0.5)
     read = model.outputs if outputs is None else outputs

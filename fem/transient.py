@@ -1,8 +1,11 @@
-"""M u'' + C u' + K u = f(t) from rest by the generalized-alpha method.
+"""M u'' + C u' + K u + sum_j K_j d_j = f(t), d_j' = u' - d_j / tau_j, from rest by the
+generalized-alpha method.
 
 Chung and Hulbert, J Appl Mech 60:371 (1993), doi 10.1115/1.2900803. Spectral radius 1 is
 average acceleration (Newmark 1/4, 1/2), which conserves energy; 0 annihilates what the time
-step cannot resolve. Second order and unconditionally stable throughout.
+step cannot resolve. Second order and unconditionally stable throughout. Springs that relax are
+stretched by d_j, which follows u by the trapezoidal rule: with average acceleration it loses what
+it should to round-off.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,6 +16,7 @@ from scipy.sparse.linalg import cg
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
+from fem.relaxation import pull, relaxing_stiffness
 from meshes.tetmesh import Floats
 
 
@@ -22,12 +26,15 @@ class Diverged(ArithmeticError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """Time in s; displacement, velocity and acceleration (3 n,) in m, m/s and m/s2."""
+    """Time in s; displacement, velocity and acceleration (3 n,) in m, m/s and m/s2; `stretch`
+    (3 n,) in m of each of the operators' branches, none if all have relaxed.
+    """
 
     time: float
     displacement: Floats
     velocity: Floats
     acceleration: Floats
+    stretch: tuple[Floats, ...] = ()
 
 
 def transient(
@@ -57,13 +64,17 @@ def transient(
     """
     a_m, a_f, beta, gamma = weights(dt, spectral_radius)
     K, C, M, free = operators.K, operators.C, operators.M, operators.free
-    system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * K)
+    branches = operators.branches
+    stiff = K + relaxing_stiffness(branches, 2 / dt)  # the trapezoidal rule's place of s
+    system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * stiff)
     factor = factorise(system, backend=solver)
+    felt = np.array([[branch.share(2 / dt)] for branch in branches]).reshape(-1, 1)
 
     start = initial or at_rest(operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
+    d = np.array([part[free] for part in start.stretch]) if start.stretch else 0 * felt * u
     f = force(start.time)[free]
-    a = acceleration(operators, f - C @ v - K @ u)
+    a = acceleration(operators, f - C @ v - K @ u - pull(branches, d))
     step = 0
     while True:
         time = start.time + step * dt
@@ -77,15 +88,19 @@ def transient(
             displacement=operators.expand(u),
             velocity=operators.expand(v),
             acceleration=operators.expand(a),
+            stretch=tuple(map(operators.expand, d)),
         )
         step += 1
         f_next = force(start.time + step * dt)[free]
         u_next = u + dt * v + dt**2 * (0.5 - beta) * a
         v_next = v + dt * (1 - gamma) * a
+        d_next = (2 * felt - 1) * d + felt * (u_next - u)
         inner = (1 - a_f) * f_next + a_f * f - a_m * (M @ a)
         inner -= K @ ((1 - a_f) * u_next + a_f * u) + C @ ((1 - a_f) * v_next + a_f * v)
+        inner -= pull(branches, (1 - a_f) * d_next + a_f * d)
         a = factor.solve(inner)
         u, v, f = u_next + dt**2 * beta * a, v_next + dt * gamma * a, f_next
+        d = d_next + felt * (dt**2 * beta * a)
 
 
 def weights(dt: float, spectral_radius: float) -> tuple[float, float, float, float]:

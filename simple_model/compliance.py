@@ -18,12 +18,16 @@ LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
 
 def half_space(
     *, density: float, shear_modulus: float, poisson: float, viscosity: float = 0.0,
-    loss_factor: float = 0.0,
+    loss_factor: float = 0.0, relaxing_modulus: float = 0.0, relaxation_time: float = 0.0,
 ) -> Compliance:  # fmt: skip
     """G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s; 0 <= poisson <= 0.5."""
+    law = {
+        "viscosity": viscosity, "loss_factor": loss_factor,
+        "relaxing_modulus": relaxing_modulus, "relaxation_time": relaxation_time,
+    }  # fmt: skip
 
     def compliance(k: Complex, w: Complex) -> Complex:
-        mu = _modulus(shear_modulus, viscosity, loss_factor, w)
+        mu = complex_modulus(w, shear_modulus, **law)
         ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
         bp, bs = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
         still = np.abs(ks2) < 1e-9 * np.abs(k) ** 2  # the closed form cancels towards rest
@@ -36,7 +40,8 @@ def half_space(
 
 def slab(
     *, density: float, shear_modulus: float, poisson: float, depth: float,
-    viscosity: float = 0.0, loss_factor: float = 0.0,
+    viscosity: float = 0.0, loss_factor: float = 0.0, relaxing_modulus: float = 0.0,
+    relaxation_time: float = 0.0,
 ) -> Compliance:  # fmt: skip
     """A layer of `depth` metre bonded to a rigid base; poisson < 0.5.
 
@@ -44,10 +49,14 @@ def slab(
     the base and unit pressure without shear at the top: four equations for each k and w, whose
     exponentials all decay, so that no thickness overflows.
     """
+    law = {
+        "viscosity": viscosity, "loss_factor": loss_factor,
+        "relaxing_modulus": relaxing_modulus, "relaxation_time": relaxation_time,
+    }  # fmt: skip
 
     def compliance(k: Complex, w: Complex) -> Complex:
         w = np.where(np.abs(w) < LEAST_FREQUENCY, LEAST_FREQUENCY, w)
-        mu = _modulus(shear_modulus, viscosity, loss_factor, w)
+        mu = complex_modulus(w, shear_modulus, **law)
         ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
         k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
         p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
@@ -69,25 +78,38 @@ def slab(
 
 def thin_sheet(
     *, bending_stiffness: float, mass_per_area: float, loss_factor: float = 0.0,
-    viscous_lag: float = 0.0, air_density: float = AIR_DENSITY,
+    viscous_lag: float = 0.0, relaxing_share: float = 0.0, relaxation_time: float = 0.0,
+    air_density: float = AIR_DENSITY,
 ) -> Compliance:  # fmt: skip
-    """G = 1 / [D (1 + i eta + i w lag) k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
+    """G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
+
+    D* = D (1 + i eta + i w lag + share i w tau / (1 + i w tau)).
 
     Under a steady push an endless sheet gives way without bound: its motion is told about a mean
     that is left out, G = 0 at rest.
     """
 
     def compliance(k: Complex, w: Complex) -> Complex:
-        bending = bending_stiffness * (1 + 1j * loss_factor + 1j * w * viscous_lag)
+        law = complex_modulus(
+            w, 1.0, viscosity=viscous_lag, loss_factor=loss_factor,
+            relaxing_modulus=relaxing_share, relaxation_time=relaxation_time,
+        )  # fmt: skip
+        bending = bending_stiffness * law
         inertia = (mass_per_area + 2 * air_density / k) * w**2
         return np.where(w == 0, 0, 1 / (bending * k**4 - inertia))
 
     return compliance
 
 
-def _modulus(mu: float, viscosity: float, loss_factor: float, w: Complex) -> Complex:
+def complex_modulus(
+    w: Complex, modulus: float, *, viscosity: float, loss_factor: float, relaxing_modulus: float,
+    relaxation_time: float,
+) -> Complex:  # fmt: skip
+    """Kelvin and Voigt's law, a hysteretic loss and the standard linear solid's, at w in rad/s."""
     # Frequencies are never below 0 here, so that a hysteretic loss has one sign.
-    return np.asarray(mu * (1 + 1j * loss_factor) + 1j * w * viscosity)
+    turned = 1j * w * relaxation_time
+    relaxing = relaxing_modulus * turned / (1 + turned)
+    return np.asarray(modulus * (1 + 1j * loss_factor) + 1j * w * viscosity + relaxing)
 
 
 def _squared_wavenumbers(

@@ -188,6 +188,8 @@ MATERIAL = {
     "poisson": _scaled("poisson"),
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
+    "relaxing_modulus_pa": _scaled("relaxing_modulus"),
+    "relaxation_time_s": _scaled("relaxation_time"),
 }
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {

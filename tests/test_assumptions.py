@@ -7,12 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import fem
 import skinwave
 from simple_model import MovingPressure, Tacton, Trajectory, lines, point_kernel
 from skinwave.cli import main
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.scene_file import dumps
-from skinwave.studies.assumptions import DEVICE_RATE, as_one, held, ladder, relaxed
+from skinwave.studies.assumptions import (
+    DEVICE_RATES,
+    as_one,
+    as_relaxing,
+    as_viscous,
+    held,
+    ladder,
+    relaxed,
+    strongest_line,
+)
 from skinwave.studies.mechanisms import paper_vs_skin, signatures, write
 from skinwave.studies.relax import climb, line_changes
 
@@ -24,8 +34,8 @@ PAPER = replace(SKIN, body=replace(BODIES["paper-sheet"], width=0.05, height=0.0
 
 def test_a_slab_and_a_sheet_have_their_own_ladders():
     assert ladder(SKIN) == (
-        "linear drive", "no propagation", "little loss", "endless", "main lobe only",
-        "continuous path", "one material", "flat",
+        "linear drive", "no propagation", "little loss", "viscous loss", "endless",
+        "main lobe only", "continuous path", "one material", "flat",
     )  # fmt: skip
     assert ladder(PAPER) == (
         "linear drive", "no propagation", "endless", "vacuum", "main lobe only",
@@ -54,12 +64,72 @@ def test_all_dropped_is_the_richest():
     assert sheet.body.solid.density > 1.15 * PAPER.body.solid.density  # the air's part
 
 
-def test_a_device_holds_its_focus_at_a_whole_number_of_points():
-    path = held(PATH)
+@pytest.mark.parametrize("rate", DEVICE_RATES)
+def test_a_device_holds_its_focus_at_a_whole_number_of_points(rate):
+    path = held(PATH, rate)
     assert path.hold
     assert path.drawing_frequency == pytest.approx(PATH.drawing_frequency)
-    assert len(path.points) - 1 == round(DEVICE_RATE / PATH.drawing_frequency)
+    assert len(path.points) - 1 == round(rate / PATH.drawing_frequency)
     assert np.hypot(*np.array(path.points).T) == pytest.approx(0.01)
+
+
+def test_a_few_points_are_equally_far_apart_and_held_equally_long():
+    path = held(PATH, points=5)
+    corners = np.array(path.points)
+    sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    np.testing.assert_allclose(sides, 0.02 * np.sin(np.pi / 5), rtol=1e-9)
+    np.testing.assert_allclose(np.diff(path.times), 1 / PATH.drawing_frequency / 5, rtol=1e-9)
+    late = path.position(0.99 * path.times[1] * np.ones(1))
+    np.testing.assert_allclose(late[0], corners[0], atol=1e-12)
+    scene, model = relaxed(SKIN, ("no propagation", "continuous path"), points=5)
+    assert (scene.tacton.trajectory, model) == (path, "fem")
+
+
+@pytest.mark.parametrize(
+    ("device", "said"),
+    [
+        ((30e3,), r"update_rate = 30 kHz is no device's; take 20 or 40"),
+        ((20e3, 1), r"points = 1 on the path must be 2 to 105"),
+        ((20e3, 106), r"points = 106 on the path must be 2 to 105, .* 20000 Hz"),
+    ],
+)
+def test_a_device_that_cannot_be_is_refused_before_anything_is_computed(device, said):
+    with pytest.raises(ValueError, match=said):
+        held(PATH, *device)
+    names = dict(zip(("update_rate", "points"), device, strict=False))
+    with pytest.raises(ValueError, match=said):
+        climb(SKIN, lambda phase, done: pytest.fail("computed"), **names)
+
+
+def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
+    for name, hz in (("palm", 140.0), ("forearm", 140.0), ("forearm", 600.0)):
+        w = 2 * np.pi * hz
+        viscous = fem.PRESETS[name]
+        relaxing = as_relaxing(viscous, w)
+        assert relaxing.viscosity == 0
+        assert relaxing.shear_modulus >= 0.499 * viscous.shear_modulus
+        assert relaxing.complex_modulus(w) == pytest.approx(viscous.complex_modulus(w), rel=1e-12)
+        assert relaxing.complex_modulus(3 * w).imag < 0.9 * viscous.complex_modulus(3 * w).imag
+        back = as_viscous(relaxing, w)
+        assert (back.relaxing_modulus, back.viscosity) == (0, pytest.approx(viscous.viscosity))
+        assert back.shear_modulus == pytest.approx(viscous.shear_modulus)
+
+
+def test_the_law_of_loss_is_one_rung():
+    before, _ = relaxed(SKIN, ("no propagation", "little loss"))
+    after, model = relaxed(SKIN, ("no propagation", "little loss", "viscous loss"))
+    assert model == "flat-body"
+    assert before.body.solid == SKIN.body.solid
+    line = 2 * np.pi * strongest_line(SKIN)
+    laws = [scene.body.solid.complex_modulus(line) for scene in (before, after)]
+    assert laws[1] == pytest.approx(laws[0], rel=1e-9)
+    # A body that relaxes keeps its own law at the end, and has its viscous twin before.
+    own = replace(SKIN, body=replace(SKIN.body, material="palm-zener"))
+    assert "viscous loss" in ladder(own)
+    before, _ = relaxed(own, ("no propagation", "little loss"))
+    after, _ = relaxed(own, ("no propagation", "little loss", "viscous loss"))
+    assert before.body.solid.relaxing_modulus == 0 < before.body.solid.viscosity
+    assert after.body.solid == own.body.solid
 
 
 def test_the_square_of_a_sine_makes_its_second_harmonic_and_no_third():
@@ -94,8 +164,8 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
         (e["waveform"] for e in record["effects"]), reverse=True
     )
     assert set(effects) == {
-        "linear drive", "no propagation", "little loss", "endless", "main lobe only",
-        "continuous path",
+        "linear drive", "no propagation", "little loss", "viscous loss", "endless",
+        "main lobe only", "continuous path",
     }  # fmt: skip
     # with a mean in the load its lines at multiples of f_d come from nothing
     assert effects["linear drive"]["decibel"]["f_d"] > 40
@@ -116,7 +186,7 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
     )
     monkeypatch.setattr(
         "skinwave.studies.relax.relaxed",
-        lambda scene, dropped: (
+        lambda scene, dropped, **device: (
             replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
         ) if not dropped else (scene, "no such model"),
     )  # fmt: skip
@@ -169,3 +239,22 @@ def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_n
     assert {row["mechanism"] for row in rows} == {
         "linear load", "squared load", "squared load, stretching",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["scene.toml", "--update-rate", "30"], "update_rate = 30 kHz is no device's; take 20 or"),
+        (["scene.toml", "--update-rate", "40", "--points", "999"], "must be 2 to 209"),
+        (["paper-vs-skin", "--points", "9"], "leave them out"),
+    ],
+)
+def test_the_command_line_refuses_such_devices_in_one_sentence(
+    options, said, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(dumps(SKIN))
+    assert main(["relax", *options, "--quiet"]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

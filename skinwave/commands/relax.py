@@ -13,6 +13,15 @@ def options(parser: argparse.ArgumentParser) -> None:
         "line of the 15 Tactons",
     )  # fmt: skip
     parser.add_argument("--h", type=float, metavar="MM", help="element size of all rungs, mm")
+    parser.add_argument(
+        "--update-rate", type=float, default=20.0, metavar="KHZ",
+        help="how often the device moves its focus: 20 or 40 kHz",
+    )  # fmt: skip
+    parser.add_argument(
+        "--points", type=int, metavar="N",
+        help="how many points on the path the device holds, one after another; as many as its rate "
+        "allows",
+    )  # fmt: skip
     add_output(parser)
 
 
@@ -21,17 +30,25 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.files import output_folder
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
+    from skinwave.studies.assumptions import DEVICE_RATES, check_rate
     from skinwave.studies.relax import climb, sentence, write
 
     h = metre(options.h)
     check_knobs("auto", h=h)
+    rate = 1e3 * options.update_rate
+    check_rate(rate)
     if options.scene == "paper-vs-skin":
+        if options.points is not None or rate != DEVICE_RATES[0]:
+            raise ValueError(
+                "--update-rate and --points are of a scene's path; paper-vs-skin draws its paths "
+                "without jumps, leave them out"
+            )
         return _mechanisms(options, h)
     scene = read(options.scene)
     out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
     with output_folder(out, overwrite=options.overwrite) as folder:
         with progress_of(options) as progress:
-            found = climb(scene, progress, h=h)
+            found = climb(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
     sentences = [sentence(effect) for effect in found.effects()]
     failed = [f"'{rung.name}' failed: {rung.error}" for rung in found.rungs if rung.error]

@@ -216,6 +216,7 @@ def bending_equivalent(material: Material, ratio: float) -> Material:
         density=material.density * ratio,
         shear_modulus=material.shear_modulus * ratio**3,
         viscosity=material.viscosity * ratio**3,
+        relaxing_modulus=material.relaxing_modulus * ratio**3,
     )
 
 
@@ -234,17 +235,13 @@ def compliance(body: Body) -> Compliance:
             mass_per_area=body.mass_per_area,
             loss_factor=solid.loss_factor,
             viscous_lag=solid.viscosity / solid.shear_modulus,
+            relaxing_share=solid.relaxing_modulus / solid.shear_modulus,
+            relaxation_time=solid.relaxation_time,
             air_density=0.0,
         )
     if body.kind not in ("sheet", "slab") or (body.base != "clamped" and isfinite(body.depth)):
         raise ValueError(
             "flat-body answers a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
         )
-    values = {
-        "density": solid.density,
-        "shear_modulus": solid.shear_modulus,
-        "poisson": solid.poisson,
-        "viscosity": solid.viscosity,
-        "loss_factor": solid.loss_factor,
-    }
+    values = vars(solid)
     return slab(**values, depth=body.depth) if isfinite(body.depth) else half_space(**values)

@@ -198,7 +198,7 @@ def _line(
     force, free = P @ pressure, ops.free
     u = fem.harmonic(ops, force, frequency, solver=solver)
     line = force[None, free], u[:, free], np.array([frequency])
-    return S @ u[0], fem.mean_power(ops.C, ops.R, *line)
+    return S @ u[0], fem.mean_power(ops.C, ops.R, *line, ops.branches)
 
 
 def _response(

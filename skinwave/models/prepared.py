@@ -19,7 +19,7 @@ SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that
 BAND = 1000.0  # Hz up to which the reduced model must be right
 REDUCTION_TOLERANCE = 1e-3
 POLES = ("values", "inputs", "outputs")
-ARRAYS = ("damping", "radiation", "read", "load", "points")
+ARRAYS = ("damping", "radiation", "relaxing", "relaxation_times", "read", "load", "points")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
 
 
@@ -32,8 +32,8 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 class Prepared:
     """A body ready to answer any Tacton at its probes.
 
-    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r) and the
-    `radiation` (r, r) in it;
+    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
+    `radiation` (r, r) in it, and `relaxing` stiffness (j, r, r) with its `relaxation_times` (j,);
     `read` (p, r): displacement of the probes; `load` (k, r): reduced forces of unit pressure at
     the surface points (k, 3).
     """
@@ -42,10 +42,18 @@ class Prepared:
     poles: fem.Poles
     damping: Floats
     radiation: Floats
+    relaxing: Floats
+    relaxation_times: Floats
     read: Floats
     load: Floats
     points: Floats
     effort: Effort
+
+    @property
+    def branches(self) -> tuple[fem.Branch, ...]:
+        """What relaxes of the reduced stiffness."""
+        both = zip(self.relaxing, self.relaxation_times.tolist(), strict=True)
+        return tuple(fem.Branch(K=K, time=time) for K, time in both)
 
 
 def prepare(
@@ -118,6 +126,8 @@ def _prepared_anew(
         poles = fem.poles(model, outputs=np.eye(len(model.K)))
         arrays = {
             "damping": model.C, "radiation": model.R, "read": model.outputs,
+            "relaxing": np.array([b.K for b in model.branches]).reshape(-1, *model.K.shape),
+            "relaxation_times": np.array([b.time for b in model.branches]),
             "load": P.T @ model.basis, "points": points,
         }  # fmt: skip
     effort = Effort(
@@ -152,7 +162,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
         motion, start = fem.line_response(prepared.poles, forces, frequencies)
         damping = prepared.damping, prepared.radiation
-        power = fem.mean_power(*damping, forces, motion, frequencies)
+        power = fem.mean_power(*damping, forces, motion, frequencies, prepared.branches)
         imbalance, radiated = energy_balance(power)
         lines, start = motion @ prepared.read.T, start @ prepared.read.T
         strength = np.abs(lines).max(axis=1)

@@ -19,7 +19,7 @@ def surface_speed(body: Body, frequency: float) -> float:
 
     A slab's is that of the Rayleigh wave of its material, as if it were deep: in a layer that is
     thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s sqrt(mu*/rho)) and
-    mu* = mu (1 + i loss_factor) + i w viscosity. A sheet's is (D w^2 / m)^(1/4), that of bending.
+    mu* = `Material.complex_modulus`. A sheet's is (D w^2 / m)^(1/4), that of bending.
 
     Raises
     ------
@@ -50,8 +50,7 @@ def air_mass(body: Body, frequency: float) -> float:
 
 def _viscous(solid: Material, w: float) -> float:
     """Phase speed of shear waves with loss, m/s."""
-    modulus = solid.shear_modulus * (1 + 1j * solid.loss_factor) + 1j * w * solid.viscosity
-    return float(1 / np.real(1 / np.sqrt(modulus / solid.density)))
+    return float(1 / np.real(1 / np.sqrt(solid.complex_modulus(w) / solid.density)))
 
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:

@@ -38,17 +38,23 @@ FEWEST_MODES, MOST_MODES = 40, 160
 
 
 def sheet_only(body: Body, model: str) -> None:
-    """Refuse a body that is no sheet held at its edges.
+    """Refuse a body that is no sheet held at its edges, or of a material that relaxes.
 
     Raises
     ------
     ValueError
-        If it is none.
+        If it is one of these.
     """
     if body.kind != "sheet" or body.sides != "clamped":
         raise ValueError(
             f"{model} answers a sheet with clamped sides, not a {body.kind} with {body.sides} "
             "sides; give it one, or use --model fem"
+        )
+    if body.solid.relaxing_modulus:
+        raise ValueError(
+            f"{model} answers no material that relaxes, and this one's relaxing_modulus is "
+            f"{body.solid.relaxing_modulus:g} Pa; leave it out, or use --model fem, fem-harmonic "
+            "or fem-transient"
         )
     if body.placement.is_tilted:
         raise ValueError(

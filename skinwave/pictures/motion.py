@@ -98,7 +98,8 @@ def waves(
         poles = fem.poles(model, outputs=np.eye(len(model.K)))
         frequencies, forces = reduced_lines(scene.pressure, points, P.T @ model.basis)
         lines, start = fem.line_response(poles, forces, frequencies)
-        power = fem.mean_power(model.C, model.R, forces, lines, frequencies)
+        load = forces, lines, frequencies
+        power = fem.mean_power(model.C, model.R, *load, model.branches)
         imbalance, radiated = energy_balance(power)
     effort = Effort(
         seconds=clock.seconds,

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fem.materials import PRESETS, Material
 from simple_model import Trajectory
 from skinwave.models.speeds import air_mass
 from skinwave.planning.estimates import motion_lines
@@ -19,6 +20,8 @@ ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",
     "no propagation": "waves run through an endless flat body",
     "little loss": "the material loses as much as it does",
+    "viscous loss": "what is lost relaxes, as in a standard linear solid, and is the same only at "
+    "the strongest line",
     "endless": "the body has its own size and sides",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
@@ -27,8 +30,10 @@ ASSUMPTIONS = {
     "flat": "the palm is curved, and its layers are one of their mean stiffness",
     "small deflection": "the sheet stretches as it bends",
 }
-DEVICE_RATE = 20_000.0  # Hz at which a device moves its focus; 40 kHz is twice as smooth
+DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LOSS_LEFT = 0.1  # of the material's own: with none at all a resonance has no limit
+RELAXATION_TIME = PRESETS["palm-zener"].relaxation_time
+LEAST_LASTING = 0.5  # of a modulus that remains at rest, when a part of it relaxes instead
 LAYERS = (
     Layer(thickness=0.3e-3, material="epidermis"),
     Layer(thickness=1.0e-3, material="dermis"),
@@ -47,9 +52,10 @@ def ladder(scene: Scene) -> tuple[str, ...]:
     body, path = scene.body, scene.tacton.trajectory
     if body.kind == "none":
         raise ValueError("a scene without a body keeps every assumption; give it one")
-    sheet, slab = body.kind == "sheet", body.kind == "slab"
+    sheet, slab, solid = body.kind == "sheet", body.kind == "slab", body.solid
     kept = {
-        "little loss": slab and body.solid.viscosity + body.solid.loss_factor > 0,
+        "little loss": slab and solid.viscosity + solid.loss_factor + solid.relaxing_modulus > 0,
+        "viscous loss": slab and solid.viscosity + solid.relaxing_modulus > 0,
         "vacuum": sheet,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
@@ -60,8 +66,19 @@ def ladder(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
 
 
-def relaxed(scene: Scene, dropped: Collection[str]) -> tuple[Scene, str]:
-    """A scene without the dropped assumptions, and the model that answers it."""
+def relaxed(
+    scene: Scene,
+    dropped: Collection[str],
+    *,
+    update_rate: float = DEVICE_RATES[0],
+    points: int | None = None,
+) -> tuple[Scene, str]:
+    """A scene without the dropped assumptions, and the model that answers it.
+
+    Parameters
+    ----------
+    update_rate, points : of the device that draws the path, as `held` takes them
+    """
     waves = "no propagation" in dropped
     elements = {"endless", "main lobe only", "continuous path", "one material", "flat",
                 "small deflection"} & set(dropped)  # fmt: skip
@@ -73,7 +90,7 @@ def relaxed(scene: Scene, dropped: Collection[str]) -> tuple[Scene, str]:
         drive=own if "linear drive" in dropped else "linear",
     )
     if "continuous path" in dropped:
-        path = held(scene.tacton.trajectory)
+        path = held(scene.tacton.trajectory, update_rate, points)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
     if not waves:
         return replace(scene, pressure=pressure, body=BODIES["none"]), "point-kernel"
@@ -84,13 +101,33 @@ def relaxed(scene: Scene, dropped: Collection[str]) -> tuple[Scene, str]:
     return replace(scene, pressure=pressure, body=body), model
 
 
-def held(path: Trajectory) -> Trajectory:
-    """A path as a device draws it: a whole number of points, each held until the next."""
+def held(
+    path: Trajectory, update_rate: float = DEVICE_RATES[0], points: int | None = None
+) -> Trajectory:
+    """A path as a device draws it: points equally far apart along it, each held until the next.
+
+    Parameters
+    ----------
+    update_rate : float, Hz, at which the device moves its focus, one of `DEVICE_RATES`
+    points : how many there are; the most that the device can set, rate / f_d, if not given
+
+    Raises
+    ------
+    ValueError
+        If no device has this rate, or the points are fewer than 2 or too many for it.
+    """
+    check_rate(update_rate)
     period = 1 / path.drawing_frequency
-    count = max(2, round(DEVICE_RATE * period))
+    most = max(2, round(update_rate * period))
+    count = most if points is None else points
+    if not 2 <= count <= most:
+        raise ValueError(
+            f"points = {count} on the path must be 2 to {most}, which is what {update_rate:g} Hz "
+            f"can set {path.drawing_frequency:g} times a second; give as many"
+        )
     phases = np.arange(count) / count
-    points = path.at_phase(phases)
-    closed = np.vstack([points, points[:1]])
+    places = path.at_phase(phases)
+    closed = np.vstack([places, places[:1]])
     return Trajectory(
         shape="recorded",
         points=tuple(map(tuple, closed.tolist())),
@@ -99,18 +136,44 @@ def held(path: Trajectory) -> Trajectory:
     )
 
 
+def check_rate(update_rate: float) -> None:
+    """Refuse a rate that no device has.
+
+    Raises
+    ------
+    ValueError
+        If it is none of `DEVICE_RATES`.
+    """
+    if update_rate not in DEVICE_RATES:
+        raise ValueError(
+            f"update_rate = {update_rate / 1e3:g} kHz is no device's; take "
+            f"{' or '.join(f'{rate / 1e3:g}' for rate in DEVICE_RATES)}"
+        )
+
+
 def _body(scene: Scene, dropped: Collection[str]) -> Body:
     body = scene.body
     solid = body.solid
     if body.kind == "slab" and "little loss" not in dropped:
         solid = replace(
-            solid, viscosity=LOSS_LEFT * solid.viscosity, loss_factor=LOSS_LEFT * solid.loss_factor
+            solid,
+            viscosity=LOSS_LEFT * solid.viscosity,
+            loss_factor=LOSS_LEFT * solid.loss_factor,
+            relaxing_modulus=LOSS_LEFT * solid.relaxing_modulus,
         )
+    line = strongest_line(scene)
+    law = as_relaxing if "viscous loss" in dropped else as_viscous
+    if body.kind == "slab":
+        solid = law(solid, 2 * np.pi * line)
     if "vacuum" in dropped:
-        solid = replace(solid, density=solid.density + _air_mass(scene) / body.depth)
+        air = air_mass(body, line) if line else 0.0
+        solid = replace(solid, density=solid.density + air / body.depth)
     changes: dict[str, object] = {"material": solid if solid != body.solid else body.material}
     if "one material" in dropped:
-        layers = body.layers or LAYERS
+        layers = tuple(
+            replace(layer, material=law(solid_of(layer.material), 2 * np.pi * line))
+            for layer in body.layers or LAYERS
+        )
         changes["layers"] = (as_one(layers),) if "flat" in dropped else layers
     elif body.kind == "slab":
         changes["layers"] = ()
@@ -130,19 +193,58 @@ def as_one(layers: Sequence[Layer]) -> Layer:
         parts = zip(layers, solids, strict=True)
         return sum(layer.thickness * getattr(solid, name) for layer, solid in parts) / thickness
 
-    names = ("density", "shear_modulus", "viscosity", "loss_factor")
-    material = replace(solids[0], **{name: mean(name) for name in names})
+    names = ("density", "shear_modulus", "viscosity", "loss_factor", "relaxing_modulus")
+    slow = sum(
+        layer.thickness * solid.relaxing_modulus * solid.relaxation_time
+        for layer, solid in zip(layers, solids, strict=True)
+    )
+    means = {name: mean(name) for name in names}
+    time = slow / thickness / means["relaxing_modulus"] if slow else 0.0
+    material = replace(solids[0], **means, relaxation_time=time)
     return Layer(thickness=thickness, material=material)
 
 
-def _air_mass(scene: Scene) -> float:
-    """Mass of the air that moves with a sheet at the strongest moving line, kg/m2.
+def as_relaxing(solid: Material, w: float) -> Material:
+    """A standard linear solid of the same complex modulus at w in rad/s as one that is viscous.
 
-    It differs from line to line; elements have one mass for all.
+    Two numbers leave the time open: it is that of the preset, or less where so much is lost that
+    more than half of the modulus would have to relax.
+    """
+    loss = w * solid.viscosity
+    if not loss or solid.relaxing_modulus:  # nothing to fit, or fitted already
+        return solid
+    time = min(RELAXATION_TIME, (1 - LEAST_LASTING) * solid.shear_modulus / loss / w)
+    turned = w * time
+    return replace(
+        solid,
+        viscosity=0.0,
+        shear_modulus=solid.shear_modulus - loss * turned,
+        relaxing_modulus=loss * (1 + turned**2) / turned,
+        relaxation_time=time,
+    )
+
+
+def as_viscous(solid: Material, w: float) -> Material:
+    """Kelvin and Voigt's solid of the same complex modulus at w in rad/s as one that relaxes."""
+    if not w or not solid.relaxing_modulus:
+        return solid
+    turned = 1j * w * solid.relaxation_time
+    relaxing = solid.relaxing_modulus * turned / (1 + turned)
+    return replace(
+        solid,
+        shear_modulus=solid.shear_modulus + relaxing.real,
+        viscosity=solid.viscosity + relaxing.imag / w,
+        relaxing_modulus=0.0,
+    )
+
+
+def strongest_line(scene: Scene) -> float:
+    """The line in Hz that moves the probes most, 0 if none does.
+
+    Air's mass and a law of loss differ from line to line; each is put right at this one.
     """
     frequencies, shares = motion_lines(scene, 0.05)
     moving = frequencies > 0
     if not moving.any():
         return 0.0
-    strongest = frequencies[moving][np.argmax(shares[moving].max(axis=1))]
-    return air_mass(scene.body, float(strongest))
+    return float(frequencies[moving][np.argmax(shares[moving].max(axis=1))])

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterable
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,7 +27,14 @@ from skinwave.models.bodies import default_size
 from skinwave.pictures.figures import png
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
-from skinwave.studies.assumptions import ASSUMPTIONS, ladder, relaxed
+from skinwave.studies.assumptions import (
+    ASSUMPTIONS,
+    DEVICE_RATES,
+    check_rate,
+    held,
+    ladder,
+    relaxed,
+)
 
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
 FIRST = "as published"
@@ -81,19 +89,31 @@ class Ladder:
         return sorted(found, key=lambda e: -e.waveform)
 
 
-def climb(scene: Scene, progress: Progress, *, h: float | None = None) -> Ladder:
+def climb(
+    scene: Scene,
+    progress: Progress,
+    *,
+    h: float | None = None,
+    update_rate: float = DEVICE_RATES[0],
+    points: int | None = None,
+) -> Ladder:
     """Answer a scene on every rung.
 
     Parameters
     ----------
     h : float, metre, element size of all rungs; the default of the scene's body if not given
+    update_rate, points : float, Hz, and how many on the path: of the device, as `held` takes them
 
     Raises
     ------
     ValueError
-        If the scene has no body.
+        If the scene has no body, or the device cannot be.
     """
     names = ladder(scene)
+    check_rate(update_rate)
+    if "continuous path" in names:
+        held(scene.tacton.trajectory, update_rate, points)  # refuses before anything is computed
+    drawn = partial(relaxed, update_rate=update_rate, points=points)
     up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     asked = {tuple(dropped) for _, dropped in up}
     but_one = [
@@ -104,12 +124,15 @@ def climb(scene: Scene, progress: Progress, *, h: float | None = None) -> Ladder
     found = []
     for k, (name, dropped) in enumerate([*up, *but_one]):
         progress(name, k / (len(up) + len(but_one)))
-        found.append(_answered(scene, name, dropped, h))
+        found.append(_answered(drawn(scene, dropped), scene, name, dropped, h))
     return Ladder(scene=scene, rungs=tuple(found[: len(up)]), but_one=tuple(found[len(up) :]))
 
 
-def _answered(scene: Scene, name: str, dropped: tuple[str, ...], h: float | None) -> Rung:
-    changed, model = relaxed(scene, dropped)
+def _answered(
+    changed_to: tuple[Scene, str], scene: Scene, name: str, dropped: tuple[str, ...],
+    h: float | None,
+) -> Rung:  # fmt: skip
+    changed, model = changed_to
     rung = {"name": name, "dropped": dropped, "model": model}
     size = (h or default_size(scene.body)) if model == "fem" else None
     try:

@@ -1,6 +1,6 @@
 """Exact waves of endless bodies against closed forms, and finite elements against exact waves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -135,20 +135,20 @@ def exact_circles() -> Case:
     )
 
 
-def circling_on_skin() -> Case:
-    """AM and circling focus on a bonded layer of forearm."""
+def circling_on_skin(law: Mapping[str, float] = FOREARM, name: str = "skin") -> Case:
+    """AM and circling focus on a bonded layer, of forearm unless another law is given."""
     depth = 0.010
     across = meshes.graded_axis(0.07, 0.0025, meshes.Grading(radius=0.02, growth=1.3))
     mesh = meshes.extrude(across, across, np.linspace(-depth, 0, 5))
-    solid = fem.Material(**FOREARM, poisson=0.49)
+    solid = fem.Material(**law, poisson=0.49)
     load = circling(0.02, 12.0, am=140.0)
     return _beside_exact_waves(
-        "Circling focus on skin: finite elements beside exact waves",
+        f"Circling focus on {name}: finite elements beside exact waves",
         "Bonded layer: Ewing, Jardetzky and Press, Elastic Waves in Layered Media (1957), chapter "
         "4; verified by the cases on flat-body",
         "sides held at 70 mm, where the response is below a hundredth of that at the focus",
         mesh, solid, {"right": "xyz", "back": "xyz", "bottom": "xyz"},
-        slab(**FOREARM, poisson=0.49, depth=depth), load, 0.02,
+        slab(**law, poisson=0.49, depth=depth), load, 0.02,
     )  # fmt: skip
 
 

@@ -298,3 +298,16 @@ def driven_oscillator(t: float, *, damping: float, drive: float) -> float:
     start = [-G.imag, -(1j * drive * G).imag]
     free = np.linalg.solve(np.array([np.ones(2), s]), np.array(start)) @ np.exp(t * s)
     return float((G * np.exp(1j * drive * t)).imag + free.real)
+
+
+def relaxing_oscillator(t: float, *, modulus: float, time: float, drive: float) -> float:
+    """u'' + u + modulus d = sin(drive t) from rest, d' = u' - d / time: by partial fractions.
+
+    The transform is drive (1 + s time) / (s^2 + drive^2) over the cubic of a standard linear solid:
+    Flugge, Viscoelasticity (1975), chapter 3.
+    """
+    cubic = np.array([time, 1.0, time * (1 + modulus), 1.0])
+    s = np.append(np.roots(cubic), [1j * drive, -1j * drive])
+    bottom = np.polymul(cubic, [1.0, 0.0, drive**2])
+    residues = drive * (1 + s * time) / np.polyval(np.polyder(bottom), s)
+    return float((residues * np.exp(s * t)).sum().real)

@@ -16,6 +16,7 @@ from skinwave.verify import (
     extremes,
     nonlinear,
     plates,
+    relaxing,
     sides,
     statics,
     stepping,
@@ -110,6 +111,9 @@ def _exact() -> Iterable[Entry]:
     yield Entry(name="exact-slab", topic=topic, run=exact.exact_slab)
     yield Entry(name="exact-circles", topic=topic, run=exact.exact_circles)
     yield Entry(name="circling-on-skin", topic=topic, run=exact.circling_on_skin)
+    yield Entry(name="relaxing-half-space", topic=topic, run=relaxing.half_space_that_relaxes)
+    run = relaxing.circling_on_skin_that_relaxes
+    yield Entry(name="circling-on-relaxing-skin", topic=topic, run=run)
     yield Entry(name="circling-on-paper", topic=topic, run=exact.circling_on_paper, slow=True)
 
 
@@ -120,6 +124,8 @@ def _stepping() -> Iterable[Entry]:
     yield Entry(name="energy", topic=topic, run=stepping.energy_kept)
     yield Entry(name="extreme-steps", topic=topic, run=stepping.extreme_steps)
     yield Entry(name="kelvin-voigt", topic=topic, run=stepping.columns)
+    yield Entry(name="relaxing-column", topic=topic, run=relaxing.column_that_relaxes)
+    yield Entry(name="relaxing-spring", topic=topic, run=relaxing.oscillator_that_relaxes)
     yield Entry(name="units", topic=topic, run=stepping.units)
 
 

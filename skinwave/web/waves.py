@@ -70,6 +70,7 @@ class Reduced:
 
     poles: fem.Poles
     damping: tuple[Floats, Floats]
+    branches: tuple[fem.Branch, ...]
     load: Floats
     points: Floats
     read: Floats
@@ -222,6 +223,7 @@ def reduced(made: Any, ops: Any, pressure: MovingPressure, progress: Progress) -
     basis, mesh = model.basis, made.mesh
     return Reduced(
         poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=(model.C, model.R),
+        branches=model.branches,
         load=P.T @ basis, points=points, read=read, within=within,
         probe=lambda at: fem.probe_operator(mesh, at) @ basis,
         effort=Effort(
@@ -249,7 +251,7 @@ def reduced_answer(body: Reduced, scene: Scene) -> Answer:
     times = sample_times(scene)
     frequencies, forces = reduced_lines(scene.pressure, body.points, body.load)
     motion, start = fem.line_response(body.poles, forces, frequencies)
-    energy_balance(fem.mean_power(*body.damping, forces, motion, frequencies))
+    energy_balance(fem.mean_power(*body.damping, forces, motion, frequencies, body.branches))
     probe = body.probe(scene.probe_points)
     rates = np.concatenate([2j * np.pi * frequencies, body.poles.values])
     displacement = fem.exponential_sum(rates, np.vstack([motion @ probe.T, start @ probe.T]), times)
