@@ -34,6 +34,7 @@ SHIFT = 2 * np.pi * 200.0  # rad/s: best between 200 and 400 Hz for a band of 1 
 # between 0.8 and 1.6; the shift above takes nearly twice as many moments.
 RELAXING_SHIFT = 1.0
 BATCH = 5  # moments between two looks at the error estimate
+RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which relaxes
 MOST_MOMENTS = 200
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
@@ -114,7 +115,7 @@ def reduce(
             _bordered(part, space.basis.T @ (whole @ new))
             for part, whole in zip(small, large, strict=True)
         ]
-        if moment % BATCH == 0:
+        if moment % (RELAXING_BATCH if branches else BATCH) == 0:
             weights = None if loads is None else space.basis.T @ loads
             relaxing = _branches(small[2:], branches)
             model = (small[0], small[1], relaxing)
@@ -257,9 +258,9 @@ def _probe_response(
 ) -> Complex:
     """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
     w = 2 * np.pi * np.linspace(0, band, 41)
-    Z = _impedance(K, C, branches, w)
-    fields = np.linalg.solve(Z, np.broadcast_to(seeds, (len(w), *seeds.shape)))
-    return np.asarray(fields if loads is None else loads.T @ fields)
+    # One by one: all at once would be as large as the body's own factors.
+    fields = (np.linalg.solve(_impedance(K, C, branches, at)[0], seeds) for at in w[:, None])
+    return np.array([x if loads is None else loads.T @ x for x in fields])
 
 
 def _change(before: Complex, now: Complex) -> float:

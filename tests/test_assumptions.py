@@ -18,6 +18,7 @@ from skinwave.studies.assumptions import (
     as_one,
     as_relaxing,
     as_viscous,
+    beside,
     held,
     ladder,
     relaxed,
@@ -34,9 +35,11 @@ PAPER = replace(SKIN, body=replace(BODIES["paper-sheet"], width=0.05, height=0.0
 
 def test_a_slab_and_a_sheet_have_their_own_ladders():
     assert ladder(SKIN) == (
-        "linear drive", "no propagation", "little loss", "viscous loss", "endless",
-        "main lobe only", "continuous path", "one material", "flat",
+        "linear drive", "no propagation", "little loss", "endless", "main lobe only",
+        "continuous path", "one material", "flat",
     )  # fmt: skip
+    assert beside(SKIN) == ("linear drive", "no propagation", "little loss", "viscous loss")
+    assert beside(PAPER) == ()
     assert ladder(PAPER) == (
         "linear drive", "no propagation", "endless", "vacuum", "main lobe only",
         "continuous path", "small deflection",
@@ -126,6 +129,7 @@ def test_the_law_of_loss_is_one_rung():
     # A body that relaxes keeps its own law at the end, and has its viscous twin before.
     own = replace(SKIN, body=replace(SKIN.body, material="palm-zener"))
     assert "viscous loss" in ladder(own)
+    assert beside(own) == ()
     before, _ = relaxed(own, ("no propagation", "little loss"))
     after, _ = relaxed(own, ("no propagation", "little loss", "viscous loss"))
     assert before.body.solid.relaxing_modulus == 0 < before.body.solid.viscosity

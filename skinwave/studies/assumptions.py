@@ -55,7 +55,7 @@ def ladder(scene: Scene) -> tuple[str, ...]:
     sheet, slab, solid = body.kind == "sheet", body.kind == "slab", body.solid
     kept = {
         "little loss": slab and solid.viscosity + solid.loss_factor + solid.relaxing_modulus > 0,
-        "viscous loss": slab and solid.viscosity + solid.relaxing_modulus > 0,
+        "viscous loss": slab and solid.relaxing_modulus > 0,
         "vacuum": sheet,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
@@ -64,6 +64,18 @@ def ladder(scene: Scene) -> tuple[str, ...]:
         "small deflection": sheet and body.sides == "clamped",
     }
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
+
+
+def beside(scene: Scene) -> tuple[str, ...]:
+    """What is dropped on the rung beside the ladder, with a second law of loss; () if none is lost.
+
+    Fast waves lose little in a standard linear solid, and elements take many times as long; where
+    the scene does not ask for it, it is tried where exact waves answer, and goes no further.
+    """
+    names = ladder(scene)
+    if "viscous loss" in names or scene.body.kind != "slab" or not scene.body.solid.viscosity:
+        return ()
+    return (*names[: names.index("little loss") + 1], "viscous loss")
 
 
 def relaxed(

@@ -30,6 +30,7 @@ from skinwave.simulation import simulate
 from skinwave.studies.assumptions import (
     ASSUMPTIONS,
     DEVICE_RATES,
+    beside,
     check_rate,
     held,
     ladder,
@@ -72,11 +73,30 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ladder:
-    """Rungs in order, the first as published and the last the richest; and all but one of them."""
+    """Rungs in order, the first as published and the last the richest; those that drop one more
+    `beside` the one they follow; and those that drop all but one.
+    """
 
     scene: Scene
     rungs: tuple[Rung, ...]
+    beside: tuple[Rung, ...]
     but_one: tuple[Rung, ...]
+
+    @property
+    def every(self) -> tuple[Rung, ...]:
+        """All rungs, as they stand in tables."""
+        return (*self.rungs, *self.beside, *self.but_one)
+
+    def pairs(self) -> list[tuple[Rung, Rung]]:
+        """Each answered rung of the ladder and beside it, after the one that it is judged by."""
+        answered = [rung for rung in self.rungs if rung.response]
+        found = [*pairwise(answered)]
+        for rung in self.beside:
+            kept = set(rung.dropped) - {rung.name}
+            before = next((r for r in answered if set(r.dropped) == kept), None)
+            if rung.response and before:
+                found.append((before, rung))
+        return found
 
     def effects(self) -> list[Effect]:
         """What each assumption changes, the greatest first; rungs that failed are passed over."""
@@ -84,7 +104,7 @@ class Ladder:
         kept = {set(self.rungs[-1].dropped).difference(r.dropped).pop(): r for r in self.but_one}
         found = [
             effect(self.scene, before, rung, answered[-1], kept.get(rung.name))
-            for before, rung in pairwise(answered)
+            for before, rung in self.pairs()
         ]
         return sorted(found, key=lambda e: -e.waveform)
 
@@ -116,16 +136,21 @@ def climb(
     drawn = partial(relaxed, update_rate=update_rate, points=points)
     up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     asked = {tuple(dropped) for _, dropped in up}
+    aside = [(dropped[-1], dropped)] if (dropped := beside(scene)) else []
     but_one = [
         (f"all but: {name}", tuple(n for n in names if n != name))
         for name in names
         if tuple(n for n in names if n != name) not in asked
     ]
-    found = []
-    for k, (name, dropped) in enumerate([*up, *but_one]):
-        progress(name, k / (len(up) + len(but_one)))
+    todo, found = [*up, *aside, *but_one], []
+    for k, (name, dropped) in enumerate(todo):
+        progress(name, k / len(todo))
         found.append(_answered(drawn(scene, dropped), scene, name, dropped, h))
-    return Ladder(scene=scene, rungs=tuple(found[: len(up)]), but_one=tuple(found[len(up) :]))
+    first, second = len(up), len(up) + len(aside)
+    return Ladder(
+        scene=scene, rungs=tuple(found[:first]), beside=tuple(found[first:second]),
+        but_one=tuple(found[second:]),
+    )  # fmt: skip
 
 
 def _answered(
@@ -210,11 +235,11 @@ def write(folder: Path, found: Ladder) -> None:
     effects = found.effects()
     record = {
         "effects": [asdict(e) for e in effects],
-        "rungs": [_record(rung) for rung in (*found.rungs, *found.but_one)],
+        "rungs": [_record(rung) for rung in found.every],
     }
     (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
     _write_lines(folder / "relax.csv", found)
-    answered = [r for r in (*found.rungs, *found.but_one) if r.response]
+    answered = [r for r in found.every if r.response]
     arrays = {r.name: r.response.displacement for r in answered if r.response}
     first = next(r.response for r in answered if r.response)
     arrays |= {"t": first.times, "probes": first.probes}
@@ -256,7 +281,7 @@ def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]
 def rung_table(found: Ladder) -> tuple[list[str], list[list[str]]]:
     """Header and rows of what was answered, in the order of the ladder."""
     rows = []
-    for rung in (*found.rungs, *found.but_one):
+    for rung in found.every:
         dofs = f"{rung.response.effort.dofs:,}" if rung.response else ""
         memory = f"{rung.memory / 2**30:.2f}" if rung.response else ""
         rows.append([rung.name, rung.model, dofs, f"{rung.seconds:.1f}", memory, rung.error])
@@ -295,7 +320,7 @@ def _write_lines(path: Path, found: Ladder) -> None:
         writer = csv.writer(file)
         writer.writerow(["rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz",
                          "from_rung_before_db", "from_richest_db"])  # fmt: skip
-        for before, rung in pairwise(answered):
+        for before, rung in found.pairs():
             ratios = [_ratios(rung, other, names) for other in (before, answered[-1])]
             for k, (name, f) in enumerate(names.items()):
                 for p, (x, y) in enumerate(found.scene.probes):
