@@ -15,7 +15,7 @@ from trame.app import get_server
 
 from skinwave.web import waves
 from skinwave.web.controls import STARTS
-from skinwave.web.model import scene_of
+from skinwave.web.scenes import scene_of
 from skinwave.web.serve import session_of
 
 CHROMIUM = "/usr/bin/chromium"

@@ -14,7 +14,7 @@ import pytest
 from simple_model import spectrum
 from skinwave.scene_file import loads
 from skinwave.simulation import simulate
-from skinwave.web import controls, model
+from skinwave.web import controls, model, scenes
 from skinwave.web.controls import NUMBERS, STARTS
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
@@ -28,7 +28,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no browser here"),
 ]
-for name in ("playwright", "trame", "trame_plotly", "trame_vuetify"):
+for name in ("playwright", "trame", "trame_vuetify"):
     pytest.importorskip(name)
 
 
@@ -165,12 +165,12 @@ def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
     page.locator(".sw-row:has(#am-field) [role=slider]").press("ArrowRight")
     query_has(page, "am=141")
     values = controls.from_query(page.evaluate("location.search.slice(1)"))[0]
-    f, amplitude = spectrum(simulate(model.scene_of(values), "point-kernel"))
+    f, amplitude = spectrum(simulate(scenes.scene_of(values), "point-kernel"))
     page.wait_for_function("() => true")
     shown = drawn(page, "spectrum_plot")[0]
     assert np.allclose(shown["x"], f[f <= 600], atol=1e-2)
     assert np.allclose(shown["y"], amplitude[f <= 600, 0], atol=1e-4 * amplitude.max())
-    named = model.kernel(model.scene_of(values)).lines[0]
+    named = model.kernel(scenes.scene_of(values)).lines[0]
     row = page.locator("#lines tr").nth(1).locator("td")
     assert row.nth(1).inner_text() == f"{named.frequency:.1f}"
     assert row.nth(2).inner_text() == f"{named.amplitude:.3g}"
@@ -231,7 +231,7 @@ def test_presets_undo_redo_pin_and_looks(page):
     page.locator("#pin").click()
     page.locator("#undo").click()
     page.wait_for_function("() => window.trame.state.get('spectrum_plot').data.length === 3")
-    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel"
+    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel, Pa"
     page.locator("#swap").click()
     query_has(page, "size=30")
     photographed(page, "pinned")
@@ -240,9 +240,7 @@ def test_presets_undo_redo_pin_and_looks(page):
     page.wait_for_function("() => window.trame.state.get('waveform_plot').data[0].x.at(-1) > 900")
     choose(page, "span", "first 60 ms")
     choose(page, "highest", "300")
-    page.wait_for_function(
-        "() => window.trame.state.get('spectrum_plot').layout.xaxis.range[1] === 300"
-    )
+    page.wait_for_function("() => window.trame.state.get('spectrum_plot').x.range[1] === 300")
     choose(page, "highest", "600")
 
 
@@ -268,12 +266,12 @@ def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
     page.mouse.move(frame["x"] + 214, middle + 2)
     page.mouse.up()
     page.wait_for_function(
-        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('with its')"
+        "() => window.trame.state.get('commanded_plot').title.includes('with its')"
     )
     photographed(page, "carrier")
     page.mouse.dblclick(frame["x"] + 200, middle)
     page.wait_for_function(
-        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('envelope')"
+        "() => window.trame.state.get('commanded_plot').title.includes('envelope')"
     )
 
 

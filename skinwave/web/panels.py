@@ -86,7 +86,8 @@ def number(session: Session, key: str) -> None:
     """A slider and a field for a number."""
     given = NUMBERS[key]
     said = f"{given.label}, {given.unit}" if given.unit else given.label
-    with html.Div(classes="sw-row"):
+    # Of a move only its own row is made anew: all of them take longer than the plots.
+    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}]"']):
         html.Label(said, raw_attrs=[f'for="{key}-field"'])
         v3.VSlider(
             v_model_number=(key,), min=given.low, max=given.high, step=given.step, id=f"{key}",
@@ -107,16 +108,17 @@ def choice(key: str, said: str, items: Sequence[Any] = ()) -> None:
     v3.VSelect(
         v_model=(key,), items=(f"{key}_items", list(items or CHOICES[key])), label=said,
         density="compact", hide_details=True, id=key, style="margin-top: 8px",
+        raw_attrs=[f'v-memo="[{key}]"'],
     )  # fmt: skip
 
 
-def area(name: str, marked: str, said: str) -> None:
+def area(name: str, marked: str, said: str, shown: str = "true") -> None:
     """A map of the area with path, foci, borderlines and the selected point, which it selects."""
     steps = {"left": "x - 1, y", "right": "x + 1, y", "up": "x, y + 1", "down": "x, y - 1"}
     keys = [f"@keydown.{key}.prevent=\"trigger('select', [{at}])\"" for key, at in steps.items()]
     drag = "trigger('select', utils.skinwave.place($event))"
     HtmlElement(
-        "svg", classes="sw-map", id=marked, children=[
+        "svg", v_if=shown, classes="sw-map", id=marked, children=[
             f'<image v-if="{name}.picture" :href="{name}.picture" x="-51.25" y="-51.25" '
             'width="102.5" height="102.5" preserveAspectRatio="none"/>'
             '<path :d="influenced" fill="none" stroke="black" stroke-width="1.1"/>'
@@ -142,6 +144,29 @@ def area(name: str, marked: str, said: str) -> None:
             f'@pointerdown="{drag}"', f'@pointermove="$event.buttons && {drag}"', *keys,
         ],
     )  # fmt: skip
+
+
+def body() -> None:
+    """The body in three dimensions through one period, which can be turned, stopped and drawn."""
+    with html.Div(v_if="solid", classes="sw-body",
+                  raw_attrs=['@vue:mounted="utils.body.begin(trame.state)"']):  # fmt: skip
+        html.Canvas(id="body-view", raw_attrs=[
+            'tabindex="0"', 'role="application"', 'aria-label="The body, moving; arrow keys turn '
+            'it, plus and minus bring it nearer, the space bar plays and pauses"',
+        ])  # fmt: skip
+        with html.Div(classes="sw-time"):
+            html.Button("▶", id="body-play")
+            HtmlElement("input", id="body-time", raw_attrs=[
+                'type="range"', 'min="0"', 'max="1000"', 'value="0"',
+                'aria-label="Where in the period"',
+            ])  # fmt: skip
+            html.Span(id="body-now")
+        html.Div(
+            "motion drawn {{ body_motion.times }} times, about its mean; "
+            "{{ body_motion.repeats ? 'one period' : 'a period of the slowest tone, "
+            "after which it jumps' }}",
+            v_if="body_motion.times", classes="sw-caption",
+        )  # fmt: skip
 
 
 def line_table() -> None:
