@@ -1,10 +1,13 @@
 """The interactive tool: its model, its state without a browser, and the page itself."""
 
+import asyncio
 import re
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 from queue import Queue
 
 import numpy as np
@@ -19,7 +22,17 @@ from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import simulate
 from skinwave.studies.paper15 import tactons
-from skinwave.web import check_extra, controls, downloads, drawings, model, plots, scenes, waves
+from skinwave.web import (
+    check_extra,
+    controls,
+    downloads,
+    drawings,
+    model,
+    moving,
+    plots,
+    scenes,
+    waves,
+)
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
 from skinwave.web.worker import Worker
@@ -27,6 +40,14 @@ from skinwave.web.worker import Worker
 
 def nothing(phase, fraction):
     pass
+
+
+def ended(pid):
+    """Whether a process has ended, or only waits to be told so."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +62,47 @@ def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys
         check_extra()
     assert main(["web"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes here")
+@pytest.mark.parametrize("way", ["cancel", "parent ends"])
+def test_what_is_cancelled_ends_with_all_that_it_has_started(way):
+    """A mesher, say, that the process waits for; also if the page's own process is killed."""
+    code = """
+import multiprocessing, subprocess, sys, time
+from skinwave.web import worker
+def busy(pipe):
+    worker._end_with_parent()
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    print(child.pid, flush=True)
+    child.wait()
+worker.answer_forever = busy
+if __name__ == "__main__":
+    one = worker.Worker(print)
+    multiprocessing.set_start_method("fork")
+    worker.multiprocessing.get_context = lambda _: multiprocessing
+    one.ask(1, None)
+    sys.stdin.readline()
+    one.cancel()
+    sys.stdin.readline()
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE,
+                               stdout=subprocess.PIPE, text=True)  # fmt: skip
+    try:
+        child = int(process.stdout.readline())
+        assert not ended(child)
+        if way == "cancel":
+            process.stdin.write("now\n")
+            process.stdin.flush()
+        else:
+            process.kill()
+        until = time.monotonic() + 20
+        while not ended(child):
+            assert time.monotonic() < until, "it goes on"
+            time.sleep(0.05)
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def test_help_and_import_load_no_page():
@@ -65,7 +127,7 @@ def test_an_address_carries_every_control():
         "amplitude": 55.0, "am": 33.5, "am2": 210.0, "ratio": "0.25:0.75", "envelope": 2.5,
         "duration": 0.7, "shape": "triangle", "size": 31.5, "speed": 4.2, "height": 150.0,
         "drive": "force_corrected", "body": "palm", "foci": 3, "sharing": "time_multiplexed",
-        "pulses": "100/50, 40/110", "ramp": 5.0, "x": -3.21, "y": 4.0,
+        "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
     }  # fmt: skip
     assert set(changed) == set(STARTS)
     assert all(changed[key] != STARTS[key] for key in STARTS)
@@ -84,6 +146,8 @@ def test_an_address_carries_every_control():
         ("shape", "circel", "did you mean 'circle'"),
         ("pulses", "100", "give on/off in ms, such as 100/50"),
         ("pulses", "0/10", "lasts longer than 0 ms"),
+        ("phases", "0, half", "'half' is no phase"),
+        ("phases", "0, 100", "100 % is outside"),
     ],
 )
 def test_what_is_wrong_is_said(key, given, said):
@@ -109,6 +173,11 @@ def test_presets_are_the_papers_tactons():
 def test_a_scene_goes_through_its_file_and_back_to_the_controls():
     values = STARTS | {"body": "palm", "pulses": "100/50", "ramp": 5.0, "foci": 2, "am": 90.0}
     assert scenes.values_of(loads(dumps(scenes.scene_of(values)))) == values
+    values |= {"phases": "0, 12.5"}
+    assert scenes.scene_of(values).tacton.foci == (0, 0.125)
+    assert scenes.values_of(loads(dumps(scenes.scene_of(values)))) == values
+    with pytest.raises(ValueError, match="2 phases of 3 foci"):
+        scenes.scene_of(values | {"foci": 3})
 
 
 def test_a_body_of_ones_own_stays():
@@ -246,14 +315,46 @@ def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
 
 @pytest.mark.slow
 def test_a_palm_answers(monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "palm", 9e-3)
+    monkeypatch.setitem(waves.SIZES, "palm", 12e-3)
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
-    answered = waves.Waves()
-    shown = answered(scenes.scene_of(values), nothing)
+    answered, said = waves.Waves(), []
+    shown = answered(scenes.scene_of(values), lambda *told: said.append(told), moving=True)
+    assert list(dict.fromkeys(phase for phase, _ in said)) == [
+        "mesh", "assemble", "factorise", "reduce", "read the surface",
+    ]  # fmt: skip
     assert np.isnan(shown.map.rms[0, 0])
     assert np.isfinite(shown.map.rms[model.SIDE // 2, model.SIDE // 2])
-    with pytest.raises(ValueError, match="beside"):
-        answered(scenes.scene_of(values | {"x": 42.0, "y": 49.0}), nothing)
+    # Its back is seen, too, and hardly moves; the motion is where the focus is.
+    z, moved = shown.moving.shape.points[:, 2], np.abs(shown.moving.frames).max(axis=0)
+    assert moved[z < np.quantile(z, 0.1)].max() < 0.5 * moved.max()
+    said.clear()
+    with pytest.raises(ValueError, match="not on the surface"):
+        answered(scenes.scene_of(values | {"x": 42.0, "y": 49.0}), lambda *told: said.append(told))
+    assert not said, "what was reduced is kept"
+
+
+def test_the_moving_body_is_what_its_probe_sees(scene):
+    """Steady motion about its mean, through the period that the load has."""
+    tacton = scenes.scene_of(STARTS | {"am": 100.0, "speed": 2 * np.pi, "duration": 0.3}).tacton
+    steady = replace(scene, pressure=replace(scene.pressure, tacton=tacton), probes=((0.0, 0.0),))
+    shown = waves.Waves()(steady, nothing, moving=True)
+    seen, response = shown.moving, shown.response
+    assert seen.repeats
+    assert seen.period == pytest.approx(0.01)
+    middle = model.SIDE**2 // 2
+    assert seen.shape.points[middle] == pytest.approx([0, 0, 0])
+    late = np.interp(0.2 + np.arange(len(seen.frames)) * 0.01 / len(seen.frames), response.times,
+                     response.displacement[:, 0])  # fmt: skip
+    late -= late.mean()
+    upwards = seen.frames[:, middle]
+    assert np.linalg.norm(upwards + late) < 0.02 * np.linalg.norm(late)
+    low = seen.shape.points[:, 2] < 0
+    assert seen.shape.points[low, 2] == pytest.approx(-0.015)
+    assert not seen.frames[:, low].any()
+    sent = moving.sent_motion(seen, steady.pressure)
+    frames = np.frombuffer(sent["frames"], np.int8).reshape(seen.frames.shape)
+    assert np.abs(frames).max() == 127
+    assert np.corrcoef(frames[:, middle], upwards)[0, 1] > 0.999
 
 
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
@@ -407,6 +508,10 @@ def test_what_is_saved_can_be_opened(session):
     assert lines[0] == '"time, s","pressure at (10, 0) mm, Pa (point-kernel)"'
     assert len(lines) == 10_001
     assert b"<svg" in files["figure"]("svg")
+    report = asyncio.run(files["report"]()).decode()
+    assert "How far to trust it" in report
+    assert "am_frequency_hz = 90" in report
+    assert "http" not in re.sub(r"http://www.w3.org|xmlns", "", report).split("<style>")[0]
     assert Image.open(BytesIO(files["figure"]("png"))).width > 1000
     with session.state:
         session.open_scene("[tacton]\nam = 5")

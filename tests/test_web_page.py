@@ -23,6 +23,7 @@ ARGUMENTS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
+READY = "() => window.trame?.utils?.plots?.shown?.spectrum_plot?.figure"
 PATIENCE = 60_000  # ms; other work on the machine may take most of it
 pytestmark = [
     pytest.mark.slow,
@@ -75,7 +76,7 @@ def opened(browser, address, query="", **viewport):
     page.on("pageerror", lambda error: logs.errors.append(str(error)))
     page.on("console", lambda m: logs.errors.append(m.text) if m.type == "error" else None)
     page.goto(address + query)
-    page.wait_for_selector("#spectrum_plot .main-svg")
+    page.wait_for_function(READY)
     return page, logs
 
 
@@ -110,36 +111,30 @@ def query_has(page, part):
 
 
 def drawn(page, plot):
-    """The curves that plotly draws."""
-    return page.evaluate(
-        """plot => { const at = document.getElementById(plot);
-        const drawn = at.data ? at : at.querySelector('.js-plotly-plot');
-        return drawn.data.map(d => ({name: d.name, x: [...(d.x || [])], y: [...d.y]})) }""",
-        plot,
-    )
+    """The curves that a canvas shows."""
+    return page.evaluate("plot => window.trame.utils.plots.shown[plot].figure.data", plot)
 
 
 def latencies(page, key, count, until):
-    """Seconds from each of `count` key presses on a slider until a plot has been drawn, in which
-    `until`, an expression of its `data`, is true.
+    """Seconds from each of `count` key presses on a slider until plots are on the screen in which
+    `until`, an expression of their `data`, is true.
     """
     found = page.evaluate(
         """async ([key, count, until]) => {
         const slider = document.querySelector(`.sw-row:has(#${key}-field) [role=slider]`);
-        const at = document.getElementById('spectrum_plot');
-        const plot = at.data ? at : at.querySelector('.js-plotly-plot');
+        const plot = window.trame.utils.plots.shown.spectrum_plot;
         const good = new Function('data', 'return ' + until), times = [];
         slider.focus();
         for (let k = 0; k < count; k++) {
-          const before = JSON.stringify(plot.data[0].y), start = performance.now();
+          const before = JSON.stringify(plot.figure.data[0].y), start = performance.now();
           const done = new Promise(resolve => {
             const look = () => {
-              if (JSON.stringify(plot.data[0].y) !== before && good(plot.data)) {
-                plot.removeListener('plotly_afterplot', look);
-                resolve(performance.now() - start);
+              if (JSON.stringify(plot.figure.data[0].y) !== before && good(plot.figure.data)) {
+                plot.canvas.removeEventListener('drawn', look);
+                requestAnimationFrame(() => setTimeout(() => resolve(performance.now() - start)));
               }
             };
-            plot.on('plotly_afterplot', look);
+            plot.canvas.addEventListener('drawn', look);
           });
           slider.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}));
           times.push(await done);
@@ -149,6 +144,24 @@ def latencies(page, key, count, until):
         [key, count, until],
     )
     return np.array(found) / 1e3
+
+
+def ink(page, canvas):
+    """How many pixels of a canvas are of each colour."""
+    return page.evaluate(
+        """id => { const from = document.getElementById(id);
+        const copy = document.createElement('canvas');
+        [copy.width, copy.height] = [from.width, from.height];
+        const g = copy.getContext('2d');
+        g.drawImage(from, 0, 0);
+        const bytes = g.getImageData(0, 0, copy.width, copy.height).data, found = {};
+        for (let k = 0; k < bytes.length; k += 4) {
+          const colour = bytes.slice(k, k + 4).join();
+          found[colour] = (found[colour] || 0) + 1;
+        }
+        return found }""",
+        canvas,
+    )
 
 
 def choose(page, key, title):
@@ -202,6 +215,10 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     choose(page, "sharing", "in turn")
     query_has(page, "sharing=time_multiplexed")
     assert len(state(page, "foci_at")) == 3
+    page.locator("#phases-field").fill("0, 25, 50")
+    query_has(page, "phases=0")
+    page.wait_for_function("() => Math.abs(window.trame.state.get('foci_at')[1][1] + 10) < 0.01")
+    assert page.locator("#kernel-map circle").count() == 3
     for shape in ("point", "line", "triangle", "square"):
         page.locator(f"#shape-{shape}").click()
         query_has(page, f"shape={shape}")
@@ -213,6 +230,7 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     photographed(page, "rhythm")
     page.locator("#pulses-field").fill("")
     page.locator("#hold").check()
+    page.wait_for_function("() => window.trame.state.get('held_frequency') > 0")
     held = page.locator("#drawing").inner_text()
     page.locator("#size-field").fill("14")
     query_has(page, "speed=8.4")
@@ -258,7 +276,7 @@ def test_a_click_or_a_key_on_the_map_selects(page):
 
 
 def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
-    frame = page.locator("#commanded_plot .nsewdrag").first.bounding_box()
+    frame = page.locator("#commanded_plot").bounding_box()
     middle = frame["y"] + frame["height"] / 2
     page.mouse.move(frame["x"] + 200, middle)
     page.mouse.down()
@@ -275,12 +293,56 @@ def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
     )
 
 
+def test_curves_are_drawn_read_and_zoomed_by_keys(page):
+    curve = "0,114,178,255" if not state(page, "dark") else "86,180,233,255"
+    assert ink(page, "waveform_plot").get(curve, 0) > 200
+    plot = page.locator("#waveform_plot")
+    before = ink(page, "waveform_plot")
+    plot.hover()
+    assert ink(page, "waveform_plot") != before, "nothing is read out"
+    plot.press("+")
+    zoom = "() => window.trame.utils.plots.shown.waveform_plot.zoom"
+    low, high = page.evaluate(zoom)
+    assert (low, high) == pytest.approx((15, 45))
+    plot.press("Home")
+    assert page.evaluate(zoom) is None
+
+
+def test_the_body_moves_in_three_dimensions(page):
+    choose(page, "body", "skin-slab")
+    page.locator("#solid").click()
+    page.wait_for_function("() => window.trame.state.get('body_motion').frames")
+    play, now = page.locator("#body-play"), page.locator("#body-now")
+    if play.get_attribute("aria-label") == "Pause":
+        play.click()
+    assert re.fullmatch(r"\d+\.\d\d of \d+\.\d\d ms", now.inner_text())
+    stopped = ink(page, "body-view")
+    assert len(stopped) > 50, "next to nothing is drawn"
+    page.wait_for_timeout(200)
+    assert ink(page, "body-view") == stopped
+    page.locator("#body-time").fill("500")
+    half = float(now.inner_text().split()[0])
+    assert half == pytest.approx(state(page, "body_motion")["period"] / 2, abs=0.01)
+    assert ink(page, "body-view") != stopped
+    page.locator("#body-view").press("ArrowLeft")
+    turned = ink(page, "body-view")
+    page.locator("#body-view").press("+")
+    assert ink(page, "body-view") != turned
+    play.click()
+    page.wait_for_function("t => !document.getElementById('body-now').textContent.startsWith(t)",
+                           arg=f"{half:.2f}")  # fmt: skip
+    photographed(page, "body")
+    page.locator("#solid").click()
+    page.wait_for_selector("#wave-map")
+
+
 def test_what_is_saved_opens_again(page, tmp_path):
     page.locator("#am-field").fill("95")
     query_has(page, "am=95")
     for item, start in (("scene-toml", b"name ="), ("waveform-csv", b'"time'),
                         ("waveform-wav", b"RIFF"), ("figure-svg", b"<?xml"),
-                        ("figure-png", b"\x89PNG")):  # fmt: skip
+                        ("figure-png", b"\x89PNG"),
+                        ("report-html", b"<!doctype html>")):  # fmt: skip
         page.locator("#save").click()
         with page.expect_download() as saved:
             page.locator(f"#save-{item}").click()
@@ -362,7 +424,7 @@ def test_a_lost_connection_is_said_and_comes_back(browser):
     ended(process)
     page.wait_for_selector("#sw-lost")
     again, _ = served("--port", address.rstrip("/").rpartition(":")[2])
-    page.wait_for_selector("#spectrum_plot .main-svg")
+    page.wait_for_function(READY)
     assert state(page, "am") == 71
     page.close()
     ended(again)

@@ -29,6 +29,8 @@ LEFT_OUT = (
     "sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
     "the body anew, which takes some seconds; other controls do not.",
+    "<b>3-D</b>: the steady state about its mean, exaggerated as is said below it. A slab is shown "
+    "as far as the area goes; its sides are drawn straight down to the bone.",
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
     "pressure, 50 Pa at full drive, is uncertain by a factor of 2. Air is left out.",
     "With a body the focus is a Gaussian of the same width as the main lobe that the point kernel "
@@ -66,10 +68,12 @@ def control_panel(session: Session) -> None:
             {"title": "all at once, at 1/n of the pressure each", "value": "simultaneous"},
             {"title": "in turn, each for 1/n of the time", "value": "time_multiplexed"},
         ])  # fmt: skip
-        html.Div(
-            "{{ foci }} foci at even phases of one path; the load is the same either way.",
-            v_if="foci > 1", classes="sw-note",
-        )  # fmt: skip
+        with html.Div(v_if="foci > 1"):
+            text(session, "phases", "Phases in % of the path, such as 0, 25, 60; empty is even")
+            html.Div(
+                "All {{ foci }} foci follow one path. As this model knows no device, the load is "
+                "the same whether they are made at once or in turn.", classes="sw-note",
+            )  # fmt: skip
         _heading("On the skin")
         number(session, "height")
         choice("drive", "Drive law", [{"title": DRIVES[d], "value": d} for d in CHOICES["drive"]])
@@ -98,6 +102,19 @@ def number(session: Session, key: str) -> None:
             model_value=(key,), update_modelValue=(setter(session, key), "[$event]"),
             error=(f"!!errors.{key}",), density="compact", hide_details=True, id=f"{key}-field",
             variant="outlined",
+            raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
+        )  # fmt: skip
+        _error(key)
+
+
+def text(session: Session, key: str, said: str) -> None:
+    """A field for several numbers."""
+    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}]"']):
+        html.Label(said, raw_attrs=[f'for="{key}-field"'])
+        v3.VTextField(
+            model_value=(key,), update_modelValue=(setter(session, key), "[$event]"),
+            error=(f"!!errors.{key}",), density="compact", hide_details=True, variant="outlined",
+            id=f"{key}-field", style="grid-column: 1 / 3",
             raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
         )  # fmt: skip
         _error(key)
@@ -207,16 +224,7 @@ def about() -> None:
 
 
 def _rhythm(session: Session) -> None:
-    with html.Div(classes="sw-row"):
-        html.Label("Rhythm: on/off in ms, such as 100/50, 40/110; empty is none",
-                   raw_attrs=['for="pulses-field"'])  # fmt: skip
-        v3.VTextField(
-            model_value=("pulses",), update_modelValue=(setter(session, "pulses"), "[$event]"),
-            error=("!!errors.pulses",), density="compact", hide_details=True, variant="outlined",
-            id="pulses-field", style="grid-column: 1 / 3",
-            raw_attrs=['aria-describedby="pulses-error"'],
-        )  # fmt: skip
-        _error("pulses")
+    text(session, "pulses", "Rhythm: on/off in ms, such as 100/50, 40/110; empty is none")
     HtmlElement(
         "svg", v_if="pulses", classes="sw-timeline", children=[
             '<polyline :points="timeline" fill="none" stroke="currentColor" stroke-width="1.5" '

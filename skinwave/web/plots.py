@@ -93,7 +93,7 @@ def spectrum_plot(
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
-        "names": _names(named, highest), **_axes(data, _tallest(waves, highest)),
+        "names": _names(named, highest), **_axes(data, _tallest(waves, highest), 1.25),
     }  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def _tallest(waves: Answer | None, highest: float) -> float | None:
         return None
     f = np.linspace(50, highest, 60)
     shown = waves.spectrum[waves.frequencies <= highest]
-    return 1e6 * max(1.25 * float(shown.max()), 1.5 * float(threshold(f).min()))
+    return 1e6 * max(float(shown.max()), 1.3 * float(threshold(f).min()))
 
 
 def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
@@ -161,8 +161,10 @@ def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _axes(data: Sequence[Plot], most: float | None = None) -> dict[str, Any]:
-    """Both axes with one zero; `most` is the largest that the second has to show."""
+def _axes(data: Sequence[Plot], most: float | None = None, room: float = 1.08) -> dict[str, Any]:
+    """Both axes with one zero; `most` is the largest that the second has to show, `room` what
+    there is above the largest, over it.
+    """
     said = {"y": "pressure, Pa", "y2": "displacement, µm"}
     ends = {}
     for name in said:
@@ -173,6 +175,6 @@ def _axes(data: Sequence[Plot], most: float | None = None) -> dict[str, Any]:
     below = max((low / high if high else 1.0) for high, low in ends.values())
     axes = {}
     for name, (high, low) in ends.items():
-        top = 1.08 * max(high, low / below if below else high) or 1.0
+        top = room * max(high, low / below if below else high) or 1.0
         axes[name] = {"said": said[name], "range": [-max(below, 0.03) * top, top]}
     return axes

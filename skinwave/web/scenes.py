@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model import MovingPressure, Rhythm, Tacton, Trajectory
 from skinwave.scene import BODIES, Body, Scene
-from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, checked, pulses_of
+from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, checked, phases_of, pulses_of
 
 
 def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
@@ -21,7 +21,9 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     shape = values["shape"]
     moving = {} if shape == "point" else {"size": values["size"] / 1e3, "speed": values["speed"]}
     pulses = pulses_of(values["pulses"])
-    foci = int(values["foci"])
+    foci, phases = int(values["foci"]), phases_of(values["phases"])
+    if phases and len(phases) != foci:
+        raise ValueError(f"{len(phases)} phases of {foci} foci; give one for each, or none")
     tacton = Tacton(
         amplitude=values["amplitude"] / 100,
         am_frequency=values["am"],
@@ -30,7 +32,7 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
         envelope_frequency=values["envelope"],
         duration=values["duration"],
         trajectory=Trajectory(shape=shape, **moving),
-        foci=tuple(k / foci for k in range(foci)),
+        foci=phases or tuple(k / foci for k in range(foci)),
         sharing=values["sharing"],
         rhythm=Rhythm(pulses=pulses, ramp=values["ramp"] / 1e3) if pulses else None,
     )
@@ -66,7 +68,6 @@ def values_of(scene: Scene) -> Values:
         "a path that is moved or swept one way": any(path.centre)
         or path.sweep != "there_and_back",
         "a sampled signal": tacton.signal is not None,
-        "foci at uneven phases": not np.allclose(sorted(tacton.foci), even),
         "a superposition that is none of the five": ratio is None,
     }  # fmt: skip
     if said := [what for what, holds in beyond.items() if holds]:
@@ -88,6 +89,9 @@ def values_of(scene: Scene) -> Values:
         "body": known.get(scene.body, OWN_BODY),
         "foci": len(tacton.foci),
         "sharing": tacton.sharing,
+        "phases": ""
+        if np.allclose(sorted(tacton.foci), even)
+        else ", ".join(f"{100 * phase:g}" for phase in tacton.foci),
         "pulses": ", ".join(f"{1e3 * on:g}/{1e3 * gap:g}" for on, gap in pulses),
         "ramp": 1e3 * rhythm.ramp if rhythm else 0.0,
         "x": round(1e3 * x, 6),

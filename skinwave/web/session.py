@@ -40,7 +40,7 @@ class Session:
         self.state.change(*KEYS)(self.on_control)
         self.state.change("hold")(self.on_hold)
         self.state.change(*PLOTTED)(self.on_look)
-        self.state.change("phase")(lambda **_: shown.foci(self.state, self.scene))
+        self.state.change("phase")(self.on_phase)
         self.state.change("solid")(self.on_solid)
         self.state.change("opened")(self.on_file)
         for name in ("select", "restart", "zoom"):
@@ -146,6 +146,10 @@ class Session:
         elif not hold:
             self.state.errors = {k: v for k, v in self.state.errors.items() if k != "hold"}
 
+    def on_phase(self, **_: Any) -> None:
+        """The foci are to be seen elsewhere on their path."""
+        shown.foci(self.state, self.scene)
+
     def on_look(self, **_: Any) -> None:
         """Something else is to be seen of the same answer."""
         self._zoom = None
@@ -221,6 +225,7 @@ class Session:
             self.waves = content
             self.state.update({"busy": "", "waves_stale": False})
             self.draw()
+            self.on_solid(self.state.solid)  # which may have been asked for in the meantime
 
     def draw(self) -> None:
         """All that is seen, from the answers there are."""

@@ -100,7 +100,7 @@
     const [c, s, d, e] = [Math.cos(view.turned), Math.sin(view.turned), Math.cos(view.tipped),
                           Math.sin(view.tipped)];
     gl.uniformMatrix3fv(at.place.turn, false, [c, s * d, -s * e, -s, c * d, -c * e, 0, e, d]);
-    const scale = (0.94 * view.near) / at.reach, wide = canvas.width / canvas.height;
+    const scale = (1.15 * view.near) / at.reach, wide = canvas.width / canvas.height;
     gl.uniform2f(at.place.size, scale / Math.max(1, wide), scale * Math.min(1, wide));
     gl.uniform3fv(at.place.middle, at.middle);
     const frames = motion.count, exact = view.at * frames, k = Math.floor(exact) % frames;
@@ -117,9 +117,11 @@
     });
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, at.corners);
     gl.drawElements(gl.TRIANGLES, at.triangles, gl.UNSIGNED_INT, 0);
+    gl.disable(gl.DEPTH_TEST); // path and foci are seen wherever the surface is
     marks(at, gl.LINE_STRIP, at.path, [0.05, 0.05, 0.05]);
     const each = at.foci.length / frames;
     marks(at, gl.POINTS, at.foci.subarray(k * each, (k + 1) * each), [0.05, 0.05, 0.05]);
+    gl.enable(gl.DEPTH_TEST);
     said(at);
     canvas.dispatchEvent(new CustomEvent("drawn"));
   }

@@ -51,7 +51,9 @@
     for (let k = 0; k < curve.y.length; k++) g.lineTo(to.x(xOf(curve, k)), y(curve.y[k]));
     if (curve.mirrored) { // the area between a curve and its mirror image
       for (let k = curve.y.length - 1; k >= 0; k--) g.lineTo(to.x(xOf(curve, k)), y(-curve.y[k]));
+      g.globalAlpha = 0.4;
       g.fill();
+      g.globalAlpha = 1;
     }
     g.stroke();
   }
