@@ -26,6 +26,7 @@ WARM = 0.2  # of the time
 SAVED = ("scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "report-html")
 PULSES = ("", "100/50", "40/20, 10/30", "5/5")
 PATIENCE = 60_000  # ms; a page that is not ready by then has failed
+BUILT = 600_000  # ms in which a body is built, whatever else the machine does
 MOST = 50.0  # MB of growth
 COMMAND = [sys.executable, "-m", "skinwave", "web", "--port", "0"]
 Page = Any
@@ -157,17 +158,21 @@ def settled(page: Page) -> None:
     """Wait until nothing is computed, and go where it can be compared."""
     page.keyboard.press("Escape")
     page.evaluate("() => window.trame.trigger('restart', ['body=skin-slab'])")
-    page.wait_for_function("() => !window.trame.state.get('waves_stale')")
+    page.wait_for_function("() => !window.trame.state.get('waves_stale')", timeout=BUILT)
 
 
-def warm(page: Page) -> None:
-    """Have the process behind a page build each body as often as it keeps."""
+def warm(pages: list[Page]) -> None:
+    """Have the processes behind pages build each body as often as they keep."""
     for name in ("palm", "paper-sheet", "skin-slab"):
         for k in range(KEPT):
             query = f"body={name}&size={10 + 2 * k}&height={200 + 5 * k}"
-            page.evaluate("q => window.trame.trigger('restart', [q])", query)
-            page.wait_for_function("q => window.trame.state.get('query').includes(q)", arg=name)
-            page.wait_for_function("() => !window.trame.state.get('waves_stale')", timeout=300_000)
+            for page in pages:
+                page.evaluate("q => window.trame.trigger('restart', [q])", query)
+            for page in pages:
+                page.wait_for_function(
+                    "q => window.trame.state.get('query').includes(q)"
+                    " && !window.trame.state.get('waves_stale')", arg=name, timeout=BUILT,
+                )  # fmt: skip
 
 
 def soak(seconds: float, seed: int) -> bool:
@@ -202,9 +207,9 @@ def turned(
     with sync_playwright() as p:
         browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         pages = [_opened(browser, address, errors) for _ in range(2)]
+        warm(pages)
         start = time.monotonic()
-        for page in pages:
-            warm(page)
+        print(f"bodies built; load {os.getloadavg()[0]:.1f}", flush=True)
         for end in (WARM * seconds, seconds):
             while time.monotonic() - start < end:
                 made[_moved(rng.choice(pages), rng, errors)] += 1

@@ -53,7 +53,7 @@ NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 BAND = 1000.0  # Hz
 # Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
-KEPT = 3  # reductions, tables and meshes each: some 30 MB a reduction
+KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
