@@ -416,10 +416,11 @@ def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
         session.turn({"size": "70"})
     assert "outside 0 to 60 mm" in session.state.errors["size"]
     assert session.state.size == STARTS["size"]
+    assert session.state.typed == {"size": "70"}
     assert session.state.spectrum_plot == before
     with session.state:
         session.turn({"size": "30"})
-    assert session.state.errors == {}
+    assert (session.state.errors, session.state.typed) == ({}, {})
     with session.state:
         session.turn({"pulses": "5/5", "ramp": 100})
     assert "ramp" in session.state.problem
@@ -526,6 +527,11 @@ def test_zooming_in_shows_the_carrier(session):
     with session.state:
         session.zoom(10.0, 11.0)
     assert "with its 40 kHz carrier" in session.state.commanded_plot["title"]
+    for beyond in ((-500.0, -400.0), (2000.0, 3000.0), (7.0, 7.0)):
+        with session.state:
+            session.zoom(*beyond)
+        low, high = session.state.commanded_plot["x"]["range"]
+        assert 0 <= low < high <= 1000
     with session.state:
         session.zoom()
     assert "envelope" in session.state.commanded_plot["title"]

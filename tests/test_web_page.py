@@ -206,6 +206,19 @@ def test_a_slider_and_a_field_turn_each_number(page, key):
     assert page.locator(f"#{key}-field").get_attribute("aria-invalid") == "true"
 
 
+def test_a_number_can_be_typed_digit_by_digit(page):
+    """Though its beginning, 1 mm, is refused."""
+    field = page.locator("#height-field")
+    field.fill("")
+    field.press_sequentially("1")
+    page.wait_for_selector("#height-error")
+    assert field.input_value() == "1"
+    field.press_sequentially("50")
+    query_has(page, "height=150")
+    assert field.input_value() == "150"
+    page.wait_for_selector("#height-error", state="detached")
+
+
 def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     choose(page, "ratio", "0.25:0.75")
     query_has(page, "ratio=0.25:0.75")

@@ -91,7 +91,7 @@ def number(session: Session, key: str) -> None:
     given = NUMBERS[key]
     said = f"{given.label}, {given.unit}" if given.unit else given.label
     # Of a move only its own row is made anew: all of them take longer than the plots.
-    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}]"']):
+    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
         html.Label(said, raw_attrs=[f'for="{key}-field"'])
         v3.VSlider(
             v_model_number=(key,), min=given.low, max=given.high, step=given.step, id=f"{key}",
@@ -99,7 +99,7 @@ def number(session: Session, key: str) -> None:
             raw_attrs=[f'aria-label="{said}"'],
         )  # fmt: skip
         v3.VTextField(
-            model_value=(key,), update_modelValue=(setter(session, key), "[$event]"),
+            model_value=(f"typed.{key} ?? {key}",), update_modelValue=(setter(session, key), "[$event]"),
             error=(f"!!errors.{key}",), density="compact", hide_details=True, id=f"{key}-field",
             variant="outlined",
             raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
@@ -109,10 +109,10 @@ def number(session: Session, key: str) -> None:
 
 def text(session: Session, key: str, said: str) -> None:
     """A field for several numbers."""
-    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}]"']):
+    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
         html.Label(said, raw_attrs=[f'for="{key}-field"'])
         v3.VTextField(
-            model_value=(key,), update_modelValue=(setter(session, key), "[$event]"),
+            model_value=(f"typed.{key} ?? {key}",), update_modelValue=(setter(session, key), "[$event]"),
             error=(f"!!errors.{key}",), density="compact", hide_details=True, variant="outlined",
             id=f"{key}-field", style="grid-column: 1 / 3",
             raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],

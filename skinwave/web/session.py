@@ -18,6 +18,7 @@ from skinwave.web.model import Answer
 from skinwave.web.worker import Worker
 
 PLOTTED = ("span", "highest")
+SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
 LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 
 
@@ -63,14 +64,17 @@ class Session:
             self.turn({key: self.state[key] for key in moved})
 
     def turn(self, given: Values) -> None:
-        """Set controls; what is refused is marked at its field and stays as it was."""
-        errors, accepted = dict(self.state.errors), {}
+        """Set controls; what is refused is marked at its field, which keeps what was typed, for it
+        may be half of a number.
+        """
+        errors, typed, accepted = dict(self.state.errors), dict(self.state.typed), {}
         for key, value in given.items():
             try:
                 accepted[key] = controls.checked(key, value)
                 errors.pop(key, None)
+                typed.pop(key, None)
             except ValueError as error:
-                errors[key] = str(error)
+                errors[key], typed[key] = str(error), str(value)
         values = self._good | accepted
         if self.state.hold and (moved := [k for k in ("shape", "size", "speed") if k in accepted]):
             try:
@@ -78,10 +82,12 @@ class Session:
                 errors.pop("hold", None)
             except ValueError as error:
                 errors["hold"] = f"the drawing frequency cannot be held: {error}"
-        self.state.errors = errors
+        moved = values != self._good
+        self.state.update({"errors": errors, "typed": typed})
         self._set(values)
         self.history.push(values)
-        self.refresh()
+        if moved:
+            self.refresh()
 
     def select(self, x: float, y: float) -> None:
         """Select the point of the area at x and y in mm."""
@@ -136,7 +142,9 @@ class Session:
         if start is None or end is None:
             self._zoom = None
         else:
-            self._zoom = (max(0.0, start) / 1e3, min(end / 1e3, self.scene.tacton.duration))
+            last = self.scene.tacton.duration
+            start = min(max(0.0, start / 1e3), last - SHORTEST)
+            self._zoom = (start, min(max(end / 1e3, start + SHORTEST), last))
         shown.commanded(self.state, self.scene, self._zoom)
 
     def on_hold(self, hold: bool, **_: Any) -> None:
@@ -242,7 +250,7 @@ class Session:
     def _take(self, values: Values | None) -> None:
         if values is not None:
             self._set(values)
-            self.state.errors = {}
+            self.state.update({"errors": {}, "typed": {}})
             self.refresh()
 
     def _set(self, values: Values) -> None:

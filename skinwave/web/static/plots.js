@@ -101,13 +101,18 @@
     g.font = `11px ${FONT}`;
     const widths = figure.data.map((curve) => g.measureText(curve.name).width + 34);
     let x = w - 6 - widths.reduce((a, b) => a + b, 0), y = 11;
-    if (x < after) {
+    const below = x < after;
+    if (below) {
+      x = box.x + 4;
       y = box.y + 10;
-      x = Math.max(box.x + 4, x - EDGE.right);
-      g.fillStyle = paper;
-      g.fillRect(x - 2, y - 8, box.x + box.w - x, 16);
     }
     for (const [k, curve] of figure.data.entries()) {
+      if (below && x > box.x + 4 && x + widths[k] > w) {
+        x = box.x + 4;
+        y += 16;
+      }
+      g.fillStyle = paper;
+      if (below) g.fillRect(x - 2, y - 8, widths[k], 16);
       line(g, curve, colours);
       g.beginPath();
       g.moveTo(x, y);
@@ -116,9 +121,9 @@
       g.globalAlpha = 1;
       g.fillStyle = ink;
       g.fillText(curve.name, x + 24, y);
+      g.setLineDash([]);
       x += widths[k];
     }
-    g.setLineDash([]);
   }
 
   function line(g, curve, colours) {
