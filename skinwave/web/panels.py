@@ -99,7 +99,8 @@ def number(session: Session, key: str) -> None:
             raw_attrs=[f'aria-label="{said}"'],
         )  # fmt: skip
         v3.VTextField(
-            model_value=(f"typed.{key} ?? {key}",), update_modelValue=(setter(session, key), "[$event]"),
+            model_value=(f"typed.{key} ?? {key}",),
+            update_modelValue=(setter(session, key), "[$event]"),
             error=(f"!!errors.{key}",), density="compact", hide_details=True, id=f"{key}-field",
             variant="outlined",
             raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
@@ -112,7 +113,8 @@ def text(session: Session, key: str, said: str) -> None:
     with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
         html.Label(said, raw_attrs=[f'for="{key}-field"'])
         v3.VTextField(
-            model_value=(f"typed.{key} ?? {key}",), update_modelValue=(setter(session, key), "[$event]"),
+            model_value=(f"typed.{key} ?? {key}",),
+            update_modelValue=(setter(session, key), "[$event]"),
             error=(f"!!errors.{key}",), density="compact", hide_details=True, variant="outlined",
             id=f"{key}-field", style="grid-column: 1 / 3",
             raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
