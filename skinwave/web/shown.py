@@ -22,7 +22,8 @@ def first(own: Body | None) -> dict[str, Any]:
     """The state beside the controls before anything was answered."""
     return {
         "errors": {}, "typed": {}, "problem": "", "stale": False, "waves_stale": False,
-        "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0, "phase": 0,
+        "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
+        "phase": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
         "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
         "about": False, "drawer": None, "opened": None, "bodies": bodies(own),
