@@ -1,7 +1,7 @@
-"""Does the page last? `python -m bench.web_soak [seconds] [seed]`: two browsers at random.
+"""Does the page last? `python -m bench.web_soak [seconds] [seed] [bodies]`: two browsers at random.
 
 Whatever can be turned, clicked, opened or saved, in any order. Every body is built first, as often
-as is kept. Counted: what either page's console or the server says of errors, and by how much memory
+as is kept, which a busy machine takes minutes for: "none,skin-slab" does without. Counted: what either page's console or the server says of errors, and by how much memory
 has grown between the end of the first fifth and the end.
 """
 
@@ -13,7 +13,8 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from skinwave.web.front import LATER
 from skinwave.web.waves import KEPT
 
 WARM = 0.2  # of the time
+OFTEN = 5  # in about a hundred moves another body
 SAVED = ("scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "report-html")
 PULSES = ("", "100/50", "40/20, 10/30", "5/5")
 PATIENCE = 60_000  # ms; a page that is not ready by then has failed
@@ -64,9 +66,8 @@ def choose(page: Page, rng: random.Random) -> None:
     options.nth(rng.randrange(options.count())).click()
 
 
-def body(page: Page, rng: random.Random) -> None:
-    found = [name for name in CHOICES["body"] if name != OWN_BODY]
-    name = rng.choice([*found, "skin-slab", "skin-slab"])
+def body(page: Page, rng: random.Random, bodies: Sequence[str]) -> None:
+    name = rng.choice([*bodies, "skin-slab", "skin-slab"])
     page.locator(".v-field:has(#body)").click()
     page.get_by_role("option", name=name, exact=True).click()
 
@@ -113,7 +114,7 @@ def reopen(page: Page, rng: random.Random) -> None:
 
 
 MOVES: dict[Callable[[Page, random.Random], None], int] = {
-    press: 30, fill: 12, select: 12, button: 12, shape: 6, choose: 6, body: 5, zoom: 5, preset: 4,
+    press: 30, fill: 12, select: 12, button: 12, shape: 6, choose: 6, zoom: 5, preset: 4,
     rhythm: 3, save: 2, reopen: 1,
 }  # fmt: skip
 
@@ -161,9 +162,9 @@ def settled(page: Page) -> None:
     page.wait_for_function("() => !window.trame.state.get('waves_stale')", timeout=BUILT)
 
 
-def warm(pages: list[Page]) -> None:
+def warm(pages: list[Page], bodies: Sequence[str]) -> None:
     """Have the processes behind pages build each body as often as they keep."""
-    for name in ("palm", "paper-sheet", "skin-slab"):
+    for name in (name for name in bodies if name != "none"):
         for k in range(KEPT):
             query = f"body={name}&size={10 + 2 * k}&height={200 + 5 * k}"
             for page in pages:
@@ -175,7 +176,7 @@ def warm(pages: list[Page]) -> None:
                 )  # fmt: skip
 
 
-def soak(seconds: float, seed: int) -> bool:
+def soak(seconds: float, seed: int, bodies: Sequence[str]) -> bool:
     """Whether nothing went wrong."""
     errors = list[str]()
     with tempfile.TemporaryDirectory() as folder:
@@ -183,7 +184,7 @@ def soak(seconds: float, seed: int) -> bool:
         with open(log, "w") as said:
             server = subprocess.Popen(COMMAND, stderr=said)
         try:
-            sizes = turned(server.pid, _address(log), seconds, random.Random(seed), errors)
+            sizes = turned(server.pid, _address(log), seconds, random.Random(seed), errors, bodies)
         finally:
             server.terminate()
             server.wait(20)
@@ -198,7 +199,12 @@ def soak(seconds: float, seed: int) -> bool:
 
 
 def turned(
-    server: int, address: str, seconds: float, rng: random.Random, errors: list[str]
+    server: int,
+    address: str,
+    seconds: float,
+    rng: random.Random,
+    errors: list[str],
+    bodies: Sequence[str],
 ) -> list[list[float]]:
     """Memory in MB of server and pages after a part of the time, and after all of it."""
     from playwright.sync_api import sync_playwright
@@ -207,12 +213,12 @@ def turned(
     with sync_playwright() as p:
         browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         pages = [_opened(browser, address, errors) for _ in range(2)]
-        warm(pages)
+        warm(pages, bodies)
         start = time.monotonic()
         print(f"bodies built; load {os.getloadavg()[0]:.1f}", flush=True)
         for end in (WARM * seconds, seconds):
             while time.monotonic() - start < end:
-                made[_moved(rng.choice(pages), rng, errors)] += 1
+                made[_moved(rng.choice(pages), rng, errors, bodies)] += 1
             for page in pages:
                 settled(page)
             time.sleep(LATER + 3)  # the process that waits for the next page is ready
@@ -225,15 +231,16 @@ def turned(
     return sizes
 
 
-def _moved(page: Page, rng: random.Random, errors: list[str]) -> str:
-    move = rng.choices(list(MOVES), list(MOVES.values()))[0]
+def _moved(page: Page, rng: random.Random, errors: list[str], bodies: Sequence[str]) -> str:
+    moves = {each.__name__: each for each in MOVES} | {"body": partial(body, bodies=bodies)}
+    name = rng.choices(list(moves), [*MOVES.values(), OFTEN])[0]
     try:
-        move(page, rng)
+        moves[name](page, rng)
     except Exception as error:  # a browser's, of any kind
-        errors.append(f"{move.__name__}: {str(error)[:300]}")
+        errors.append(f"{name}: {str(error)[:300]}")
         page.keyboard.press("Escape")
     page.wait_for_timeout(rng.uniform(0, 400))
-    return move.__name__
+    return name
 
 
 def _address(log: Path) -> str:
@@ -257,6 +264,8 @@ def _opened(browser: Any, address: str, errors: list[str]) -> Page:
 if __name__ == "__main__":
     lasts = float(sys.argv[1]) if len(sys.argv) > 1 else 600.0
     started = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    known = [name for name in CHOICES["body"] if name != OWN_BODY]
+    chosen = sys.argv[3].split(",") if len(sys.argv) > 3 else known
     sys.argv = sys.argv[:1]  # trame reads it
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; {lasts:g} s, seed {started}")
-    sys.exit(0 if soak(lasts, started) else 1)
+    sys.exit(0 if soak(lasts, started, chosen) else 1)
