@@ -1,8 +1,9 @@
 """Does the page last? `python -m bench.web_soak [seconds] [seed] [bodies]`: two browsers at random.
 
 Whatever can be turned, clicked, opened or saved, in any order. Every body is built first, as often
-as is kept, which a busy machine takes minutes for: "none,skin-slab" does without. Counted: what either page's console or the server says of errors, and by how much memory
-has grown between the end of the first fifth and the end.
+as is kept, which a busy machine takes minutes for: "none,skin-slab" does without. Counted: what
+either page's console or the server says of errors, and by how much memory has grown between the end
+of the first fifth and the end.
 """
 
 import os

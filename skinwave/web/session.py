@@ -82,11 +82,11 @@ class Session:
                 errors.pop("hold", None)
             except ValueError as error:
                 errors["hold"] = f"the drawing frequency cannot be held: {error}"
-        moved = values != self._good
+        changed = values != self._good
         self.state.update({"errors": errors, "typed": typed})
         self._set(values)
         self.history.push(values)
-        if moved:
+        if changed:
             self.refresh()
 
     def select(self, x: float, y: float) -> None:
