@@ -82,11 +82,10 @@ class Session:
                 errors.pop("hold", None)
             except ValueError as error:
                 errors["hold"] = f"the drawing frequency cannot be held: {error}"
-        changed = values != self._good
         self.state.update({"errors": errors, "typed": typed})
         self._set(values)
         self.history.push(values)
-        if changed:
+        if accepted:
             self.refresh()
 
     def select(self, x: float, y: float) -> None:
