@@ -147,7 +147,7 @@ def kernel_map(pressure: MovingPressure) -> Map:
     return Map(rms=rms, felt=borderline(np.sqrt(gain * swept), PRESSURE**0.5))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=4)  # some MB each
 def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.complex128]:
     """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places."""
     pressure = MovingPressure(tacton=Tacton(trajectory=path), height=height, focus=focus)
