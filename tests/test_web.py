@@ -1,10 +1,13 @@
 """The interactive tool: its model, its state without a browser, and the page itself."""
 
+import asyncio
 import re
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 from queue import Queue
 
 import numpy as np
@@ -19,7 +22,17 @@ from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import simulate
 from skinwave.studies.paper15 import tactons
-from skinwave.web import check_extra, controls, model, plots, waves
+from skinwave.web import (
+    check_extra,
+    controls,
+    downloads,
+    drawings,
+    model,
+    moving,
+    plots,
+    scenes,
+    waves,
+)
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
 from skinwave.web.worker import Worker
@@ -29,10 +42,18 @@ def nothing(phase, fraction):
     pass
 
 
+def ended(pid):
+    """Whether a process has ended, or only waits to be told so."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
+
+
 @pytest.fixture(scope="module")
 def scene():
     """A short Tacton of AM and STM on the slab."""
-    return model.scene_of(STARTS | {"body": "skin-slab", "duration": 0.15, "x": 7.3, "y": -2.1})
+    return scenes.scene_of(STARTS | {"body": "skin-slab", "duration": 0.15, "x": 7.3, "y": -2.1})
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys):
@@ -41,6 +62,47 @@ def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys
         check_extra()
     assert main(["web"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes here")
+@pytest.mark.parametrize("way", ["cancel", "parent ends"])
+def test_what_is_cancelled_ends_with_all_that_it_has_started(way):
+    """A mesher, say, that the process waits for; also if the page's own process is killed."""
+    code = """
+import multiprocessing, subprocess, sys, time
+from skinwave.web import worker
+def busy(pipe):
+    worker._end_with_parent()
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    print(child.pid, flush=True)
+    child.wait()
+worker.answer_forever = busy
+if __name__ == "__main__":
+    one = worker.Worker(print)
+    multiprocessing.set_start_method("fork")
+    worker.multiprocessing.get_context = lambda _: multiprocessing
+    one.ask(1, None)
+    sys.stdin.readline()
+    one.cancel()
+    sys.stdin.readline()
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE,
+                               stdout=subprocess.PIPE, text=True)  # fmt: skip
+    try:
+        child = int(process.stdout.readline())
+        assert not ended(child)
+        if way == "cancel":
+            process.stdin.write("now\n")
+            process.stdin.flush()
+        else:
+            process.kill()
+        until = time.monotonic() + 20
+        while not ended(child):
+            assert time.monotonic() < until, "it goes on"
+            time.sleep(0.05)
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def test_help_and_import_load_no_page():
@@ -65,7 +127,7 @@ def test_an_address_carries_every_control():
         "amplitude": 55.0, "am": 33.5, "am2": 210.0, "ratio": "0.25:0.75", "envelope": 2.5,
         "duration": 0.7, "shape": "triangle", "size": 31.5, "speed": 4.2, "height": 150.0,
         "drive": "force_corrected", "body": "palm", "foci": 3, "sharing": "time_multiplexed",
-        "pulses": "100/50, 40/110", "ramp": 5.0, "x": -3.21, "y": 4.0,
+        "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
     }  # fmt: skip
     assert set(changed) == set(STARTS)
     assert all(changed[key] != STARTS[key] for key in STARTS)
@@ -84,6 +146,8 @@ def test_an_address_carries_every_control():
         ("shape", "circel", "did you mean 'circle'"),
         ("pulses", "100", "give on/off in ms, such as 100/50"),
         ("pulses", "0/10", "lasts longer than 0 ms"),
+        ("phases", "0, half", "'half' is no phase"),
+        ("phases", "0, 100", "100 % is outside"),
     ],
 )
 def test_what_is_wrong_is_said(key, given, said):
@@ -99,7 +163,7 @@ def test_presets_are_the_papers_tactons():
     found = controls.presets()
     assert len(found) == 15
     for name, tacton in tactons():
-        made = model.scene_of(STARTS | found[name]).tacton
+        made = scenes.scene_of(STARTS | found[name]).tacton
         assert made.trajectory.drawing_frequency == pytest.approx(
             tacton.trajectory.drawing_frequency
         )
@@ -108,25 +172,30 @@ def test_presets_are_the_papers_tactons():
 
 def test_a_scene_goes_through_its_file_and_back_to_the_controls():
     values = STARTS | {"body": "palm", "pulses": "100/50", "ramp": 5.0, "foci": 2, "am": 90.0}
-    assert model.values_of(loads(dumps(model.scene_of(values)))) == values
+    assert scenes.values_of(loads(dumps(scenes.scene_of(values)))) == values
+    values |= {"phases": "0, 12.5"}
+    assert scenes.scene_of(values).tacton.foci == (0, 0.125)
+    assert scenes.values_of(loads(dumps(scenes.scene_of(values)))) == values
+    with pytest.raises(ValueError, match="2 phases of 3 foci"):
+        scenes.scene_of(values | {"foci": 3})
 
 
 def test_a_body_of_ones_own_stays():
     own = Body(depth=0.008)
-    values = model.values_of(replace(model.scene_of(STARTS), body=own))
+    values = scenes.values_of(replace(scenes.scene_of(STARTS), body=own))
     assert values["body"] == controls.OWN_BODY
-    assert model.scene_of(values, own).body == own
+    assert scenes.scene_of(values, own).body == own
 
 
 def test_a_held_drawing_frequency_moves_the_other():
-    before = model.scene_of(STARTS).tacton.trajectory.drawing_frequency
+    before = scenes.scene_of(STARTS).tacton.trajectory.drawing_frequency
     for moved, given in (("size", 30.0), ("speed", 6.0), ("shape", "square")):
         values = STARTS | {moved: given}
-        values |= model.held(values, moved, before)
-        assert model.scene_of(values).tacton.trajectory.drawing_frequency == pytest.approx(before)
+        values |= scenes.held(values, moved, before)
+        assert scenes.scene_of(values).tacton.trajectory.drawing_frequency == pytest.approx(before)
         assert values[moved] == given
     with pytest.raises(ValueError, match="outside 0 to 40 m/s"):
-        model.held(STARTS | {"size": 60.0, "shape": "square"}, "size", before)
+        scenes.held(STARTS | {"size": 60.0, "shape": "square"}, "size", before)
 
 
 def test_undo_takes_a_drawn_slider_as_one_move():
@@ -146,10 +215,10 @@ def test_undo_takes_a_drawn_slider_as_one_move():
 
 
 def test_what_is_shown_is_what_simulate_answers():
-    scene = model.scene_of(STARTS)
+    scene = scenes.scene_of(STARTS)
     shown, alone = model.kernel(scene), simulate(scene, "point-kernel")
     f, amplitude = spectrum(alone)
-    plot = plots.spectrum_plot(shown, None, (), False, highest=600)["data"][0]
+    plot = plots.spectrum_plot(shown, None, (), highest=600)["data"][0]
     assert plot["x"] == pytest.approx(f[f <= 600])
     assert plot["y"] == pytest.approx(amplitude[f <= 600, 0], abs=1e-4 * amplitude.max())
     named = {line.name: line for line in shown.lines}
@@ -160,7 +229,7 @@ def test_what_is_shown_is_what_simulate_answers():
 
 
 def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
-    pressure = model.scene_of(STARTS).pressure
+    pressure = scenes.scene_of(STARTS).pressure
     t = np.random.default_rng(1).random(4000)
     sampled = pressure(model.places(), t).std(axis=0).reshape(model.SIDE, model.SIDE)
     found = model.kernel_map(pressure)
@@ -172,7 +241,7 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
 
 
 def test_the_influenced_area_ends_a_main_lobe_from_the_path():
-    path = model.scene_of(STARTS).tacton.trajectory
+    path = scenes.scene_of(STARTS).tacton.trajectory
     outer, inner = (
         sorted(model.influenced(path, 0.2), key=lambda x: -np.linalg.norm(x, axis=1).max())[:1] * 2
     )
@@ -181,7 +250,7 @@ def test_the_influenced_area_ends_a_main_lobe_from_the_path():
 
 
 def test_the_carrier_is_shown_where_it_can_be_resolved():
-    tacton = model.scene_of(STARTS).tacton
+    tacton = scenes.scene_of(STARTS).tacton
     t, p, resolved = model.commanded_curve(tacton, 0.001, 0.002)
     assert resolved
     assert p == pytest.approx(commanded(tacton, t))
@@ -216,7 +285,7 @@ def test_tabulated_waves_are_the_exact_ones(scene):
 
 
 def test_tabulated_waves_follow_pulses_and_foci(scene):
-    tacton = model.scene_of(STARTS | {"pulses": "30/20", "foci": 3, "duration": 0.15}).tacton
+    tacton = scenes.scene_of(STARTS | {"pulses": "30/20", "foci": 3, "duration": 0.15}).tacton
     scene = replace(scene, pressure=replace(scene.pressure, tacton=tacton))
     shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
     exact = simulate(scene, "flat-body").displacement[:, 0]
@@ -227,31 +296,65 @@ def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
     monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
-    answered, scene = waves.Waves(), model.scene_of(values, own)
+    answered, scene = waves.Waves(), scenes.scene_of(values, own)
     shown = answered(scene, nothing)
     alone = simulate(scene, "fem", h=5e-3).displacement[:, 0]
     assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
     said = []
-    faster = answered(model.scene_of(values | {"speed": 9.0}, own), lambda *told: said.append(told))
+    faster = answered(
+        scenes.scene_of(values | {"speed": 9.0}, own), lambda *told: said.append(told)
+    )
     assert not said  # nothing was reduced anew
     assert faster.lines[0].sensation > 0
     # Beside the body there is no map, on it everywhere.
     edge, on = 1e3 * np.abs(model.places()).max(axis=1), np.isfinite(shown.map.rms).ravel()
     assert on[edge < 29.9].all()
     assert not on[edge > 30.1].any()
-    assert plots.picture(shown.map).startswith("data:image/png;base64,")
+    assert drawings.picture(shown.map).startswith("data:image/png;base64,")
 
 
 @pytest.mark.slow
 def test_a_palm_answers(monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "palm", 9e-3)
+    monkeypatch.setitem(waves.SIZES, "palm", 12e-3)
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
-    answered = waves.Waves()
-    shown = answered(model.scene_of(values), nothing)
+    answered, said = waves.Waves(), []
+    shown = answered(scenes.scene_of(values), lambda *told: said.append(told), moving=True)
+    assert list(dict.fromkeys(phase for phase, _ in said)) == [
+        "mesh", "assemble", "factorise", "reduce", "read the surface",
+    ]  # fmt: skip
     assert np.isnan(shown.map.rms[0, 0])
     assert np.isfinite(shown.map.rms[model.SIDE // 2, model.SIDE // 2])
-    with pytest.raises(ValueError, match="beside"):
-        answered(model.scene_of(values | {"x": 42.0, "y": 49.0}), nothing)
+    # Its back is seen, too, and hardly moves; the motion is where the focus is.
+    z, moved = shown.moving.shape.points[:, 2], np.abs(shown.moving.frames).max(axis=0)
+    assert moved[z < np.quantile(z, 0.1)].max() < 0.5 * moved.max()
+    said.clear()
+    with pytest.raises(ValueError, match="not on the surface"):
+        answered(scenes.scene_of(values | {"x": 42.0, "y": 49.0}), lambda *told: said.append(told))
+    assert not said, "what was reduced is kept"
+
+
+def test_the_moving_body_is_what_its_probe_sees(scene):
+    """Steady motion about its mean, through the period that the load has."""
+    tacton = scenes.scene_of(STARTS | {"am": 100.0, "speed": 2 * np.pi, "duration": 0.3}).tacton
+    steady = replace(scene, pressure=replace(scene.pressure, tacton=tacton), probes=((0.0, 0.0),))
+    shown = waves.Waves()(steady, nothing, moving=True)
+    seen, response = shown.moving, shown.response
+    assert seen.repeats
+    assert seen.period == pytest.approx(0.01)
+    middle = model.SIDE**2 // 2
+    assert seen.shape.points[middle] == pytest.approx([0, 0, 0])
+    late = np.interp(0.2 + np.arange(len(seen.frames)) * 0.01 / len(seen.frames), response.times,
+                     response.displacement[:, 0])  # fmt: skip
+    late -= late.mean()
+    upwards = seen.frames[:, middle]
+    assert np.linalg.norm(upwards + late) < 0.02 * np.linalg.norm(late)
+    low = seen.shape.points[:, 2] < 0
+    assert seen.shape.points[low, 2] == pytest.approx(-0.015)
+    assert not seen.frames[:, low].any()
+    sent = moving.sent_motion(seen, steady.pressure)
+    frames = np.frombuffer(sent["frames"], np.int8).reshape(seen.frames.shape)
+    assert np.abs(frames).max() == 127
+    assert np.corrcoef(frames[:, middle], upwards)[0, 1] > 0.999
 
 
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
@@ -313,10 +416,11 @@ def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
         session.turn({"size": "70"})
     assert "outside 0 to 60 mm" in session.state.errors["size"]
     assert session.state.size == STARTS["size"]
+    assert session.state.typed == {"size": "70"}
     assert session.state.spectrum_plot == before
     with session.state:
         session.turn({"size": "30"})
-    assert session.state.errors == {}
+    assert (session.state.errors, session.state.typed) == ({}, {})
     with session.state:
         session.turn({"pulses": "5/5", "ramp": 100})
     assert "ramp" in session.state.problem
@@ -375,7 +479,7 @@ def test_pinning_keeps_and_exchanges(session):
     with session.state:
         session.pin()
         session.state.am = 90
-    assert any(d["name"] == "pinned kernel" for d in session.state.spectrum_plot["data"])
+    assert any(d["name"] == "pinned kernel, Pa" for d in session.state.spectrum_plot["data"])
     with session.state:
         session.take_pinned()
     assert session.state.am == 140
@@ -393,18 +497,23 @@ def test_what_is_saved_can_be_opened(session):
 
     with session.state:
         session.turn({"pulses": "100/50", "am": 90, "size": 12})
-    kept, values = session.scene_toml().decode(), session.values
+    files = downloads.offered(session)
+    kept, values = files["scene_toml"]().decode(), session.values
     with session.state:
         session.preset("am80")
         session.open_scene(kept)
     assert session.values == values
-    rate, samples = wavfile.read(BytesIO(session.waveform_wav()))
+    rate, samples = wavfile.read(BytesIO(files["waveform_wav"]()))
     assert (rate, len(samples)) == (10_000, 10_000)
-    lines = session.waveform_csv().decode().splitlines()
+    lines = files["waveform_csv"]().decode().splitlines()
     assert lines[0] == '"time, s","pressure at (10, 0) mm, Pa (point-kernel)"'
     assert len(lines) == 10_001
-    assert b"<svg" in session.figure("svg")
-    assert Image.open(BytesIO(session.figure("png"))).width > 1000
+    assert b"<svg" in files["figure"]("svg")
+    report = asyncio.run(files["report"]()).decode()
+    assert "How far to trust it" in report
+    assert "am_frequency_hz = 90" in report
+    assert "http" not in re.sub(r"http://www.w3.org|xmlns", "", report).split("<style>")[0]
+    assert Image.open(BytesIO(files["figure"]("png"))).width > 1000
     with session.state:
         session.open_scene("[tacton]\nam = 5")
     assert "the scene cannot be opened" in session.state.problem
@@ -414,13 +523,18 @@ def test_what_is_saved_can_be_opened(session):
 
 
 def test_zooming_in_shows_the_carrier(session):
-    assert "envelope" in session.state.commanded_plot["layout"]["title"]["text"]
+    assert "envelope" in session.state.commanded_plot["title"]
     with session.state:
-        session.zoom({"xaxis.range[0]": 10.0, "xaxis.range[1]": 11.0})
-    assert "with its 40 kHz carrier" in session.state.commanded_plot["layout"]["title"]["text"]
+        session.zoom(10.0, 11.0)
+    assert "with its 40 kHz carrier" in session.state.commanded_plot["title"]
+    for beyond in ((-500.0, -400.0), (2000.0, 3000.0), (7.0, 7.0)):
+        with session.state:
+            session.zoom(*beyond)
+        low, high = session.state.commanded_plot["x"]["range"]
+        assert 0 <= low < high <= 1000
     with session.state:
-        session.zoom({"xaxis.autorange": True})
-    assert "envelope" in session.state.commanded_plot["layout"]["title"]["text"]
+        session.zoom()
+    assert "envelope" in session.state.commanded_plot["title"]
 
 
 def test_an_address_begins_a_page_and_what_is_wrong_in_it_is_said(request):

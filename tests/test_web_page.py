@@ -14,7 +14,7 @@ import pytest
 from simple_model import spectrum
 from skinwave.scene_file import loads
 from skinwave.simulation import simulate
-from skinwave.web import controls, model
+from skinwave.web import controls, model, scenes
 from skinwave.web.controls import NUMBERS, STARTS
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
@@ -23,12 +23,13 @@ ARGUMENTS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
+READY = "() => window.trame?.utils?.plots?.shown?.spectrum_plot?.figure"
 PATIENCE = 60_000  # ms; other work on the machine may take most of it
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no browser here"),
 ]
-for name in ("playwright", "trame", "trame_plotly", "trame_vuetify"):
+for name in ("playwright", "trame", "trame_vuetify"):
     pytest.importorskip(name)
 
 
@@ -75,7 +76,7 @@ def opened(browser, address, query="", **viewport):
     page.on("pageerror", lambda error: logs.errors.append(str(error)))
     page.on("console", lambda m: logs.errors.append(m.text) if m.type == "error" else None)
     page.goto(address + query)
-    page.wait_for_selector("#spectrum_plot .main-svg")
+    page.wait_for_function(READY)
     return page, logs
 
 
@@ -110,36 +111,30 @@ def query_has(page, part):
 
 
 def drawn(page, plot):
-    """The curves that plotly draws."""
-    return page.evaluate(
-        """plot => { const at = document.getElementById(plot);
-        const drawn = at.data ? at : at.querySelector('.js-plotly-plot');
-        return drawn.data.map(d => ({name: d.name, x: [...(d.x || [])], y: [...d.y]})) }""",
-        plot,
-    )
+    """The curves that a canvas shows."""
+    return page.evaluate("plot => window.trame.utils.plots.shown[plot].figure.data", plot)
 
 
 def latencies(page, key, count, until):
-    """Seconds from each of `count` key presses on a slider until a plot has been drawn, in which
-    `until`, an expression of its `data`, is true.
+    """Seconds from each of `count` key presses on a slider until plots are on the screen in which
+    `until`, an expression of their `data`, is true.
     """
     found = page.evaluate(
         """async ([key, count, until]) => {
         const slider = document.querySelector(`.sw-row:has(#${key}-field) [role=slider]`);
-        const at = document.getElementById('spectrum_plot');
-        const plot = at.data ? at : at.querySelector('.js-plotly-plot');
+        const plot = window.trame.utils.plots.shown.spectrum_plot;
         const good = new Function('data', 'return ' + until), times = [];
         slider.focus();
         for (let k = 0; k < count; k++) {
-          const before = JSON.stringify(plot.data[0].y), start = performance.now();
+          const before = JSON.stringify(plot.figure.data[0].y), start = performance.now();
           const done = new Promise(resolve => {
             const look = () => {
-              if (JSON.stringify(plot.data[0].y) !== before && good(plot.data)) {
-                plot.removeListener('plotly_afterplot', look);
-                resolve(performance.now() - start);
+              if (JSON.stringify(plot.figure.data[0].y) !== before && good(plot.figure.data)) {
+                plot.canvas.removeEventListener('drawn', look);
+                requestAnimationFrame(() => setTimeout(() => resolve(performance.now() - start)));
               }
             };
-            plot.on('plotly_afterplot', look);
+            plot.canvas.addEventListener('drawn', look);
           });
           slider.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}));
           times.push(await done);
@@ -149,6 +144,24 @@ def latencies(page, key, count, until):
         [key, count, until],
     )
     return np.array(found) / 1e3
+
+
+def ink(page, canvas):
+    """How many pixels of a canvas are of each colour."""
+    return page.evaluate(
+        """id => { const from = document.getElementById(id);
+        const copy = document.createElement('canvas');
+        [copy.width, copy.height] = [from.width, from.height];
+        const g = copy.getContext('2d');
+        g.drawImage(from, 0, 0);
+        const bytes = g.getImageData(0, 0, copy.width, copy.height).data, found = {};
+        for (let k = 0; k < bytes.length; k += 4) {
+          const colour = bytes.slice(k, k + 4).join();
+          found[colour] = (found[colour] || 0) + 1;
+        }
+        return found }""",
+        canvas,
+    )
 
 
 def choose(page, key, title):
@@ -165,12 +178,12 @@ def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
     page.locator(".sw-row:has(#am-field) [role=slider]").press("ArrowRight")
     query_has(page, "am=141")
     values = controls.from_query(page.evaluate("location.search.slice(1)"))[0]
-    f, amplitude = spectrum(simulate(model.scene_of(values), "point-kernel"))
+    f, amplitude = spectrum(simulate(scenes.scene_of(values), "point-kernel"))
     page.wait_for_function("() => true")
     shown = drawn(page, "spectrum_plot")[0]
     assert np.allclose(shown["x"], f[f <= 600], atol=1e-2)
     assert np.allclose(shown["y"], amplitude[f <= 600, 0], atol=1e-4 * amplitude.max())
-    named = model.kernel(model.scene_of(values)).lines[0]
+    named = model.kernel(scenes.scene_of(values)).lines[0]
     row = page.locator("#lines tr").nth(1).locator("td")
     assert row.nth(1).inner_text() == f"{named.frequency:.1f}"
     assert row.nth(2).inner_text() == f"{named.amplitude:.3g}"
@@ -193,6 +206,19 @@ def test_a_slider_and_a_field_turn_each_number(page, key):
     assert page.locator(f"#{key}-field").get_attribute("aria-invalid") == "true"
 
 
+def test_a_number_can_be_typed_digit_by_digit(page):
+    """Though its beginning, 1 mm, is refused."""
+    field = page.locator("#height-field")
+    field.fill("")
+    field.press_sequentially("1")
+    page.wait_for_selector("#height-error")
+    assert field.input_value() == "1"
+    field.press_sequentially("50")
+    query_has(page, "height=150")
+    assert field.input_value() == "150"
+    page.wait_for_selector("#height-error", state="detached")
+
+
 def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     choose(page, "ratio", "0.25:0.75")
     query_has(page, "ratio=0.25:0.75")
@@ -202,6 +228,10 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     choose(page, "sharing", "in turn")
     query_has(page, "sharing=time_multiplexed")
     assert len(state(page, "foci_at")) == 3
+    page.locator("#phases-field").fill("0, 25, 50")
+    query_has(page, "phases=0")
+    page.wait_for_function("() => Math.abs(window.trame.state.get('foci_at')[1][1] + 10) < 0.01")
+    assert page.locator("#kernel-map circle").count() == 3
     for shape in ("point", "line", "triangle", "square"):
         page.locator(f"#shape-{shape}").click()
         query_has(page, f"shape={shape}")
@@ -213,6 +243,7 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     photographed(page, "rhythm")
     page.locator("#pulses-field").fill("")
     page.locator("#hold").check()
+    page.wait_for_function("() => window.trame.state.get('held_frequency') > 0")
     held = page.locator("#drawing").inner_text()
     page.locator("#size-field").fill("14")
     query_has(page, "speed=8.4")
@@ -231,7 +262,7 @@ def test_presets_undo_redo_pin_and_looks(page):
     page.locator("#pin").click()
     page.locator("#undo").click()
     page.wait_for_function("() => window.trame.state.get('spectrum_plot').data.length === 3")
-    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel"
+    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel, Pa"
     page.locator("#swap").click()
     query_has(page, "size=30")
     photographed(page, "pinned")
@@ -240,9 +271,7 @@ def test_presets_undo_redo_pin_and_looks(page):
     page.wait_for_function("() => window.trame.state.get('waveform_plot').data[0].x.at(-1) > 900")
     choose(page, "span", "first 60 ms")
     choose(page, "highest", "300")
-    page.wait_for_function(
-        "() => window.trame.state.get('spectrum_plot').layout.xaxis.range[1] === 300"
-    )
+    page.wait_for_function("() => window.trame.state.get('spectrum_plot').x.range[1] === 300")
     choose(page, "highest", "600")
 
 
@@ -260,7 +289,7 @@ def test_a_click_or_a_key_on_the_map_selects(page):
 
 
 def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
-    frame = page.locator("#commanded_plot .nsewdrag").first.bounding_box()
+    frame = page.locator("#commanded_plot").bounding_box()
     middle = frame["y"] + frame["height"] / 2
     page.mouse.move(frame["x"] + 200, middle)
     page.mouse.down()
@@ -268,13 +297,56 @@ def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
     page.mouse.move(frame["x"] + 214, middle + 2)
     page.mouse.up()
     page.wait_for_function(
-        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('with its')"
+        "() => window.trame.state.get('commanded_plot').title.includes('with its')"
     )
     photographed(page, "carrier")
     page.mouse.dblclick(frame["x"] + 200, middle)
     page.wait_for_function(
-        "() => window.trame.state.get('commanded_plot').layout.title.text.includes('envelope')"
+        "() => window.trame.state.get('commanded_plot').title.includes('envelope')"
     )
+
+
+def test_curves_are_drawn_read_and_zoomed_by_keys(page):
+    curve = "0,114,178,255" if not state(page, "dark") else "86,180,233,255"
+    assert ink(page, "waveform_plot").get(curve, 0) > 200
+    plot = page.locator("#waveform_plot")
+    before = ink(page, "waveform_plot")
+    plot.hover()
+    assert ink(page, "waveform_plot") != before, "nothing is read out"
+    plot.press("+")
+    zoom = "() => window.trame.utils.plots.shown.waveform_plot.zoom"
+    low, high = page.evaluate(zoom)
+    assert (low, high) == pytest.approx((15, 45))
+    plot.press("Home")
+    assert page.evaluate(zoom) is None
+
+
+def test_the_body_moves_in_three_dimensions(page):
+    choose(page, "body", "skin-slab")
+    page.locator("#solid").click()
+    page.wait_for_function("() => window.trame.state.get('body_motion').frames")
+    play, now = page.locator("#body-play"), page.locator("#body-now")
+    if play.get_attribute("aria-label") == "Pause":
+        play.click()
+    assert re.fullmatch(r"\d+\.\d\d of \d+\.\d\d ms", now.inner_text())
+    stopped = ink(page, "body-view")
+    assert len(stopped) > 50, "next to nothing is drawn"
+    page.wait_for_timeout(200)
+    assert ink(page, "body-view") == stopped
+    page.locator("#body-time").fill("500")
+    half = float(now.inner_text().split()[0])
+    assert half == pytest.approx(state(page, "body_motion")["period"] / 2, abs=0.01)
+    assert ink(page, "body-view") != stopped
+    page.locator("#body-view").press("ArrowLeft")
+    turned = ink(page, "body-view")
+    page.locator("#body-view").press("+")
+    assert ink(page, "body-view") != turned
+    play.click()
+    page.wait_for_function("t => !document.getElementById('body-now').textContent.startsWith(t)",
+                           arg=f"{half:.2f}")  # fmt: skip
+    photographed(page, "body")
+    page.locator("#solid").click()
+    page.wait_for_selector("#wave-map")
 
 
 def test_what_is_saved_opens_again(page, tmp_path):
@@ -282,7 +354,8 @@ def test_what_is_saved_opens_again(page, tmp_path):
     query_has(page, "am=95")
     for item, start in (("scene-toml", b"name ="), ("waveform-csv", b'"time'),
                         ("waveform-wav", b"RIFF"), ("figure-svg", b"<?xml"),
-                        ("figure-png", b"\x89PNG")):  # fmt: skip
+                        ("figure-png", b"\x89PNG"),
+                        ("report-html", b"<!doctype html>")):  # fmt: skip
         page.locator("#save").click()
         with page.expect_download() as saved:
             page.locator(f"#save-{item}").click()
@@ -364,7 +437,7 @@ def test_a_lost_connection_is_said_and_comes_back(browser):
     ended(process)
     page.wait_for_selector("#sw-lost")
     again, _ = served("--port", address.rstrip("/").rpartition(":")[2])
-    page.wait_for_selector("#spectrum_plot .main-svg")
+    page.wait_for_function(READY)
     assert state(page, "am") == 71
     page.close()
     ended(again)

@@ -23,11 +23,11 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"port = {options.port} is outside 0..65535; leave it out for 8080")
     check_extra()
     from skinwave.scene_file import dumps, read
-    from skinwave.web import front, model
+    from skinwave.web import front, scenes
 
     scene = read(options.scene) if options.scene else None
     if scene is not None:
-        model.values_of(scene)  # refuses what no control says
+        scenes.values_of(scene)  # refuses what no control says
 
     def ready(address: str) -> None:
         print(f"skinwave: {address} (Ctrl-C ends it)", file=sys.stderr, flush=True)

@@ -1,11 +1,12 @@
 """The interactive tool: turn a Tacton's parameters, and see at once what a point of the skin feels.
 
-`controls` are what can be turned, `model` turns them into a scene and arrays, `plots` into what a
-page draws, all without a browser. `waves` and `worker` answer with a body, in a process of its own;
-`session` and `layout` are the page, `front` gives each page a process of its own.
+`controls` are what can be turned, `scenes` makes a scene of them, `model` arrays, `plots`,
+`drawings` and `moving` what a page draws, all without a browser. `waves` and `worker` answer with a
+body, in a process of its own; `session`, `shown` and `layout` are the page, with curves and body
+drawn in `static`; `front` gives each page a process of its own.
 """
 
-EXTRA = ("trame", "trame_vuetify", "trame_plotly")
+EXTRA = ("trame", "trame_vuetify")
 
 
 def check_extra() -> None:

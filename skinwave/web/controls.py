@@ -68,6 +68,7 @@ STARTS = {
     "body": "none",
     "sharing": "simultaneous",
     "pulses": "",
+    "phases": "",
 }
 KEYS = tuple(STARTS)
 MOST_PULSES = 64
@@ -83,8 +84,8 @@ def checked(key: str, given: Any) -> Any:
     """
     if key in CHOICES:
         return choose(key, str(given), CHOICES[key])
-    if key == "pulses":
-        pulses_of(str(given))
+    if key in TEXTS:
+        TEXTS[key](str(given))
         return str(given).strip()
     number = NUMBERS[key]
     unit = f" {number.unit}" if number.unit else ""
@@ -120,6 +121,29 @@ def pulses_of(text: str) -> tuple[tuple[float, float], ...]:
     if len(found) > MOST_PULSES:
         raise ValueError(f"{len(found)} pulses exceed {MOST_PULSES}; repeat a shorter pattern")
     return tuple(found)
+
+
+def phases_of(text: str) -> tuple[float, ...]:
+    """Phases 0..1 of a text such as "0, 25, 60" in per cent of a drawing period; none if empty.
+
+    Raises
+    ------
+    ValueError
+        If it is no such text, or a phase is out of range.
+    """
+    found = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        try:
+            phase = float(part)
+        except ValueError:
+            raise ValueError(f"'{part}' is no phase; give per cent, such as 0, 25, 60") from None
+        if not 0 <= phase < 100:
+            raise ValueError(f"{phase:g} % is outside 0 to below 100 % of a drawing period")
+        found.append(phase / 100)
+    return tuple(found)
+
+
+TEXTS = {"pulses": pulses_of, "phases": phases_of}
 
 
 def to_query(values: Mapping[str, Any]) -> str:
@@ -160,6 +184,7 @@ def presets() -> dict[str, Values]:
             "speed": tacton.trajectory.speed,
             "foci": 1,
             "pulses": "",
+            "phases": "",
             "ramp": 0.0,
         }
         for name, tacton in tactons()

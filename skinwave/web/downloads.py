@@ -1,15 +1,42 @@
-"""What a page gives to keep: waveforms as tables and sound, and a figure."""
+"""What a page gives to keep: the scene, waveforms as tables and sound, a figure, the report."""
 
+import asyncio
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from io import BytesIO, StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from simple_model.response import step
 from skinwave.exports import FULL_SCALE
-from skinwave.scene import Scene
+from skinwave.scene import BODIES, Scene, with_body
+from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, influenced
+
+
+def offered(session: Any) -> dict[str, Callable[..., Any]]:
+    """What makes each file of what a session shows, by its name as a trigger of the page.
+
+    Waves are those of a body if it has answered; a file of several answers has the kernel's, too.
+    """
+
+    def current() -> list[Answer]:
+        return [a for a in (session.kernel, session.current_waves) if a]
+
+    async def report() -> bytes:
+        return await asyncio.to_thread(report_of, session.scene, current())
+
+    return {
+        "scene_toml": lambda: dumps(session.scene).encode(),
+        "waveform_csv": lambda: csv_of(current()),
+        "waveform_wav": lambda: wav_of(current()[-1]),
+        "figure": lambda kind: figure_of(session.scene, current(), kind),
+        "report": report,
+    }
 
 
 def csv_of(answers: Sequence[Answer]) -> bytes:
@@ -43,11 +70,34 @@ def wav_of(answer: Answer) -> bytes:
     return buffer.getvalue()
 
 
-def figure_of(scene: Scene, kernel: Answer, waves: Answer | None, kind: str) -> bytes:
+def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
+    """The report of `skinwave report` as one page, from the answers there are; no model is run."""
+    from skinwave.effort import silent, versions
+    from skinwave.files import fill
+    from skinwave.pictures.styles import style
+    from skinwave.reports.scene_report import write_report
+    from skinwave.run import Run
+
+    known = (name for name, body in BODIES.items() if body == scene.body)
+    names = {"Pa": "none", "m": next(known, scene.body.kind)}
+    with TemporaryDirectory() as folder:
+        results, out = Path(folder, "results"), Path(folder, "report")
+        out.mkdir()
+        for answer in answers:
+            response, name = answer.response, names[answer.response.unit]
+            response = replace(response, effort=replace(response.effort, versions=versions()))
+            own = scene if name != "none" else with_body(scene, BODIES["none"])
+            (results / name).mkdir(parents=True)
+            fill(results / name, Run(tacton=scene.name, body=name, scene=own, response=response))
+        (results / "scene.toml").write_text(dumps(scene), encoding="utf-8")
+        write_report(results, out, style("report"), silent)
+        return (out / "index.html").read_bytes()
+
+
+def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
     """Maps, waveform and spectrum; `kind` is "svg" or "png"."""
     from matplotlib.figure import Figure
 
-    answers = [a for a in (kernel, waves) if a is not None]
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
     for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
         unit, per = ("Pa", 1.0) if answer.response.unit == "Pa" else ("µm", 1e6)

@@ -162,12 +162,11 @@ def _page(folder: str) -> Any:
 def served() -> tuple[dict[str, str], str]:
     """Folders of what a page is made of, by route, and the folder of the page itself."""
     import trame_client.module.vue3 as client
-    import trame_plotly.module as plotly
     import trame_vuetify.module.v3 as vuetify
 
     from skinwave.web.serve import STATIC_ROUTE
 
-    return {**vuetify.serve, **plotly.serve, **STATIC_ROUTE}, str(client.www)
+    return {**vuetify.serve, **STATIC_ROUTE}, str(client.www)
 
 
 def run(port: int, scene: str = "", ready: Callable[[str], None] = print) -> None:

@@ -4,17 +4,18 @@ from pathlib import Path
 from typing import Any
 
 from trame.ui.vuetify3 import VAppLayout
-from trame.widgets import client, html, plotly
+from trame.widgets import client, html
 from trame.widgets import vuetify3 as v3
 
 from skinwave.web import controls, panels
 from skinwave.web.plots import SPANS
-from skinwave.web.session import HIGHEST, Session
+from skinwave.web.session import Session
+from skinwave.web.shown import HIGHEST
 
 STATIC = Path(__file__).with_name("static")
 MODULE = {
     "serve": {"__skinwave": str(STATIC)},
-    "scripts": ["__skinwave/skinwave.js"],
+    "scripts": [f"__skinwave/{name}.js" for name in ("plots", "body", "skinwave")],
     "styles": ["__skinwave/skinwave.css"],
 }
 LOST = """
@@ -34,6 +35,7 @@ SAVED = {  # name of the file, what makes it, its kind, what it is called
     "waveform.wav": ("waveform_wav", "", "audio/wav", "Waveform (WAV)"),
     "figure.svg": ("figure", ", ['svg']", "image/svg+xml", "Figure (SVG)"),
     "figure.png": ("figure", ", ['png']", "image/png", "Figure (PNG)"),
+    "report.html": ("report", "", "text/html", "Report (HTML)"),
 }
 
 
@@ -44,10 +46,10 @@ def lay_out(session: Session) -> None:
     session.state.trame__title = "skinwave"
     session.state.trame__template_error = LOST
     with VAppLayout(server, theme=("dark ? 'dark' : 'light'",)):
-        client.ClientStateChange(
-            value="query", immediate=True, change="utils.skinwave.address(query)"
+        client.ClientTriggers(
+            mounted="dark = utils.skinwave.prefersDark();"
+            f"utils.skinwave.begin(trame.state, {list(PLOTS)})"
         )
-        client.ClientTriggers(mounted="dark = utils.skinwave.prefersDark()")
         _bar(session)
         with v3.VNavigationDrawer(
             v_model=("drawer", None), width=320, mobile_breakpoint=960,
@@ -110,11 +112,15 @@ def _maps(session: Session) -> None:
             )
             panels.area("kernel_map", "kernel-map", "point kernel")
         with html.Div(v_if="body != 'none'", classes=("{ 'sw-stale': waves_stale }",)):
-            html.Div(
-                "<b>Waves</b>, RMS displacement: up to {{ wave_map.largest || '…' }}",
-                classes="sw-caption",
-            )
-            panels.area("wave_map", "wave-map", "waves in the body")
+            with html.Div(classes="sw-caption sw-which"):
+                html.Span(
+                    "<b>Waves</b>, {{ solid ? 'moving' : 'RMS displacement' }}: up to "
+                    "{{ (solid ? body_motion.largest : wave_map.largest) || '…' }}"
+                )
+                html.Button("{{ solid ? 'map' : '3-D' }}", click="solid = !solid", id="solid",
+                            title="The body in three dimensions, or its map")  # fmt: skip
+            panels.area("wave_map", "wave-map", "waves in the body", "!solid")
+            panels.body()
         with html.Div(style="grid-column: 1 / -1"):
             html.Div(
                 "<span><b style='color:#56B4E9'>━</b> path, foci</span> "
@@ -134,15 +140,11 @@ def _maps(session: Session) -> None:
 def _plots(session: Session) -> None:
     with html.Div(classes="sw-plots"):
         for name, said in PLOTS.items():
-            with html.Div(raw_attrs=['role="img"', f'aria-label="{said}"'],
-                          classes=("{ 'sw-stale': stale }",)):  # fmt: skip
-                more = {"relayout": (session.zoom, "[$event]")} if name == "commanded_plot" else {}
-                plotly.Figure(
-                    state_variable_name=name, display_logo=False, display_mode_bar="hover",
-                    responsive=True, id=name, style="width: 100%; height: 100%",
-                    to_image_options=("{ format: 'svg' }",),
-                    mode_bar_buttons_to_remove=("['lasso2d', 'select2d', 'autoScale2d']",), **more,
-                )  # fmt: skip
+            with html.Div(classes=("{ 'sw-stale': stale }",)):
+                html.Canvas(id=name, raw_attrs=[
+                    'tabindex="0"', 'role="img"',
+                    f'aria-label="{said}; plus and minus zoom, arrow keys move, Home shows all"',
+                ])  # fmt: skip
         with html.Div(style="position: fixed; right: 10px; top: 54px; width: 340px; z-index: 5",
                       raw_attrs=['role="status"', 'aria-live="polite"']):  # fmt: skip
             panels.notices(session)

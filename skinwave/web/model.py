@@ -1,9 +1,7 @@
-"""From the values of the controls to a scene, and from that to everything a page shows of it."""
+"""From a scene to everything that a page shows of the point kernel's answer, and of any other."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +10,6 @@ from meshes.tetmesh import Floats
 from simple_model import (
     MovingPressure,
     Response,
-    Rhythm,
     Tacton,
     Trajectory,
     commanded,
@@ -26,9 +23,9 @@ from simple_model.focus import lobe_width, moved_spot
 from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import CARRIER, level
 from simple_model.threshold import PRESSURE
-from skinwave.scene import BODIES, Body, Scene
+from skinwave.scene import Scene
 from skinwave.simulation import simulate
-from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, pulses_of
+from skinwave.web.moving import Moving
 
 REACH = 50e-3  # m: half the side of the area that is shown
 SIDE = 41  # places along a side of a map
@@ -68,7 +65,8 @@ class Line:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
     """A model's answer: the `response` at the one point that is selected, its `frequencies` (f,)
-    in Hz with the amplitudes `spectrum` (f,), its named `lines`, the strongest first, and the map.
+    in Hz with the amplitudes `spectrum` (f,), its named `lines`, the strongest first, the map
+    and, if it was asked for, the motion of the whole body.
     """
 
     response: Response
@@ -76,113 +74,7 @@ class Answer:
     spectrum: Floats
     lines: tuple[Line, ...]
     map: Map
-
-
-def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
-    """The scene that controls say, probed at the selected point; `own` is a body from a file.
-
-    Raises
-    ------
-    ValueError
-        If values are out of range together, such as a path beyond the body.
-    """
-    shape = values["shape"]
-    moving = {} if shape == "point" else {"size": values["size"] / 1e3, "speed": values["speed"]}
-    pulses = pulses_of(values["pulses"])
-    foci = int(values["foci"])
-    tacton = Tacton(
-        amplitude=values["amplitude"] / 100,
-        am_frequency=values["am"],
-        second_am_frequency=values["am2"],
-        superposition=RATIOS[values["ratio"]],
-        envelope_frequency=values["envelope"],
-        duration=values["duration"],
-        trajectory=Trajectory(shape=shape, **moving),
-        foci=tuple(k / foci for k in range(foci)),
-        sharing=values["sharing"],
-        rhythm=Rhythm(pulses=pulses, ramp=values["ramp"] / 1e3) if pulses else None,
-    )
-    body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
-    pressure = MovingPressure(
-        tacton=tacton,
-        # The published model has the main lobe; exact waves and elements a Gaussian of its width.
-        focus="main_lobe" if body.kind == "none" else "gaussian",
-        drive=values["drive"],
-        height=values["height"] / 1e3,
-    )
-    return Scene(
-        name="skinwave web", pressure=pressure, body=body,
-        probes=((values["x"] / 1e3, values["y"] / 1e3),),
-    )  # fmt: skip
-
-
-def values_of(scene: Scene) -> Values:
-    """The controls' values that give a scene, probed at its first probe.
-
-    Raises
-    ------
-    ValueError
-        If it has what no control says.
-    """
-    tacton, path = scene.tacton, scene.tacton.trajectory
-    known = {body: name for name, body in BODIES.items()}
-    ratio = {weights: name for name, weights in RATIOS.items()}.get(tacton.superposition)
-    even = tuple(k / len(tacton.foci) for k in range(len(tacton.foci)))
-    beyond = {
-        "a path of its own points": path.shape not in ("point", "line", "circle", "triangle",
-                                                       "square"),
-        "a path that is moved or swept one way": any(path.centre)
-        or path.sweep != "there_and_back",
-        "a sampled signal": tacton.signal is not None,
-        "foci at uneven phases": not np.allclose(sorted(tacton.foci), even),
-        "a superposition that is none of the five": ratio is None,
-    }  # fmt: skip
-    if said := [what for what, holds in beyond.items() if holds]:
-        raise ValueError(f"{' and '.join(said)} cannot be turned here; use skinwave run")
-    rhythm, (x, y) = tacton.rhythm, scene.probes[0]
-    pulses = rhythm.pulses if rhythm else ()
-    return STARTS | {
-        "amplitude": 100 * tacton.amplitude,
-        "am": tacton.am_frequency,
-        "am2": tacton.second_am_frequency,
-        "ratio": ratio,
-        "envelope": tacton.envelope_frequency,
-        "duration": tacton.duration,
-        "shape": path.shape,
-        "size": 1e3 * path.size,
-        "speed": path.speed,
-        "height": 1e3 * scene.pressure.height,
-        "drive": scene.pressure.drive,
-        "body": known.get(scene.body, OWN_BODY),
-        "foci": len(tacton.foci),
-        "sharing": tacton.sharing,
-        "pulses": ", ".join(f"{1e3 * on:g}/{1e3 * gap:g}" for on, gap in pulses),
-        "ramp": 1e3 * rhythm.ramp if rhythm else 0.0,
-        "x": round(1e3 * x, 6),
-        "y": round(1e3 * y, 6),
-    }
-
-
-def held(values: Mapping[str, Any], moved: str, frequency: float) -> Values:
-    """Size or speed, whichever was not moved, so that the path is drawn `frequency` times a second
-    (in Hz).
-
-    Raises
-    ------
-    ValueError
-        If that is out of the range of its control.
-    """
-    from skinwave.web.controls import checked
-
-    per_size = Trajectory(shape=values["shape"], size=1e-3).length  # metre per mm
-    if not per_size or not frequency:
-        return {}
-    found = (
-        ("speed", frequency * per_size * values["size"])
-        if moved != "speed"
-        else ("size", values["speed"] / (frequency * per_size))
-    )
-    return {found[0]: checked(found[0], round(found[1], 6))}
+    moving: Moving | None = None
 
 
 def kernel(scene: Scene) -> Answer:
@@ -190,13 +82,13 @@ def kernel(scene: Scene) -> Answer:
     return answer_of(scene, simulate(scene, "point-kernel"), kernel_map(scene.pressure))
 
 
-def answer_of(scene: Scene, response: Response, found: Map) -> Answer:
+def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:
     """What is shown of a response at one point."""
     f, amplitude = spectrum(response)
     shown = f <= HIGHEST
     return Answer(
         response=response, frequencies=f[shown], spectrum=amplitude[shown, 0],
-        lines=named_lines(scene, response), map=found,
+        lines=named_lines(scene, response), map=found, moving=moving,
     )  # fmt: skip
 
 
@@ -211,9 +103,7 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
             known[name] = f
     if not known:
         return ()
-    bins, rough = spectrum(
-        response
-    )  # to fit only what is there: a fit of all takes ten times as long
+    bins, rough = spectrum(response)  # to fit what is there: a fit of all takes ten times as long
     near = np.array([rough[np.abs(bins - each) < 2.5 * bins[1]].max(initial=0.0) for each in
                      known.values()])  # fmt: skip
     known = {name: known[name] for name, a in zip(known, near, strict=True)
@@ -257,7 +147,7 @@ def kernel_map(pressure: MovingPressure) -> Map:
     return Map(rms=rms, felt=borderline(np.sqrt(gain * swept), PRESSURE**0.5))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=4)  # some MB each
 def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.complex128]:
     """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places."""
     pressure = MovingPressure(tacton=Tacton(trajectory=path), height=height, focus=focus)
@@ -319,8 +209,3 @@ def thinned(x: Floats, y: Floats, most: int = MOST_SHOWN) -> tuple[Floats, Float
     kept = np.unique((both + np.arange(0, count, width)[:, None]).ravel())
     kept = np.append(kept, np.arange(count, len(x)))
     return x[kept], y[kept]
-
-
-def with_point(scene: Scene, x: float, y: float) -> Scene:
-    """The scene probed elsewhere, in metre."""
-    return replace(scene, probes=((x, y),))

@@ -29,6 +29,8 @@ LEFT_OUT = (
     "sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
     "the body anew, which takes some seconds; other controls do not.",
+    "<b>3-D</b>: the steady state about its mean, exaggerated as is said below it. A slab is shown "
+    "as far as the area goes; its sides are drawn straight down to the bone.",
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
     "pressure, 50 Pa at full drive, is uncertain by a factor of 2. Air is left out.",
     "With a body the focus is a Gaussian of the same width as the main lobe that the point kernel "
@@ -66,10 +68,12 @@ def control_panel(session: Session) -> None:
             {"title": "all at once, at 1/n of the pressure each", "value": "simultaneous"},
             {"title": "in turn, each for 1/n of the time", "value": "time_multiplexed"},
         ])  # fmt: skip
-        html.Div(
-            "{{ foci }} foci at even phases of one path; the load is the same either way.",
-            v_if="foci > 1", classes="sw-note",
-        )  # fmt: skip
+        with html.Div(v_if="foci > 1"):
+            text(session, "phases", "Phases in % of the path, such as 0, 25, 60; empty is even")
+            html.Div(
+                "All {{ foci }} foci follow one path. As this model knows no device, the load is "
+                "the same whether they are made at once or in turn.", classes="sw-note",
+            )  # fmt: skip
         _heading("On the skin")
         number(session, "height")
         choice("drive", "Drive law", [{"title": DRIVES[d], "value": d} for d in CHOICES["drive"]])
@@ -86,7 +90,8 @@ def number(session: Session, key: str) -> None:
     """A slider and a field for a number."""
     given = NUMBERS[key]
     said = f"{given.label}, {given.unit}" if given.unit else given.label
-    with html.Div(classes="sw-row"):
+    # Of a move only its own row is made anew: all of them take longer than the plots.
+    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
         html.Label(said, raw_attrs=[f'for="{key}-field"'])
         v3.VSlider(
             v_model_number=(key,), min=given.low, max=given.high, step=given.step, id=f"{key}",
@@ -94,9 +99,24 @@ def number(session: Session, key: str) -> None:
             raw_attrs=[f'aria-label="{said}"'],
         )  # fmt: skip
         v3.VTextField(
-            model_value=(key,), update_modelValue=(setter(session, key), "[$event]"),
+            model_value=(f"typed.{key} ?? {key}",),
+            update_modelValue=(setter(session, key), "[$event]"),
             error=(f"!!errors.{key}",), density="compact", hide_details=True, id=f"{key}-field",
             variant="outlined",
+            raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
+        )  # fmt: skip
+        _error(key)
+
+
+def text(session: Session, key: str, said: str) -> None:
+    """A field for several numbers."""
+    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
+        html.Label(said, raw_attrs=[f'for="{key}-field"'])
+        v3.VTextField(
+            model_value=(f"typed.{key} ?? {key}",),
+            update_modelValue=(setter(session, key), "[$event]"),
+            error=(f"!!errors.{key}",), density="compact", hide_details=True, variant="outlined",
+            id=f"{key}-field", style="grid-column: 1 / 3",
             raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
         )  # fmt: skip
         _error(key)
@@ -107,16 +127,17 @@ def choice(key: str, said: str, items: Sequence[Any] = ()) -> None:
     v3.VSelect(
         v_model=(key,), items=(f"{key}_items", list(items or CHOICES[key])), label=said,
         density="compact", hide_details=True, id=key, style="margin-top: 8px",
+        raw_attrs=[f'v-memo="[{key}]"'],
     )  # fmt: skip
 
 
-def area(name: str, marked: str, said: str) -> None:
+def area(name: str, marked: str, said: str, shown: str = "true") -> None:
     """A map of the area with path, foci, borderlines and the selected point, which it selects."""
     steps = {"left": "x - 1, y", "right": "x + 1, y", "up": "x, y + 1", "down": "x, y - 1"}
     keys = [f"@keydown.{key}.prevent=\"trigger('select', [{at}])\"" for key, at in steps.items()]
     drag = "trigger('select', utils.skinwave.place($event))"
     HtmlElement(
-        "svg", classes="sw-map", id=marked, children=[
+        "svg", v_if=shown, classes="sw-map", id=marked, children=[
             f'<image v-if="{name}.picture" :href="{name}.picture" x="-51.25" y="-51.25" '
             'width="102.5" height="102.5" preserveAspectRatio="none"/>'
             '<path :d="influenced" fill="none" stroke="black" stroke-width="1.1"/>'
@@ -142,6 +163,29 @@ def area(name: str, marked: str, said: str) -> None:
             f'@pointerdown="{drag}"', f'@pointermove="$event.buttons && {drag}"', *keys,
         ],
     )  # fmt: skip
+
+
+def body() -> None:
+    """The body in three dimensions through one period, which can be turned, stopped and drawn."""
+    with html.Div(v_if="solid", classes="sw-body",
+                  raw_attrs=['@vue:mounted="utils.body.begin(trame.state)"']):  # fmt: skip
+        html.Canvas(id="body-view", raw_attrs=[
+            'tabindex="0"', 'role="application"', 'aria-label="The body, moving; arrow keys turn '
+            'it, plus and minus bring it nearer, the space bar plays and pauses"',
+        ])  # fmt: skip
+        with html.Div(classes="sw-time"):
+            html.Button("▶", id="body-play")
+            HtmlElement("input", id="body-time", raw_attrs=[
+                'type="range"', 'min="0"', 'max="1000"', 'value="0"',
+                'aria-label="Where in the period"',
+            ])  # fmt: skip
+            html.Span(id="body-now")
+        html.Div(
+            "motion drawn {{ body_motion.times }} times, about its mean; "
+            "{{ body_motion.repeats ? 'one period' : 'a period of the slowest tone, "
+            "after which it jumps' }}",
+            v_if="body_motion.times", classes="sw-caption",
+        )  # fmt: skip
 
 
 def line_table() -> None:
@@ -182,16 +226,7 @@ def about() -> None:
 
 
 def _rhythm(session: Session) -> None:
-    with html.Div(classes="sw-row"):
-        html.Label("Rhythm: on/off in ms, such as 100/50, 40/110; empty is none",
-                   raw_attrs=['for="pulses-field"'])  # fmt: skip
-        v3.VTextField(
-            model_value=("pulses",), update_modelValue=(setter(session, "pulses"), "[$event]"),
-            error=("!!errors.pulses",), density="compact", hide_details=True, variant="outlined",
-            id="pulses-field", style="grid-column: 1 / 3",
-            raw_attrs=['aria-describedby="pulses-error"'],
-        )  # fmt: skip
-        _error("pulses")
+    text(session, "pulses", "Rhythm: on/off in ms, such as 100/50, 40/110; empty is none")
     HtmlElement(
         "svg", v_if="pulses", classes="sw-timeline", children=[
             '<polyline :points="timeline" fill="none" stroke="currentColor" stroke-width="1.5" '

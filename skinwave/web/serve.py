@@ -20,14 +20,14 @@ STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None) -> Any:
     """A session with its page; the address's values, if it has any, before the scene's."""
     from skinwave.scene_file import loads
-    from skinwave.web import controls, model
+    from skinwave.web import controls, scenes
     from skinwave.web.layout import lay_out
     from skinwave.web.session import Session
 
     start, own = None, None
     if scene:
         read = loads(scene)
-        start = model.values_of(read)
+        start = scenes.values_of(read)
         own = read.body if start["body"] == controls.OWN_BODY else None
     given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
     refused: tuple[str, ...] = ()

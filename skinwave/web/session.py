@@ -9,15 +9,16 @@ from collections.abc import Callable
 from typing import Any
 
 from skinwave.scene import Body
-from skinwave.scene_file import dumps, loads
-from skinwave.web import controls, model, plots
-from skinwave.web.controls import CHOICES, KEYS, NUMBERS, OWN_BODY, STARTS, Values
+from skinwave.scene_file import loads
+from skinwave.web import controls, model, scenes, shown
+from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, STARTS, Values
+from skinwave.web.downloads import offered
 from skinwave.web.history import History
 from skinwave.web.model import Answer
 from skinwave.web.worker import Worker
 
-PLOTTED = ("span", "dark", "highest")
-HIGHEST = (300, 600, 1000)  # Hz of the spectrum
+PLOTTED = ("span", "highest")
+SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
 LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 
 
@@ -36,14 +37,17 @@ class Session:
         self._good = dict(values or STARTS)
         self._zoom: tuple[float, float] | None = None
         self._loop: Any = None
-        self.state.update({**STARTS, **(values or {}), **_first(own)})
+        self.state.update({**STARTS, **(values or {}), **shown.first(own)})
         self.state.change(*KEYS)(self.on_control)
         self.state.change("hold")(self.on_hold)
         self.state.change(*PLOTTED)(self.on_look)
-        self.state.change("phase")(self.draw_foci)
+        self.state.change("phase")(self.on_phase)
+        self.state.change("solid")(self.on_solid)
         self.state.change("opened")(self.on_file)
-        for name in ("scene_toml", "waveform_csv", "waveform_wav", "figure", "select", "restart"):
+        for name in ("select", "restart", "zoom"):
             server.trigger(name)(getattr(self, name))
+        for name, made in offered(self).items():
+            server.trigger(name)(made)
         self.refresh()
 
     @property
@@ -60,25 +64,29 @@ class Session:
             self.turn({key: self.state[key] for key in moved})
 
     def turn(self, given: Values) -> None:
-        """Set controls; what is refused is marked at its field and stays as it was."""
-        errors, accepted = dict(self.state.errors), {}
+        """Set controls; what is refused is marked at its field, which keeps what was typed, for it
+        may be half of a number.
+        """
+        errors, typed, accepted = dict(self.state.errors), dict(self.state.typed), {}
         for key, value in given.items():
             try:
                 accepted[key] = controls.checked(key, value)
                 errors.pop(key, None)
+                typed.pop(key, None)
             except ValueError as error:
-                errors[key] = str(error)
+                errors[key], typed[key] = str(error), str(value)
         values = self._good | accepted
         if self.state.hold and (moved := [k for k in ("shape", "size", "speed") if k in accepted]):
             try:
-                values |= model.held(values, moved[-1], self.state.held_frequency)
+                values |= scenes.held(values, moved[-1], self.state.held_frequency)
                 errors.pop("hold", None)
             except ValueError as error:
                 errors["hold"] = f"the drawing frequency cannot be held: {error}"
-        self.state.errors = errors
+        self.state.update({"errors": errors, "typed": typed})
         self._set(values)
         self.history.push(values)
-        self.refresh()
+        if accepted:
+            self.refresh()
 
     def select(self, x: float, y: float) -> None:
         """Select the point of the area at x and y in mm."""
@@ -107,7 +115,7 @@ class Session:
     def pin(self) -> None:
         """Keep what is shown, to compare with; or let go of what was kept."""
         self.pinned = (
-            () if self.pinned else tuple(a for a in (self.kernel, self._current_waves()) if a)
+            () if self.pinned else tuple(a for a in (self.kernel, self.current_waves) if a)
         )
         if self.pinned:
             self.state.pinned_query = controls.to_query(self.values)
@@ -117,7 +125,7 @@ class Session:
     def take_pinned(self) -> None:
         """Go to what is pinned, and pin what was shown instead."""
         back, kept = self.state.pinned_query, controls.to_query(self.values)
-        self.pinned = tuple(a for a in (self.kernel, self._current_waves()) if a)
+        self.pinned = tuple(a for a in (self.kernel, self.current_waves) if a)
         self.state.pinned_query = kept
         self._take(controls.from_query(back)[0])
 
@@ -128,16 +136,15 @@ class Session:
         self.state.update({"busy": "", "body": "none"})
         self.turn({"body": "none"})
 
-    def zoom(self, event: dict[str, Any] | None) -> None:
-        """The commanded Tacton between other times, which its plot was zoomed to."""
-        event = event or {}
-        if "xaxis.range[0]" in event:
-            self._zoom = (event["xaxis.range[0]"] / 1e3, event["xaxis.range[1]"] / 1e3)
-        elif "xaxis.autorange" in event:
+    def zoom(self, start: float | None = None, end: float | None = None) -> None:
+        """The commanded Tacton between two times in ms; without any, as it was."""
+        if start is None or end is None:
             self._zoom = None
         else:
-            return
-        self._draw_commanded()
+            last = self.scene.tacton.duration
+            start = min(max(0.0, start / 1e3), last - SHORTEST)
+            self._zoom = (start, min(max(end / 1e3, start + SHORTEST), last))
+        shown.commanded(self.state, self.scene, self._zoom)
 
     def on_hold(self, hold: bool, **_: Any) -> None:
         """From now on the drawing frequency stays as it is."""
@@ -146,10 +153,19 @@ class Session:
         elif not hold:
             self.state.errors = {k: v for k, v in self.state.errors.items() if k != "hold"}
 
+    def on_phase(self, **_: Any) -> None:
+        """The foci are to be seen elsewhere on their path."""
+        shown.foci(self.state, self.scene)
+
     def on_look(self, **_: Any) -> None:
         """Something else is to be seen of the same answer."""
         self._zoom = None
         self.draw()
+
+    def on_solid(self, solid: bool, **_: Any) -> None:
+        """The body is to be seen moving: only then is its motion computed."""
+        if solid and self.waves is not None and self.waves.moving is None:
+            self._ask()
 
     def on_file(self, opened: Any = None, **_: Any) -> None:
         """A scene file was chosen on the page."""
@@ -165,7 +181,7 @@ class Session:
         """Take the scene of a TOML text; say why if it cannot be."""
         try:
             scene = loads(text)
-            values = model.values_of(scene)
+            values = scenes.values_of(scene)
             if scene.body.file:
                 raise ValueError("a body from a file cannot be opened in a page; name the scene "
                                  "on the command line")  # fmt: skip
@@ -173,42 +189,15 @@ class Session:
             self.state.problem = f"the scene cannot be opened: {error}"
             return
         self.own = scene.body if values["body"] == OWN_BODY else self.own
-        self.state.bodies = _bodies(self.own)
+        self.state.bodies = shown.bodies(self.own)
         self.turn(values)
-
-    # What a page is given to keep
-
-    def scene_toml(self) -> bytes:
-        """The scene as a file."""
-        return dumps(self.scene).encode()
-
-    def waveform_csv(self) -> bytes:
-        """The waveform at the point as CSV: of waves where a body is answered, and the kernel's."""
-        from skinwave.web.downloads import csv_of
-
-        return csv_of([a for a in (self.kernel, self._current_waves()) if a])
-
-    def waveform_wav(self) -> bytes:
-        """The same as sound, of waves if there are any."""
-        from skinwave.web.downloads import wav_of
-
-        answer = self._current_waves() or self.kernel
-        assert answer is not None
-        return wav_of(answer)
-
-    def figure(self, kind: str) -> bytes:
-        """Maps, waveform and spectrum as one figure, "svg" or "png"."""
-        from skinwave.web.downloads import figure_of
-
-        assert self.kernel is not None
-        return figure_of(self.scene, self.kernel, self._current_waves(), kind)
 
     # What follows from a move
 
     def refresh(self) -> None:
         """Answer the controls: the point kernel at once, a body when its process has."""
         try:
-            self.scene = model.scene_of(self._good, self.own)
+            self.scene = scenes.scene_of(self._good, self.own)
             self.kernel = model.kernel(self.scene)
         except ValueError as error:
             self.state.update({"problem": str(error), "stale": True})
@@ -226,8 +215,8 @@ class Session:
             "busy": (self.state.busy or ("" if self.waves else "starting")) if waiting else "",
         })  # fmt: skip
         self.draw()
-        if waiting and self._loop:
-            self.worker.ask(self._number, self.scene)
+        if waiting:
+            self._ask()
 
     def told(self, what: str, number: int, content: Any) -> None:
         """The process that answers with a body has something to tell."""
@@ -243,51 +232,24 @@ class Session:
             self.waves = content
             self.state.update({"busy": "", "waves_stale": False})
             self.draw()
+            self.on_solid(self.state.solid)  # which may have been asked for in the meantime
 
     def draw(self) -> None:
         """All that is seen, from the answers there are."""
-        if self.kernel is None:
-            return
-        dark, stale = bool(self.state.dark), bool(self.state.waves_stale)
-        tacton, pressure = self.scene.tacton, self.scene.pressure
-        path, outline = tacton.trajectory, tacton.trajectory.outline
-        shown = plots.span_of(self.state.span, tacton.duration)
-        given = (self.kernel, self.waves, self.pinned)
-        self._draw_commanded()
-        self.draw_foci()
-        self.state.update({
-            "waveform_plot": plots.waveform_plot(*given, shown, dark, stale=stale),
-            "spectrum_plot": plots.spectrum_plot(
-                *given, dark, stale=stale, highest=self.state.highest
-            ),
-            "path": plots.drawn([outline]) if not path.is_static else "",
-            "influenced": plots.drawn(model.influenced(path, pressure.height)),
-            "kernel_map": _map_state(self.kernel), "wave_map": _map_state(self.waves),
-            "timeline": plots.timeline(tacton),
-            "rows": plots.rows(self.kernel, None if stale else self.waves),
-        })  # fmt: skip
+        if self.kernel is not None:
+            shown.commanded(self.state, self.scene, self._zoom)
+            shown.foci(self.state, self.scene)
+            shown.answers(self.state, self.scene, self.kernel, self.waves, self.pinned)
 
-    def draw_foci(self, **_: Any) -> None:
-        """The foci where they are at the chosen part of a drawing period."""
-        tacton = self.scene.tacton
-        ahead = [(self.state.phase / 100 + phase) % 1 for phase in tacton.foci]
-        at = tacton.trajectory.at_phase(ahead)
-        self.state.foci_at = [[round(1e3 * float(x), 2), round(-1e3 * float(y), 2)] for x, y in at]
-
-    def _draw_commanded(self) -> None:
-        tacton = self.scene.tacton
-        between = self._zoom or plots.span_of(self.state.span, tacton.duration)
-        plot = plots.commanded_plot(tacton, *between, bool(self.state.dark))
-        plot["layout"]["uirevision"] = self.state.span
-        self.state.commanded_plot = plot
-
-    def _current_waves(self) -> Answer | None:
+    @property
+    def current_waves(self) -> Answer | None:
+        """The body's answer, if it is that of the controls."""
         return None if self.state.waves_stale else self.waves
 
     def _take(self, values: Values | None) -> None:
         if values is not None:
             self._set(values)
-            self.state.errors = {}
+            self.state.update({"errors": {}, "typed": {}})
             self.refresh()
 
     def _set(self, values: Values) -> None:
@@ -309,43 +271,13 @@ class Session:
         """From now on tell a page, served by this loop, what the other process tells."""
         self._loop = loop
         if self.scene and self.scene.body.kind != "none":
-            self.worker.ask(self._number, self.scene)
+            self._ask()
+
+    def _ask(self) -> None:
+        if self._loop:
+            self.worker.ask(self._number, self.scene, bool(self.state.solid))
 
 
 def setter(session: Session, key: str) -> Callable[[Any], None]:
     """What a field of a control calls with what was typed."""
     return lambda given: session.turn({key: given})
-
-
-def _bodies(own: Body | None) -> list[str]:
-    return [name for name in CHOICES["body"] if name != OWN_BODY or own]
-
-
-def _first(own: Body | None) -> dict[str, Any]:
-    """The state beside the controls before anything was answered."""
-    return {
-        "errors": {}, "problem": "", "stale": False, "waves_stale": False, "busy": "", "done": 0,
-        "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0, "phase": 0,
-        "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False,
-        "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
-        "about": False, "drawer": None, "opened": None, "bodies": _bodies(own),
-        "path": "", "influenced": "", "timeline": "", "foci_at": [], "rows": [],
-        "kernel_map": _map_state(None), "wave_map": _map_state(None),
-    }  # fmt: skip
-
-
-def _map_state(answer: Answer | None) -> dict[str, Any]:
-    if answer is None:
-        return {"picture": "", "felt": "", "largest": ""}
-    found, unit = answer.map, answer.response.unit
-    return {
-        "picture": plots.picture(found),
-        "felt": plots.drawn(found.felt),
-        "largest": plots.shown_value(float(_largest(found)), unit),
-    }
-
-
-def _largest(found: model.Map) -> Any:
-    import numpy as np
-
-    return np.nanmax(found.rms, initial=0.0)

@@ -16,11 +16,12 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft, sparse
 from scipy.interpolate import CubicSpline
 
 import fem
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints, TetMesh
 from simple_model import Effort, MovingPressure, Response, sensation_level
 from simple_model.flat_body import point_response
 from simple_model.focus import spot_width
@@ -38,6 +39,7 @@ from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
 from skinwave.scene import Body, Scene
 from skinwave.web.model import SIDE, Answer, Map, answer_of, borderline, places
+from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
@@ -47,10 +49,11 @@ FINER = 4  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
 TOLERANCE = 0.02  # of a reduction
+NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 BAND = 1000.0  # Hz
 # Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
-KEPT = 6  # reductions, tables and meshes each
+KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +68,8 @@ class Table:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reduced:
     """A body reduced to the pressure along one path: reduced forces `load` (k, r) of the surface
-    `points` (k, 3), and displacement `read` (q, r) of the places `within` (SIDE^2,) the area.
+    `points` (k, 3), displacement `read` (q, r) of the places `within` (SIDE^2,) the area, and
+    displacement `rows` (n, 3, r) of the `nodes` (n,) of its mesh that are seen as `shape`.
     """
 
     poles: fem.Poles
@@ -75,7 +79,10 @@ class Reduced:
     points: Floats
     read: Floats
     within: Floats
-    probe: Callable[[Floats], Floats]
+    mesh: TetMesh
+    shape: Shape
+    nodes: Ints
+    rows: NDArray[np.float32]
     effort: Effort
 
 
@@ -85,21 +92,23 @@ class Waves:
     def __init__(self) -> None:
         self._kept: dict[str, dict[Any, Any]] = {"table": {}, "body": {}, "reduced": {}}
 
-    def __call__(self, scene: Scene, progress: Progress) -> Answer:
-        """The answer to a scene of one probe; raises what `simulate` does."""
+    def __call__(self, scene: Scene, progress: Progress, moving: bool = False) -> Answer:
+        """The answer to a scene of one probe, with the motion of the whole body if `moving`;
+        raises what `simulate` does.
+        """
         if is_exact(scene.body):
             flat = (scene.body, scene.pressure.height)
-            return flat_answer(self._keep("table", flat, lambda: tabulate(*flat, progress)), scene)
+            table = self._keep("table", flat, lambda: tabulate(*flat, progress))
+            return flat_answer(table, scene, moving)
         path = scene.tacton.trajectory
         still = path if path.is_static else replace(path, speed=1.0)  # the same places
         key = (scene.body, still, scene.pressure.height)
-        return reduced_answer(
-            self._keep("reduced", key, lambda: self._reduce(scene, progress)), scene
-        )
+        body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
+        return reduced_answer(body, scene, moving)
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
         made, ops = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
-        return reduced(made, ops, scene.pressure, progress)
+        return reduced(made, ops, scene.body, scene.pressure, progress)
 
     def _keep(self, kind: str, key: Any, make: Callable[[], Any]) -> Any:
         kept = self._kept[kind]
@@ -127,7 +136,7 @@ def tabulate(body: Body, height: float, progress: Progress) -> Table:
     return Table(frequencies=frequencies, distances=distances, g=g)
 
 
-def flat_answer(table: Table, scene: Scene) -> Answer:
+def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     """Motion from rest of a scene's probe, and RMS motion of the area."""
     pressure, times = scene.pressure, sample_times(scene)
     response = Response(
@@ -141,7 +150,13 @@ def flat_answer(table: Table, scene: Scene) -> Answer:
     of_lines = CubicSpline(table.frequencies, table.g, axis=0)(f)
     of_lines = CubicSpline(table.distances, of_lines, axis=1)(fine).astype(np.complex64)
     motion = np.array([g[index] @ weights for g, weights in zip(of_lines, w, strict=True)])
-    return answer_of(scene, response, motion_map(f, motion))
+    seen = None
+    if moving:
+        shape = slab_shape(scene.body, places())
+        upwards = np.zeros((len(f), len(shape.points)), np.complex128)
+        upwards[:, : SIDE**2] = -motion
+        seen = moving_of(shape, pressure, f, upwards)
+    return answer_of(scene, response, motion_map(f, motion), seen)
 
 
 def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Floats) -> Floats:
@@ -206,11 +221,15 @@ def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     return made, operators(made)
 
 
-def reduced(made: Any, ops: Any, pressure: MovingPressure, progress: Progress) -> Reduced:
+def reduced(
+    made: Any, ops: Any, body: Body, pressure: MovingPressure, progress: Progress
+) -> Reduced:
     """A meshed and assembled body, reduced to a pressure's path."""
     progress("factorise", 0.0)
     P, points = surface_load(made)
     spots = pressure.spot(points, path_knots(pressure))
+    near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
+    P, points, spots = P[:, near], points[near], spots[:, near]
     seeds = fem.load_subspace(P @ spots.T, TOLERANCE / 5)
     model = fem.reduce(
         ops, sparse.csr_array(seeds.T), BAND, TOLERANCE,
@@ -220,12 +239,13 @@ def reduced(made: Any, ops: Any, pressure: MovingPressure, progress: Progress) -
     inwards = (1 - 1e-6) * places()  # a body may end where the area does
     within = _on(made.mesh, inwards)
     read = fem.probe_operator(made.mesh, inwards[within]) @ model.basis
-    basis, mesh = model.basis, made.mesh
+    shape, nodes = skin_of(made, body)
     return Reduced(
         poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=(model.C, model.R),
         branches=model.branches,
-        load=P.T @ basis, points=points, read=read, within=within,
-        probe=lambda at: fem.probe_operator(mesh, at) @ basis,
+        load=P.T @ model.basis, points=points, read=read, within=within, mesh=made.mesh,
+        shape=shape, nodes=nodes,
+        rows=model.basis.reshape(-1, 3, len(model.K))[nodes].astype(np.float32),
         effort=Effort(
             dofs=len(ops.free), reduced_dofs=len(model.K), solver=model.solver,
             estimate=model.estimate,
@@ -246,13 +266,20 @@ def _on(mesh: Any, points: Floats) -> Any:
     return np.concatenate(found)
 
 
-def reduced_answer(body: Reduced, scene: Scene) -> Answer:
+def _probe(body: Reduced, at: Floats) -> Floats:
+    """Displacement (p, r) of points (p, 2) of the top into the body."""
+    dofs = (3 * body.nodes[:, None] + np.arange(3)).ravel()
+    rows = body.rows.reshape(len(dofs), -1)
+    return np.asarray(fem.probe_operator(body.mesh, at)[:, dofs] @ rows)
+
+
+def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
     """Motion from rest of a scene's probe, and RMS motion of the area."""
     times = sample_times(scene)
     frequencies, forces = reduced_lines(scene.pressure, body.points, body.load)
     motion, start = fem.line_response(body.poles, forces, frequencies)
     energy_balance(fem.mean_power(*body.damping, forces, motion, frequencies, body.branches))
-    probe = body.probe(scene.probe_points)
+    probe = _probe(body, scene.probe_points)
     rates = np.concatenate([2j * np.pi * frequencies, body.poles.values])
     displacement = fem.exponential_sum(rates, np.vstack([motion @ probe.T, start @ probe.T]), times)
     response = Response(
@@ -265,4 +292,8 @@ def reduced_answer(body: Reduced, scene: Scene) -> Answer:
     heard = (frequencies > 1e-6) & (frequencies <= BAND)
     area = np.full((int(heard.sum()), SIDE**2), np.nan, np.complex128)
     area[:, body.within] = motion[heard] @ body.read.T
-    return answer_of(scene, response, motion_map(frequencies[heard], area))
+    seen = None
+    if moving:
+        upwards = motion[heard] @ body.rows[:, 2].T
+        seen = moving_of(body.shape, scene.pressure, frequencies[heard], upwards)
+    return answer_of(scene, response, motion_map(frequencies[heard], area), seen)

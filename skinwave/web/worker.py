@@ -3,6 +3,7 @@
 import contextlib
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -13,26 +14,52 @@ LEAST_STEP = 0.02  # of progress that is told
 
 
 def answer_forever(pipe: Connection) -> None:
-    """Answer questions (number, scene) until the other end is closed.
+    """Answer questions (number, scene, moving) until the other end is closed.
 
     Tells ("progress", number, (phase, fraction)), then ("answer", number, Answer) or
     ("failed", number, sentence).
     """
     from skinwave.web.waves import Waves
 
+    _end_with_parent()
     with contextlib.suppress(AttributeError, OSError):
         os.nice(5)  # the page comes first
     waves = Waves()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
-            number, scene = pipe.recv()
+            number, scene, moving = pipe.recv()
             try:
-                found = waves(scene, _teller(pipe, number))
+                found = waves(scene, _teller(pipe, number), moving)
             except (ValueError, ArithmeticError, MemoryError) as error:
                 said = " ".join(str(error).split()) or "not enough memory for this body"
                 pipe.send(("failed", number, said))
             else:
                 pipe.send(("answer", number, found))
+
+
+def _end_with_parent() -> None:
+    """In a group of its own, which ends as soon as the page's process does: a mesher that this
+    process waits for ends, too.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        os.setsid()
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            _end_group(os.getpid())
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def _end_group(process: int) -> None:
+    """End a process and all that it has started."""
+    with contextlib.suppress(OSError):
+        if hasattr(os, "killpg") and os.getpgid(process) == process:
+            os.killpg(process, signal.SIGKILL)
+        else:
+            os.kill(process, getattr(signal, "SIGKILL", signal.SIGTERM))
 
 
 def _teller(pipe: Connection, number: int) -> Callable[[str, float], None]:
@@ -59,16 +86,18 @@ class Worker:
         self._pipe: Any = None
         self._lock = threading.Lock()
         self._at: int | None = None
-        self._waiting: tuple[int, Any] | None = None
+        self._waiting: tuple[int, Any, bool] | None = None
 
-    def ask(self, number: int, scene: Any) -> None:
-        """Ask for a scene's answer; an older question that still waits is forgotten."""
+    def ask(self, number: int, scene: Any, moving: bool = False) -> None:
+        """Ask for a scene's answer, with the motion of the whole body if `moving`; an older
+        question that still waits is forgotten.
+        """
         with self._lock:
             if self._at is not None:
-                self._waiting = (number, scene)
+                self._waiting = (number, scene, moving)
                 return
             self._start()
-            self._send(number, scene)
+            self._send(number, scene, moving)
 
     def cancel(self) -> None:
         """Forget all questions, and end the process if it is at one."""
@@ -94,13 +123,13 @@ class Worker:
         other.close()
         threading.Thread(target=self._listen, args=(self._pipe,), daemon=True).start()
 
-    def _send(self, number: int, scene: Any) -> None:
+    def _send(self, number: int, scene: Any, moving: bool) -> None:
         self._at = number
-        self._pipe.send((number, scene))
+        self._pipe.send((number, scene, moving))
 
     def _end(self) -> None:
         if self._process is not None:
-            self._process.kill()
+            _end_group(self._process.pid)
             self._process.join(5)
         self._process = self._pipe = None
 

@@ -11,6 +11,12 @@ window.trame.utils.skinwave = {
     return [at.x, -at.y];
   },
   prefersDark: () => window.matchMedia("(prefers-color-scheme: dark)").matches,
+  // Curves and address follow the state by themselves: nothing else of the page has to for them.
+  begin(state, plots) {
+    this.unwatch?.();
+    this.unwatch = state.watch(["query"], (query) => query !== undefined && this.address(query));
+    window.trame.utils.plots.begin(state, plots);
+  },
 };
 document.title = "skinwave";
 document.addEventListener("keydown", (event) => {

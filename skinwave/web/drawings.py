@@ -1,0 +1,87 @@
+"""What a page draws beside curves: maps as small pictures, paths in mm, and the table of lines."""
+
+import base64
+from collections.abc import Sequence
+from functools import cache
+from io import BytesIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshes.tetmesh import Floats
+from simple_model import Tacton
+from simple_model.tacton import level
+from skinwave.web.model import Answer, Map
+
+
+def picture(found: Map) -> str:
+    """RMS of a map as the address of a PNG, from dark (none) to light (its largest)."""
+    from PIL import Image
+
+    largest = float(np.nanmax(found.rms, initial=0.0)) or 1.0
+    relative = np.nan_to_num(found.rms / largest)
+    image = np.dstack([_shades()[np.round(255 * relative).astype(int)],
+                       np.where(np.isnan(found.rms), 0, 255)])  # fmt: skip
+    buffer = BytesIO()
+    Image.fromarray(image[::-1].astype(np.uint8)).save(buffer, format="png")
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def drawn(lines: Sequence[Floats]) -> str:
+    """Lines (k, 2) in metre as a path of an SVG in mm, y upwards; at most 200 points of each."""
+    lines = [line[:: max(1, len(line) // 200)] for line in lines]
+    return "".join(
+        "M" + "L".join(f"{1e3 * x:.2f},{-1e3 * y:.2f}" for x, y in line) for line in lines
+    )
+
+
+def timeline(tacton: Tacton) -> str:
+    """The level of a rhythm over a Tacton as points of a line, 100 wide and 26 high."""
+    if tacton.rhythm is None:
+        return ""
+    t = np.linspace(0, tacton.duration, 800)
+    high = np.broadcast_to(level(tacton, t), t.shape)
+    return " ".join(
+        f"{100 * x / tacton.duration:.2f},{24 - 22 * y:.2f}" for x, y in zip(t, high, strict=True)
+    )
+
+
+def shown_value(value: float, unit: str) -> str:
+    """A value as a text with its unit, Pa or m in micrometre."""
+    return f"{value:.3g} Pa" if unit == "Pa" else f"{1e6 * value:.3g} µm"
+
+
+def rows(kernel: Answer, waves: Answer | None) -> list[dict[str, str]]:
+    """The named lines as a table: frequency, amplitudes and level above threshold."""
+    by_wave = {line.name: line for line in waves.lines} if waves else {}
+    by_kernel = {line.name: line for line in kernel.lines}
+    names = dict.fromkeys([line.name for line in (waves.lines if waves else ())]
+                          + [line.name for line in kernel.lines])  # fmt: skip
+    found = []
+    for name in list(names)[:12]:
+        line = by_wave.get(name) or by_kernel[name]
+        pa, um = by_kernel.get(name), by_wave.get(name)
+        level = um.sensation if um else None
+        found.append({
+            "name": written(name),
+            "frequency": f"{line.frequency:.1f}",
+            "pressure": f"{pa.amplitude:.3g}" if pa else "",
+            "displacement": f"{1e6 * um.amplitude:.3g}" if um else "",
+            "level": "" if level is None or not np.isfinite(level) else f"{level:+.0f}",
+        })  # fmt: skip
+    return found
+
+
+def written(name: str) -> str:
+    """A line's name with its subscripts, such as 2f_d-f_AM, as HTML."""
+    for tone in ("AM2", "AM", "d", "e", "r"):
+        name = name.replace(f"f_{tone}", f"f<sub>{tone}</sub>")
+    return name
+
+
+@cache
+def _shades() -> NDArray[np.float64]:
+    """Colours (256, 3) from least to most, told apart by every kind of colour vision."""
+    from matplotlib import colormaps
+
+    return np.asarray(np.round(255 * colormaps["cividis"](np.arange(256))[:, :3]))

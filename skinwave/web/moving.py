@@ -1,0 +1,133 @@
+"""A body in three dimensions, moving through one period of the steady state about its mean."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+import fem
+from meshes.tetmesh import Floats, Ints, boundary_facets
+from simple_model import MovingPressure
+from skinwave.models.speeds import period, shown_period
+from skinwave.scene import Body
+
+FEWEST, MOST = 32, 128  # frames of a period
+EACH = 8  # frames of the fastest vibration that is seen
+SEEN = 0.02  # of the largest line: weaker ones need no frames of their own
+DRAWN = 0.06  # of the width: how far the largest motion is drawn
+FOCUS_ROOM = 5.0  # mm about a focus in which the surface is looked for
+LIFTED = 0.5  # mm, by which marks are above the surface
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape:
+    """A surface at rest: `points` (n, 3) in metre, z upwards, and `triangles` (k, 3)."""
+
+    points: Floats
+    triangles: Ints
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moving:
+    """A shape and its motion `frames` (t, n) in metre upwards, equally spaced through `period` s.
+
+    `repeats` says whether the load is the same again after it.
+    """
+
+    shape: Shape
+    frames: Floats
+    period: float
+    repeats: bool
+
+
+def slab_shape(body: Body, places: Floats) -> Shape:
+    """A part of a slab whose surface is seen at `places` (side^2, 2) in metre, row after row; after
+    these the lower ends of its sides, which rest.
+    """
+    side = round(len(places) ** 0.5)
+    k = np.arange(side**2).reshape(side, side)
+    a, b, c, d = (x.ravel() for x in (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]))
+    rim = np.concatenate([k[0, :-1], k[:-1, -1], k[-1, :0:-1], k[:0:-1, 0]])
+    after, low = np.roll(rim, -1), side**2 + np.arange(len(rim))
+    depth = min(body.depth, float(np.ptp(places[:, 0])) / 4)  # of a half-space some
+    points = np.column_stack([places, np.zeros(len(places))])
+    triangles = [
+        np.stack([a, b, c], 1), np.stack([a, c, d], 1),
+        np.stack([rim, low, after], 1), np.stack([after, low, np.roll(low, -1)], 1),
+    ]  # fmt: skip
+    return Shape(
+        points=np.vstack([points, points[rim] - [0.0, 0.0, depth]]), triangles=np.vstack(triangles)
+    )
+
+
+def skin_of(made: Any, body: Body) -> tuple[Shape, Ints]:
+    """What is seen of a meshed body, and which nodes (n,) of the mesh its points are: the upper
+    side of a sheet, all around of others, without what only takes waves away.
+    """
+    mesh = made.mesh
+    if body.kind == "sheet":
+        facets = mesh.facets["top"]
+    else:
+        own = slice(None) if made.drag is None else made.drag == 0
+        facets = boundary_facets(mesh.tets[own])
+    flat = facets[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]].reshape(-1, 3)
+    nodes, triangles = np.unique(flat, return_inverse=True)
+    return Shape(points=mesh.points[nodes], triangles=triangles.reshape(-1, 3)), nodes
+
+
+def moving_of(
+    shape: Shape, pressure: MovingPressure, frequencies: Floats, upwards: fem.Complex
+) -> Moving:
+    """The motion of lines (f,) in Hz, of complex amplitudes (f, n) in metre upwards."""
+    span = shown_period(pressure)
+    strength = np.abs(upwards).max(axis=1, initial=0.0)
+    seen = frequencies[strength > SEEN * strength.max(initial=0.0)]
+    count = int(np.clip(ceil(EACH * span * seen.max(initial=0.0)), FEWEST, MOST))
+    t = np.arange(count) * span / count
+    turn = np.exp(2j * np.pi * np.outer(t, frequencies))
+    frames = turn.real @ upwards.real - turn.imag @ upwards.imag
+    return Moving(
+        shape=shape, frames=frames, period=span, repeats=period(pressure) is not None,
+    )  # fmt: skip
+
+
+def sent_shape(moving: Moving) -> dict[str, bytes]:
+    """A shape as a page takes it: float32 in mm, and uint32."""
+    shape = moving.shape
+    return {
+        "points": (1e3 * shape.points).astype("<f4").tobytes(),
+        "triangles": shape.triangles.astype("<u4").tobytes(),
+    }
+
+
+def sent_motion(moving: Moving, pressure: MovingPressure) -> dict[str, Any]:
+    """Motion as a page takes it: int8 of the largest, which is `drawn` mm; times in ms; the path
+    (m, 3) and the foci (t, foci, 3) as float32 in mm on the surface at rest.
+    """
+    points, path = moving.shape.points, pressure.tacton.trajectory
+    largest = float(np.abs(moving.frames).max()) or 1.0
+    drawn = DRAWN * 1e3 * float(np.ptp(points[:, 0]))
+    t = np.arange(len(moving.frames)) * moving.period / len(moving.frames)
+    f_d = path.drawing_frequency
+    at = [path.at_phase((f_d * t + phase) % 1) for phase in pressure.tacton.foci]
+    line = path.at_phase(np.linspace(0, 1, 121)) if f_d else np.zeros((0, 2))
+    return {
+        "frames": np.rint(127 / largest * moving.frames).astype(np.int8).tobytes(),
+        "count": len(t), "period": 1e3 * moving.period, "drawn": drawn,
+        "path": _on(points, line).tobytes(),
+        "foci": _on(points, np.stack(at, axis=1).reshape(-1, 2)).tobytes(),
+        "largest": f"{1e6 * largest:.3g} µm", "times": f"{drawn / (1e3 * largest):,.0f}",
+        "repeats": moving.repeats,
+    }  # fmt: skip
+
+
+def _on(points: Floats, places: Floats) -> Any:
+    """Places (q, 2) in metre lifted a little above a surface, (q, 3) in mm."""
+    from scipy.spatial import cKDTree
+
+    if not len(places):
+        return np.zeros((0, 3), "<f4")
+    near = cKDTree(points[:, :2]).query_ball_point(places, FOCUS_ROOM / 1e3)
+    high = [1e3 * points[k, 2].max() if k else 0.0 for k in near]
+    return np.column_stack([1e3 * places, np.array(high) + LIFTED]).astype("<f4")

@@ -1,0 +1,119 @@
+"""Between the values of the controls and a scene, either way."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from simple_model import MovingPressure, Rhythm, Tacton, Trajectory
+from skinwave.scene import BODIES, Body, Scene
+from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, checked, phases_of, pulses_of
+
+
+def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
+    """The scene that controls say, probed at the selected point; `own` is a body from a file.
+
+    Raises
+    ------
+    ValueError
+        If values are out of range together, such as a path beyond the body.
+    """
+    shape = values["shape"]
+    moving = {} if shape == "point" else {"size": values["size"] / 1e3, "speed": values["speed"]}
+    pulses = pulses_of(values["pulses"])
+    foci, phases = int(values["foci"]), phases_of(values["phases"])
+    if phases and len(phases) != foci:
+        raise ValueError(f"{len(phases)} phases of {foci} foci; give one for each, or none")
+    tacton = Tacton(
+        amplitude=values["amplitude"] / 100,
+        am_frequency=values["am"],
+        second_am_frequency=values["am2"],
+        superposition=RATIOS[values["ratio"]],
+        envelope_frequency=values["envelope"],
+        duration=values["duration"],
+        trajectory=Trajectory(shape=shape, **moving),
+        foci=phases or tuple(k / foci for k in range(foci)),
+        sharing=values["sharing"],
+        rhythm=Rhythm(pulses=pulses, ramp=values["ramp"] / 1e3) if pulses else None,
+    )
+    body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
+    pressure = MovingPressure(
+        tacton=tacton,
+        # The published model has the main lobe; exact waves and elements a Gaussian of its width.
+        focus="main_lobe" if body.kind == "none" else "gaussian",
+        drive=values["drive"],
+        height=values["height"] / 1e3,
+    )
+    return Scene(
+        name="skinwave web", pressure=pressure, body=body,
+        probes=((values["x"] / 1e3, values["y"] / 1e3),),
+    )  # fmt: skip
+
+
+def values_of(scene: Scene) -> Values:
+    """The controls' values that give a scene, probed at its first probe.
+
+    Raises
+    ------
+    ValueError
+        If it has what no control says.
+    """
+    tacton, path = scene.tacton, scene.tacton.trajectory
+    known = {body: name for name, body in BODIES.items()}
+    ratio = {weights: name for name, weights in RATIOS.items()}.get(tacton.superposition)
+    even = tuple(k / len(tacton.foci) for k in range(len(tacton.foci)))
+    beyond = {
+        "a path of its own points": path.shape not in ("point", "line", "circle", "triangle",
+                                                       "square"),
+        "a path that is moved or swept one way": any(path.centre)
+        or path.sweep != "there_and_back",
+        "a sampled signal": tacton.signal is not None,
+        "a superposition that is none of the five": ratio is None,
+    }  # fmt: skip
+    if said := [what for what, holds in beyond.items() if holds]:
+        raise ValueError(f"{' and '.join(said)} cannot be turned here; use skinwave run")
+    rhythm, (x, y) = tacton.rhythm, scene.probes[0]
+    pulses = rhythm.pulses if rhythm else ()
+    return STARTS | {
+        "amplitude": 100 * tacton.amplitude,
+        "am": tacton.am_frequency,
+        "am2": tacton.second_am_frequency,
+        "ratio": ratio,
+        "envelope": tacton.envelope_frequency,
+        "duration": tacton.duration,
+        "shape": path.shape,
+        "size": 1e3 * path.size,
+        "speed": path.speed,
+        "height": 1e3 * scene.pressure.height,
+        "drive": scene.pressure.drive,
+        "body": known.get(scene.body, OWN_BODY),
+        "foci": len(tacton.foci),
+        "sharing": tacton.sharing,
+        "phases": ""
+        if np.allclose(sorted(tacton.foci), even)
+        else ", ".join(f"{100 * phase:g}" for phase in tacton.foci),
+        "pulses": ", ".join(f"{1e3 * on:g}/{1e3 * gap:g}" for on, gap in pulses),
+        "ramp": 1e3 * rhythm.ramp if rhythm else 0.0,
+        "x": round(1e3 * x, 6),
+        "y": round(1e3 * y, 6),
+    }
+
+
+def held(values: Mapping[str, Any], moved: str, frequency: float) -> Values:
+    """Size or speed, whichever was not moved, so that the path is drawn `frequency` times a second
+    (in Hz).
+
+    Raises
+    ------
+    ValueError
+        If that is out of the range of its control.
+    """
+    per_size = Trajectory(shape=values["shape"], size=1e-3).length  # metre per mm
+    if not per_size or not frequency:
+        return {}
+    found = (
+        ("speed", frequency * per_size * values["size"])
+        if moved != "speed"
+        else ("size", values["speed"] / (frequency * per_size))
+    )
+    return {found[0]: checked(found[0], round(found[1], 6))}

@@ -1,0 +1,82 @@
+"""From answers to the keys of a page's state that its plots, maps and tables show."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from skinwave.scene import Body, Scene
+from skinwave.web import drawings, model, moving, plots
+from skinwave.web.controls import CHOICES, OWN_BODY
+from skinwave.web.model import Answer
+
+HIGHEST = (300, 600, 1000)  # Hz of the spectrum
+
+
+def bodies(own: Body | None) -> list[str]:
+    """The bodies that can be chosen; `own` is one from a file."""
+    return [name for name in CHOICES["body"] if name != OWN_BODY or own]
+
+
+def first(own: Body | None) -> dict[str, Any]:
+    """The state beside the controls before anything was answered."""
+    return {
+        "errors": {}, "typed": {}, "problem": "", "stale": False, "waves_stale": False,
+        "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
+        "phase": 0,
+        "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
+        "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
+        "about": False, "drawer": None, "opened": None, "bodies": bodies(own),
+        "path": "", "influenced": "", "timeline": "", "foci_at": [], "rows": [],
+        "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
+    }  # fmt: skip
+
+
+def answers(
+    state: Any, scene: Scene, kernel: Answer, waves: Answer | None, pinned: Sequence[Answer]
+) -> None:
+    """Plots, maps and table of answers; waves are of other controls while `waves_stale`."""
+    stale, tacton = bool(state.waves_stale), scene.tacton
+    path, given = tacton.trajectory, (kernel, waves, pinned)
+    span = plots.span_of(state.span, tacton.duration)
+    state.update({
+        "waveform_plot": plots.waveform_plot(*given, span, stale=stale),
+        "spectrum_plot": plots.spectrum_plot(*given, stale=stale, highest=state.highest),
+        "path": "" if path.is_static else drawings.drawn([path.outline]),
+        "influenced": drawings.drawn(model.influenced(path, scene.pressure.height)),
+        "kernel_map": _map(kernel), "wave_map": _map(waves),
+        "timeline": drawings.timeline(tacton),
+        "rows": drawings.rows(kernel, None if stale else waves),
+    })  # fmt: skip
+    seen = waves.moving if waves else None
+    if seen is not None and not stale:
+        state.update({
+            "body_shape": moving.sent_shape(seen),
+            "body_motion": moving.sent_motion(seen, scene.pressure),
+        })  # fmt: skip
+    elif seen is None and state.body_motion:
+        state.update({"body_shape": {}, "body_motion": {}})
+
+
+def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> None:
+    """The commanded Tacton between two times in s, or in the span that is chosen."""
+    between = zoom or plots.span_of(state.span, scene.tacton.duration)
+    state.commanded_plot = plots.commanded_plot(scene.tacton, *between)
+
+
+def foci(state: Any, scene: Scene) -> None:
+    """The foci where they are at the chosen part of a drawing period."""
+    tacton = scene.tacton
+    at = tacton.trajectory.at_phase([(state.phase / 100 + phase) % 1 for phase in tacton.foci])
+    state.foci_at = [[round(1e3 * float(x), 2), round(-1e3 * float(y), 2)] for x, y in at]
+
+
+def _map(answer: Answer | None) -> dict[str, Any]:
+    if answer is None:
+        return {"picture": "", "felt": "", "largest": ""}
+    found, unit = answer.map, answer.response.unit
+    return {
+        "picture": drawings.picture(found),
+        "felt": drawings.drawn(found.felt),
+        "largest": drawings.shown_value(float(np.nanmax(found.rms, initial=0.0)), unit),
+    }

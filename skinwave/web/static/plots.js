@@ -1,0 +1,281 @@
+// Curves on a canvas: draws what plots.py describes, in a few milliseconds, and lets one zoom in.
+(() => {
+  const EDGE = { left: 56, right: 56, top: 22, bottom: 34 };
+  const FONT = "Roboto, sans-serif";
+  const LEAST_DRAG = 6; // pixels that are no click any more
+  const shown = {}; // by id of the canvas: { canvas, figure, zoom, drag, at }
+
+  // About `count` round numbers between two others.
+  function ticks([low, high], count) {
+    const rough = (high - low) / Math.max(1, count);
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = power * [1, 2, 5, 10].find((s) => s * power >= rough);
+    const found = [];
+    for (let k = Math.ceil(low / step); k * step <= high * (1 + 1e-12); k++) found.push(k * step);
+    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    return found.map((value) => [value, value.toFixed(Math.min(digits, 9))]);
+  }
+
+  // Text with its parts in <sub> lowered; returns its width without drawing if there is no place.
+  function text(g, said, size, place) {
+    let x = 0;
+    for (const [k, part] of said.split(/<\/?sub>/).entries()) {
+      g.font = `${k % 2 ? 0.75 * size : size}px ${FONT}`;
+      if (place) g.fillText(part, place[0] + x, place[1] + (k % 2 ? 0.25 * size : 0));
+      x += g.measureText(part).width;
+    }
+    return x;
+  }
+
+  // From values to pixels of an axis, "y" or "y2" upwards.
+  function scales(plot) {
+    const { figure, canvas } = plot;
+    const w = canvas.clientWidth, h = canvas.clientHeight;
+    const box = { x: EDGE.left, y: EDGE.top, w: w - EDGE.left - EDGE.right,
+                  h: h - EDGE.top - EDGE.bottom };
+    const range = plot.zoom || figure.x.range;
+    const to = { x: (v) => box.x + ((v - range[0]) / (range[1] - range[0])) * box.w };
+    for (const axis of ["y", "y2"]) {
+      if (!figure[axis]) continue;
+      const [low, high] = figure[axis].range;
+      to[axis] = (v) => box.y + box.h - ((v - low) / (high - low)) * box.h;
+    }
+    return { box, range, to, w, h };
+  }
+
+  const xOf = (curve, k) => (curve.x ? curve.x[k] : curve.x0 + k * curve.dx);
+
+  function stroke(g, curve, to) {
+    const y = to[curve.axis];
+    g.beginPath();
+    for (let k = 0; k < curve.y.length; k++) g.lineTo(to.x(xOf(curve, k)), y(curve.y[k]));
+    if (curve.mirrored) { // the area between a curve and its mirror image
+      for (let k = curve.y.length - 1; k >= 0; k--) g.lineTo(to.x(xOf(curve, k)), y(-curve.y[k]));
+      g.globalAlpha = 0.4;
+      g.fill();
+      g.globalAlpha = 1;
+    }
+    g.stroke();
+  }
+
+  function grid(g, { box, range, to }, figure, ink, faint) {
+    g.lineWidth = 1;
+    g.textBaseline = "top";
+    g.textAlign = "center";
+    for (const [value, said] of ticks(range, box.w / 80)) {
+      g.fillStyle = faint;
+      g.fillRect(Math.round(to.x(value)), box.y, 1, box.h);
+      g.fillStyle = ink;
+      g.fillText(said, to.x(value), box.y + box.h + 4);
+    }
+    g.fillText(figure.x.said, box.x + box.w / 2, box.y + box.h + 18);
+    g.textBaseline = "middle";
+    for (const [axis, x, align, turn] of [["y", box.x - 5, "right", 12],
+                                          ["y2", box.x + box.w + 5, "left", -12]]) {
+      if (!figure[axis]) continue;
+      g.textAlign = align;
+      for (const [value, said] of ticks(figure[axis].range, box.h / 32)) {
+        g.fillStyle = faint;
+        if (axis === "y") g.fillRect(box.x, Math.round(to.y(value)), box.w, 1);
+        g.fillStyle = ink;
+        g.fillText(said, x, to[axis](value));
+      }
+      g.save();
+      g.translate(axis === "y" ? turn : box.x + box.w + EDGE.right + turn, box.y + box.h / 2);
+      g.rotate(-Math.PI / 2);
+      g.textAlign = "center";
+      g.fillText(figure[axis].said, 0, 0);
+      g.restore();
+    }
+  }
+
+  // Names of curves on the right of the title or, where there is no room, below it.
+  function legend(g, { box, w }, figure, colours, ink, paper) {
+    g.textAlign = "left";
+    g.textBaseline = "middle";
+    g.fillStyle = ink;
+    g.font = `500 12px ${FONT}`;
+    g.fillText(figure.title, 4, 11);
+    const after = 4 + g.measureText(figure.title).width + 16;
+    if (figure.data.length < 2 && !figure.legend) return;
+    g.font = `11px ${FONT}`;
+    const widths = figure.data.map((curve) => g.measureText(curve.name).width + 34);
+    let x = w - 6 - widths.reduce((a, b) => a + b, 0), y = 11;
+    const below = x < after;
+    if (below) {
+      x = box.x + 4;
+      y = box.y + 10;
+    }
+    for (const [k, curve] of figure.data.entries()) {
+      if (below && x > box.x + 4 && x + widths[k] > w) {
+        x = box.x + 4;
+        y += 16;
+      }
+      g.fillStyle = paper;
+      if (below) g.fillRect(x - 2, y - 8, widths[k], 16);
+      line(g, curve, colours);
+      g.beginPath();
+      g.moveTo(x, y);
+      g.lineTo(x + 20, y);
+      g.stroke();
+      g.globalAlpha = 1;
+      g.fillStyle = ink;
+      g.fillText(curve.name, x + 24, y);
+      g.setLineDash([]);
+      x += widths[k];
+    }
+  }
+
+  function line(g, curve, colours) {
+    g.strokeStyle = g.fillStyle = colours[curve.role];
+    g.lineWidth = 1.4;
+    g.setLineDash({ dash: [6, 4], dot: [1.5, 3] }[curve.dash] || []);
+    g.globalAlpha = curve.opacity ?? 1;
+  }
+
+  // Names over lines of a spectrum, moved down where they would leave the plot.
+  function names(g, { box, range, to }, figure, ink, paper) {
+    for (const { x, y, axis, said } of figure.names || []) {
+      if (x < range[0] || x > range[1]) continue;
+      const widths = said.map((part) => text(g, part, 11)), wide = Math.max(...widths);
+      const left = Math.min(to.x(x) - wide / 2, box.x + box.w - wide);
+      const top = Math.max(box.y + 2, to[axis](y) - 13 * said.length - 4);
+      g.fillStyle = paper;
+      g.fillRect(left - 2, top, wide + 4, 13 * said.length);
+      g.fillStyle = ink;
+      g.textAlign = "left";
+      g.textBaseline = "middle";
+      said.forEach((part, k) => text(g, part, 11, [left + (wide - widths[k]) / 2, top + 7 + 13 * k]));
+    }
+  }
+
+  // The value of each curve where the pointer is.
+  function readout(g, { box, range, to, w }, plot, ink, paper) {
+    const value = range[0] + ((plot.at - box.x) / box.w) * (range[1] - range[0]);
+    const said = plot.figure.data.filter((c) => !c.mirrored).map((curve) => {
+      let low = 0, high = curve.y.length - 1;
+      while (high - low > 1) {
+        const middle = (low + high) >> 1;
+        if (xOf(curve, middle) > value) high = middle; else low = middle;
+      }
+      const k = value - xOf(curve, low) < xOf(curve, high) - value ? low : high;
+      return `${curve.name.split(",")[0]} ${curve.y[k].toPrecision(4)}`;
+    });
+    g.fillStyle = ink;
+    g.fillRect(plot.at, box.y, 1, box.h);
+    const all = `${value.toPrecision(5)}: ${said.join("; ")}`;
+    g.font = `11px ${FONT}`;
+    const wide = g.measureText(all).width, left = Math.max(2, Math.min(plot.at + 6, w - wide - 6));
+    g.fillStyle = paper;
+    g.fillRect(left - 3, box.y + box.h - 18, wide + 6, 16);
+    g.fillStyle = ink;
+    g.textAlign = "left";
+    g.textBaseline = "middle";
+    g.fillText(all, left, box.y + box.h - 10);
+  }
+
+  function draw(plot) {
+    const { canvas, figure } = plot, ratio = window.devicePixelRatio || 1;
+    if (!figure || !canvas.clientWidth) return;
+    const style = getComputedStyle(canvas), own = (name) => style.getPropertyValue(name).trim();
+    const ink = own("--sw-ink"), faint = own("--sw-grid"), paper = own("--sw-paper");
+    const colours = Object.fromEntries(
+      ["kernel", "waves", "pinned", "felt"].map((role) => [role, own(`--sw-${role}`)]));
+    const at = scales(plot), { box } = at, g = canvas.getContext("2d");
+    if (canvas.width !== Math.round(at.w * ratio)) canvas.width = Math.round(at.w * ratio);
+    if (canvas.height !== Math.round(at.h * ratio)) canvas.height = Math.round(at.h * ratio);
+    g.setTransform(ratio, 0, 0, ratio, 0, 0);
+    g.clearRect(0, 0, at.w, at.h);
+    g.font = `11px ${FONT}`;
+    grid(g, at, figure, ink, faint);
+    g.save();
+    g.beginPath();
+    g.rect(box.x, box.y, box.w, box.h);
+    g.clip();
+    for (const curve of figure.data) {
+      line(g, curve, colours);
+      stroke(g, curve, at.to);
+    }
+    g.restore();
+    names(g, at, figure, ink, paper);
+    legend(g, at, figure, colours, ink, paper);
+    if (plot.at !== null && !plot.drag) readout(g, at, plot, ink, paper);
+    if (plot.drag) {
+      g.fillStyle = faint;
+      g.globalAlpha = 0.6;
+      g.fillRect(plot.drag[0], box.y, plot.drag[1] - plot.drag[0], box.h);
+      g.globalAlpha = 1;
+    }
+    canvas.dispatchEvent(new CustomEvent("drawn"));
+  }
+
+  // A figure of which `asks` is true is computed anew where it is zoomed to.
+  function zoomed(plot, range) {
+    if (plot.figure.asks) {
+      window.trame.trigger("zoom", range || []);
+      return;
+    }
+    plot.zoom = range;
+    draw(plot);
+  }
+
+  function nearer(plot, factor, shift) {
+    const [low, high] = plot.zoom || plot.figure.x.range;
+    const middle = (low + high) / 2 + shift * (high - low), half = ((high - low) / 2) * factor;
+    zoomed(plot, [middle - half, middle + half]);
+  }
+
+  function listen(plot) {
+    const { canvas } = plot;
+    const within = (event) => {
+      const { box } = scales(plot);
+      return Math.min(Math.max(event.offsetX, box.x), box.x + box.w);
+    };
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      plot.drag = [within(event), within(event)];
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      plot.at = within(event);
+      if (plot.drag) plot.drag[1] = plot.at;
+      draw(plot);
+    });
+    canvas.addEventListener("pointerup", () => {
+      const { box, range } = scales(plot), drag = plot.drag && [...plot.drag].sort((a, b) => a - b);
+      plot.drag = null;
+      if (drag && drag[1] - drag[0] >= LEAST_DRAG) {
+        const back = (x) => range[0] + ((x - box.x) / box.w) * (range[1] - range[0]);
+        zoomed(plot, drag.map(back));
+      } else draw(plot);
+    });
+    canvas.addEventListener("pointerleave", () => { plot.at = null; draw(plot); });
+    canvas.addEventListener("dblclick", () => zoomed(plot, null));
+    const keys = { "+": [0.5, 0], "-": [2, 0], ArrowLeft: [1, -0.25], ArrowRight: [1, 0.25] };
+    canvas.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || !plot.figure) return;
+      if (keys[event.key]) nearer(plot, ...keys[event.key]);
+      else if (event.key === "Home" || event.key === "0") zoomed(plot, null);
+      else return;
+      event.preventDefault();
+    });
+    new ResizeObserver(() => draw(plot)).observe(canvas);
+  }
+
+  // Begin to draw the figures of these keys of the state, on the canvas of the same name.
+  function begin(state, keys) {
+    for (const key of keys) {
+      const canvas = document.getElementById(key);
+      const plot = (shown[key] = { canvas, figure: null, zoom: null, drag: null, at: null });
+      listen(plot);
+      state.watch([key], (figure) => {
+        if (!figure) return;
+        if (plot.figure?.kept !== figure.kept) plot.zoom = null;
+        plot.figure = figure;
+        draw(plot);
+      });
+    }
+    state.watch(["dark"], () => setTimeout(() => Object.values(shown).forEach(draw), 50));
+  }
+
+  window.trame.utils.plots = { begin, shown };
+})();
