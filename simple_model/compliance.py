@@ -4,16 +4,34 @@ Frequencies w are complex, in rad/s; time goes as exp(+i w t).
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 Complex = NDArray[np.complex128]
-# (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f, 1) in rad/s.
-Compliance = Callable[[Complex, Complex], Complex]
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f, 1) in rad/s.
+
+    At frequencies w (f,) no wave has its wavenumber between the real axis and `clearance`, 1/m,
+    above it.
+    """
+
+    answer: Callable[[Complex, Complex], Complex]
+    clearance: Callable[[Complex], float] = lambda w: inf
+
+    def __call__(self, k: Complex, w: Complex) -> Complex:
+        """G at each k and w."""
+        return self.answer(k, w)
+
 
 AIR_DENSITY = 1.2  # kg/m3
 LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
+BACKWARD = 0.75  # of a layer's second resonance: where some of its waves begin to run backwards
 
 
 def half_space(
@@ -35,7 +53,7 @@ def half_space(
         dynamic = -bp * ks2 / (mu * np.where(still, 1.0, rayleigh))
         return np.where(still, (1 - poisson) / (mu * k), dynamic)
 
-    return compliance
+    return Compliance(compliance)
 
 
 def slab(
@@ -73,7 +91,19 @@ def slab(
         a, b, c, d = np.moveaxis(np.linalg.solve(matrix, load)[..., 0], -1, 0)
         return (p * (a - b * ep) - k * (c + d * es)) / mu
 
-    return compliance
+    def clearance(w: Complex) -> float:
+        """Some waves of a layer run backwards, and their wavenumbers lie above the real axis, by
+        more than a shear wave's decay as they carry energy more slowly (Tolstoy and Usdin, J
+        Acoust Soc Am 29:37 (1957)). They begin below the second thickness resonance.
+        """
+        ks2, kp2 = _squared_wavenumbers(
+            density, complex_modulus(w, shear_modulus, **law), poisson, w
+        )
+        turns = np.maximum(np.sqrt(ks2).real / 3, np.sqrt(kp2).real) * depth / (np.pi / 2)
+        backward = np.sqrt(ks2)[turns > BACKWARD]
+        return float(np.abs(backward.imag).min(initial=inf))
+
+    return Compliance(compliance, clearance)
 
 
 def thin_sheet(
@@ -98,7 +128,7 @@ def thin_sheet(
         inertia = (mass_per_area + 2 * air_density / k) * w**2
         return np.where(w == 0, 0, 1 / (bending * k**4 - inertia))
 
-    return compliance
+    return Compliance(compliance)
 
 
 def complex_modulus(

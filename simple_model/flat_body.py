@@ -14,8 +14,8 @@ once; with splines B_j(r) that carry g(r, w) = sum_j g_j(w) B_j(r), it moves the
 
     u(w) = sum_j g_j(w) int q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
 
-The path of integration over k runs above
-the real axis, away from the poles of the waves, which lie below it for any loss.
+The path of integration over k runs above the real axis, away from the poles of waves, which lie
+below it for any loss; and below those of waves that run backwards, which lie above it.
 """
 
 import time
@@ -225,7 +225,8 @@ def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: 
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     x = (middle[:, None] + half[:, None] * nodes).ravel()
     dx = (half[:, None] * weights).ravel()
-    lift = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
+    highest = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
+    lift = min(highest, compliance.clearance(w))
     ramp = np.tanh(x / lift)
     k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
     spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)

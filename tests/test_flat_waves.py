@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad_vec
+from scipy.special import j0
 
 from simple_model import MovingPressure, Tacton, Trajectory, flat_body, point_kernel
 from simple_model.compliance import half_space, slab, thin_sheet
@@ -111,3 +113,18 @@ def test_load_lines_add_up_to_the_load():
     waves = lines.coefficients * np.exp(2j * np.pi * lines.frequencies * times[:, None])
     summed = (waves @ spots[:, lines.harmonics].T).real
     np.testing.assert_allclose(summed, point_kernel(load, points, times).displacement, atol=1e-6)
+
+
+@pytest.mark.parametrize(("poisson", "frequency"), [(0.35, 165.0), (0.45, 215.0), (0.4999, 240.0)])
+def test_waves_that_run_backwards_are_on_their_side_of_the_path(poisson, frequency):
+    """A layer that loses little, beside the integral along the real axis itself."""
+    layer = slab(density=1000, shear_modulus=25e3, poisson=poisson, depth=0.015, viscosity=0.5)
+    w, width, r = np.array([2 * np.pi * frequency + 0j]), 4.35e-3, 0.02
+
+    def integrand(k):
+        spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
+        return spot * layer(np.array([k + 0j]), w[:, None])[0, 0] * j0(k * r) * k / 2 / np.pi
+
+    expected, _ = quad_vec(integrand, 0, 6.5 / width, epsrel=1e-7, limit=2000)
+    found = point_response(layer, [0.0, r], w, width)
+    assert found[0, 1] == pytest.approx(expected, rel=1e-4)

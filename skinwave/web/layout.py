@@ -138,7 +138,7 @@ def _maps(session: Session) -> None:
 
 
 def _plots(session: Session) -> None:
-    with html.Div(classes="sw-plots"):
+    with html.Div(classes=("['sw-plots', `sw-of-${body}`]",)):
         for name, said in PLOTS.items():
             with html.Div(classes=("{ 'sw-stale': stale }",)):
                 html.Canvas(id=name, raw_attrs=[
