@@ -1,5 +1,6 @@
 """Scene files: what they default to, what they refuse, and that they come back as written."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ from fem import Material
 from skinwave import BODIES, dumps, loads, read
 from skinwave.studies.paper15 import scenes, tactons
 
-EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
+ROOT = Path(__file__).parent.parent
+EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+SHOWN = re.findall(r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
 
 
 def test_the_paper_has_fifteen_tactons():
@@ -29,6 +32,12 @@ def test_every_preset_comes_back_from_its_file(name):
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_is_a_scene_that_comes_back(path):
     assert loads(dumps(read(path))) == read(path)
+
+
+@pytest.mark.parametrize("text", SHOWN)
+def test_every_scene_that_the_readme_shows_is_one(text):
+    scene = loads(text)
+    assert loads(dumps(scene)) == scene
 
 
 def test_a_material_of_ones_own_comes_back():

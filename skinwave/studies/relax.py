@@ -226,7 +226,7 @@ def sentence(e: Effect) -> str:
     if e.decibel:
         line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
         text += f" and the {line} line by {e.decibel[line]:+.1f} dB"
-    cost = f"costs {e.seconds:.1f} s more" if e.seconds > 0.05 else "costs nothing"
+    cost = f"costs {e.seconds:.1f} s more" if e.seconds > 0.05 else "costs nothing more"
     return f"{text}, and {cost}."
 
 
