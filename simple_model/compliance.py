@@ -31,7 +31,7 @@ class Compliance:
 
 AIR_DENSITY = 1.2  # kg/m3
 LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
-BACKWARD = 0.75  # of a layer's second resonance: where some of its waves begin to run backwards
+BACKWARD = 0.5  # of a layer's second resonance: where some of its waves begin to run backwards
 
 
 def half_space(
@@ -92,16 +92,17 @@ def slab(
         return (p * (a - b * ep) - k * (c + d * es)) / mu
 
     def clearance(w: Complex) -> float:
-        """Some waves of a layer run backwards, and their wavenumbers lie above the real axis, by
-        more than a shear wave's decay as they carry energy more slowly (Tolstoy and Usdin, J
-        Acoust Soc Am 29:37 (1957)). They begin below the second thickness resonance.
+        """Where waves of a layer run backwards, from somewhat below its second resonance, their
+        wavenumbers lie above the real axis by more than a shear wave's decay, as they carry energy
+        more slowly (Tolstoy and Usdin, J Acoust Soc Am 29:37 (1957)). Those that do not run at
+        all lie above 1 / depth.
         """
         ks2, kp2 = _squared_wavenumbers(
             density, complex_modulus(w, shear_modulus, **law), poisson, w
         )
         turns = np.maximum(np.sqrt(ks2).real / 3, np.sqrt(kp2).real) * depth / (np.pi / 2)
-        backward = np.sqrt(ks2)[turns > BACKWARD]
-        return float(np.abs(backward.imag).min(initial=inf))
+        decay = np.abs(np.sqrt(ks2).imag)
+        return float(decay[turns > BACKWARD].min(initial=1 / depth))
 
     return Compliance(compliance, clearance)
 

@@ -43,6 +43,8 @@ PADDING = 2.0  # the transform's period over the duration; what wraps round is d
 WRAPPED = 1e-5
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
+AT_ONCE = 2**19  # pairs of frequency and wavenumber: some hundred megabytes
+UNRESOLVED = "the wavenumber integral does not converge; add some loss"
 CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
@@ -73,11 +75,13 @@ def point_response(
     r = np.atleast_1d(np.asarray(distances, np.float64))
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))
     found = np.zeros((len(w), len(r)), np.complex128)
-    n = FEWEST_NODES
+    n, before = FEWEST_NODES, 0.0
     for start in range(0, len(w), BATCH):
         part = slice(start, start + BATCH)
-        if start % (CHECKED_EACH * BATCH) == 0:
-            n = _enough_nodes(compliance, r, w[part], width, n)
+        lift = _lift(compliance, r, w[part], width)
+        if lift != before or start % (CHECKED_EACH * BATCH) == 0:
+            n = _enough_nodes(compliance, r, w[part], width, n if lift == before else FEWEST_NODES)
+        before = lift
         found[part] = _integrated(compliance, r, w[part], width, n)
         if np.abs(found[part]).max() < negligible * np.abs(found[: part.stop]).max():
             break
@@ -206,6 +210,12 @@ def _check(pressure: MovingPressure) -> None:
         raise ValueError(f"focus '{pressure.focus}' has no flat-body answer; use 'gaussian'")
 
 
+def _lift(compliance: Compliance, r: Floats, w: Complex, width: float) -> float:
+    """How far above the real axis, 1/m, the path of integration runs."""
+    highest = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
+    return min(highest, compliance.clearance(w))
+
+
 def _enough_nodes(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> int:
     """The fewest wavenumbers that twice as many do not improve on."""
     coarse = _integrated(compliance, r, w, width, n)
@@ -214,7 +224,7 @@ def _enough_nodes(compliance: Compliance, r: Floats, w: Complex, width: float, n
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
             return n
         coarse, n = fine, 2 * n
-    raise ArithmeticError("the wavenumber integral does not converge; add some loss")
+    raise ArithmeticError(UNRESOLVED)
 
 
 def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> Complex:
@@ -225,14 +235,16 @@ def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: 
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     x = (middle[:, None] + half[:, None] * nodes).ravel()
     dx = (half[:, None] * weights).ravel()
-    highest = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
-    lift = min(highest, compliance.clearance(w))
+    lift = _lift(compliance, r, w, width)
+    if not lift > 0:
+        raise ArithmeticError(UNRESOLVED)
     ramp = np.tanh(x / lift)
     k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
     spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
     weight = spot * k * dk * dx / (2 * np.pi)
     bessel = jv(0, k[:, None] * r)
-    return (compliance(k, w[:, None]) * weight) @ bessel
+    some = np.array_split(w[:, None], max(1, len(w) * n // AT_ONCE))
+    return np.concatenate([(compliance(k, part) * weight) @ bessel for part in some])
 
 
 def _distances(pressure: MovingPressure, probes: Floats) -> Floats:

@@ -115,10 +115,22 @@ def test_load_lines_add_up_to_the_load():
     np.testing.assert_allclose(summed, point_kernel(load, points, times).displacement, atol=1e-6)
 
 
-@pytest.mark.parametrize(("poisson", "frequency"), [(0.35, 165.0), (0.45, 215.0), (0.4999, 240.0)])
-def test_waves_that_run_backwards_are_on_their_side_of_the_path(poisson, frequency):
-    """A layer that loses little, beside the integral along the real axis itself."""
-    layer = slab(density=1000, shear_modulus=25e3, poisson=poisson, depth=0.015, viscosity=0.5)
+@pytest.mark.parametrize(
+    ("poisson", "depth", "viscosity", "frequency"),
+    [
+        (0.35, 0.015, 0.5, 165.0),  # runs backwards
+        (0.45, 0.015, 0.5, 215.0),
+        (0.4999, 0.015, 0.5, 240.0),
+        (0.4999, 0.030, 5.0, 85.0),  # is about to
+        (0.4999, 0.040, 5.0, 60.0),
+        (0.30, 0.100, 1.0, 14.0),
+    ],
+)
+def test_every_wave_of_a_layer_is_on_its_side_of_the_path(poisson, depth, viscosity, frequency):
+    """Beside the integral along the real axis itself."""
+    layer = slab(
+        density=1000, shear_modulus=25e3, poisson=poisson, depth=depth, viscosity=viscosity
+    )
     w, width, r = np.array([2 * np.pi * frequency + 0j]), 4.35e-3, 0.02
 
     def integrand(k):
@@ -128,3 +140,9 @@ def test_waves_that_run_backwards_are_on_their_side_of_the_path(poisson, frequen
     expected, _ = quad_vec(integrand, 0, 6.5 / width, epsrel=1e-7, limit=2000)
     found = point_response(layer, [0.0, r], w, width)
     assert found[0, 1] == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_layer_that_loses_nothing_has_no_steady_state():
+    layer = slab(density=1000, shear_modulus=25e3, poisson=0.49, depth=0.015)
+    with pytest.raises(ArithmeticError, match="add some loss"):
+        point_response(layer, [0.0], [2 * np.pi * 200.0], 4.35e-3)
