@@ -9,6 +9,7 @@ import pytest
 
 import fem
 import skinwave
+from fem import Material
 from simple_model import MovingPressure, Tacton, Trajectory, lines, point_kernel
 from skinwave.cli import main
 from skinwave.scene import BODIES, Body, Layer
@@ -116,6 +117,30 @@ def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
         back = as_viscous(relaxing, w)
         assert (back.relaxing_modulus, back.viscosity) == (0, pytest.approx(viscous.viscosity))
         assert back.shear_modulus == pytest.approx(viscous.shear_modulus)
+
+
+@pytest.mark.parametrize("material", ["palm", "palm-zener"])
+def test_little_loss_is_a_tenth_of_it_and_as_stiff(material):
+    own = replace(SKIN, body=replace(SKIN.body, material=material))
+    w = 2 * np.pi * strongest_line(own)
+    little, all_of_it = (
+        relaxed(own, ("no propagation", *dropped))[0].body.solid.complex_modulus(w)
+        for dropped in ((), ("little loss",))
+    )
+    assert little.real == pytest.approx(all_of_it.real, rel=1e-9)
+    assert little.imag == pytest.approx(0.1 * all_of_it.imag, rel=1e-9)
+    assert all_of_it == pytest.approx(own.body.solid.complex_modulus(w), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", [as_relaxing, as_viscous])
+def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
+    both = Material(
+        density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=0.2,
+        **({"viscosity": 5.0} if law is as_relaxing else
+           {"relaxing_modulus": 1e4, "relaxation_time": 5e-4}),
+    )  # fmt: skip
+    w = 2 * np.pi * 140
+    assert law(both, w).complex_modulus(w) == pytest.approx(both.complex_modulus(w), rel=1e-9)
 
 
 def test_the_law_of_loss_is_one_rung():

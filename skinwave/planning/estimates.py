@@ -77,7 +77,9 @@ def waves_returned(
         for sign in (-1, 1)
     ]
     distances = np.linalg.norm(probes[:, None] - np.array(foci)[:, None], axis=-1)  # (5, p, k)
-    if distances[1:].min() > 1.5 * body.solid.shear_speed * scene.tacton.duration:
+    stiffest = 1 + body.solid.relaxing_modulus / body.solid.shear_modulus
+    fastest = body.solid.shear_speed * stiffest**0.5
+    if distances[1:].min() > 1.5 * fastest * scene.tacton.duration:
         return 0.0
     lines = load_lines(replace(scene.pressure, focus="gaussian"), 1e-2)
     kept = lines.frequencies <= max(highest, 1.0)

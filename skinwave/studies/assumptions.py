@@ -165,18 +165,12 @@ def check_rate(update_rate: float) -> None:
 
 def _body(scene: Scene, dropped: Collection[str]) -> Body:
     body = scene.body
-    solid = body.solid
-    if body.kind == "slab" and "little loss" not in dropped:
-        solid = replace(
-            solid,
-            viscosity=LOSS_LEFT * solid.viscosity,
-            loss_factor=LOSS_LEFT * solid.loss_factor,
-            relaxing_modulus=LOSS_LEFT * solid.relaxing_modulus,
-        )
-    line = strongest_line(scene)
+    solid, line = body.solid, strongest_line(scene)
     law = as_relaxing if "viscous loss" in dropped else as_viscous
     if body.kind == "slab":
         solid = law(solid, 2 * np.pi * line)
+        if "little loss" not in dropped:
+            solid = with_little_loss(solid, 2 * np.pi * line)
     if "vacuum" in dropped:
         air = air_mass(body, line) if line else 0.0
         solid = replace(solid, density=solid.density + air / body.depth)
@@ -216,6 +210,27 @@ def as_one(layers: Sequence[Layer]) -> Layer:
     return Layer(thickness=thickness, material=material)
 
 
+def with_little_loss(solid: Material, w: float) -> Material:
+    """A tenth of the loss, and the same stiffness at w in rad/s."""
+    turned = (w * solid.relaxation_time) ** 2
+    stiffer = (1 - LOSS_LEFT) * solid.relaxing_modulus * turned / (1 + turned)
+    return _of_modulus(
+        replace(
+            solid,
+            viscosity=LOSS_LEFT * solid.viscosity,
+            loss_factor=LOSS_LEFT * solid.loss_factor,
+            relaxing_modulus=LOSS_LEFT * solid.relaxing_modulus,
+        ),
+        solid.shear_modulus + stiffer,
+    )
+
+
+def _of_modulus(solid: Material, shear_modulus: float) -> Material:
+    """With another modulus at rest, of which as much is lost by hysteresis."""
+    lost = solid.loss_factor * solid.shear_modulus / shear_modulus
+    return replace(solid, shear_modulus=shear_modulus, loss_factor=lost)
+
+
 def as_relaxing(solid: Material, w: float) -> Material:
     """A standard linear solid of the same complex modulus at w in rad/s as one that is viscous.
 
@@ -228,9 +243,8 @@ def as_relaxing(solid: Material, w: float) -> Material:
     time = min(RELAXATION_TIME, (1 - LEAST_LASTING) * solid.shear_modulus / loss / w)
     turned = w * time
     return replace(
-        solid,
+        _of_modulus(solid, solid.shear_modulus - loss * turned),
         viscosity=0.0,
-        shear_modulus=solid.shear_modulus - loss * turned,
         relaxing_modulus=loss * (1 + turned**2) / turned,
         relaxation_time=time,
     )
@@ -243,8 +257,7 @@ def as_viscous(solid: Material, w: float) -> Material:
     turned = 1j * w * solid.relaxation_time
     relaxing = solid.relaxing_modulus * turned / (1 + turned)
     return replace(
-        solid,
-        shear_modulus=solid.shear_modulus + relaxing.real,
+        _of_modulus(solid, solid.shear_modulus + relaxing.real),
         viscosity=solid.viscosity + relaxing.imag / w,
         relaxing_modulus=0.0,
     )

@@ -254,13 +254,13 @@ def _body_sentence(runs: list[Run]) -> str:
         f"{solid.shear_modulus / 1e3:.4g} kPa, Poisson's ratio {solid.poisson:g}, viscosity "
         f"{solid.viscosity:g} Pa s, loss factor {solid.loss_factor:g}"
     )
+    if solid.loss_factor:
+        text += " (as Rayleigh damping that fits it over 50-600 Hz)"
     if solid.relaxing_modulus:
         text += (
             f", relaxing {solid.relaxing_modulus / 1e3:.4g} kPa in "
             f"{1e3 * solid.relaxation_time:g} ms"
         )
-    if solid.loss_factor:
-        text += " (as Rayleigh damping that fits it over 50-600 Hz)"
     if body.kind == "slab":
         return text + ". Left out: layers and curvature."
     sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
