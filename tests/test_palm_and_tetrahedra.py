@@ -456,9 +456,11 @@ def test_a_mesher_that_crashes_takes_nobody_with_it(tmp_path, monkeypatch):
 
 def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    plain = inputs(SPHERE)
+    endless = {"h": np.array(1e-4), "grid_sizes": np.full_like(plain["grid_sizes"], 1e-4)}
     started = time.perf_counter()
     with pytest.raises(TimeoutError, match="stopped after 3 s; take larger elements or a longer"):
-        tetra._run(inputs(SPHERE, epsilon=np.array(0.0)), 3.0)
+        tetra._run(plain | endless, 3.0)
     assert time.perf_counter() - started < 6
     assert not list(tmp_path.iterdir())
 

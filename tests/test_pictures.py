@@ -1,5 +1,6 @@
 """Pictures: that they show what their captions say."""
 
+import gc
 import json
 import re
 import wave
@@ -209,6 +210,9 @@ def test_every_frame_of_a_film_differs_and_the_last_leads_to_the_first(seen, tmp
 
 @draws
 @pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
+@pytest.mark.filterwarnings(  # imageio-ffmpeg leaves its encoder's pipe to the collector
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
 def test_a_film_may_be_an_mp4(seen, tmp_path):
     import imageio.v2 as imageio
 
@@ -219,6 +223,7 @@ def test_a_film_may_be_an_mp4(seen, tmp_path):
         assert film.get_meta_data()["fps"] == pytest.approx(12 / films.LASTS)
     assert len(frames) == 12
     assert min(np.abs(a - b).max() for a, b in pairwise(frames)) > 60
+    gc.collect()
 
 
 def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch):

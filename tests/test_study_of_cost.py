@@ -1,6 +1,7 @@
 """Choosing a model and measuring what accuracy costs."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -195,8 +196,10 @@ def test_no_cache_is_no_error(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path):
+def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypatch):
+    monkeypatch.setattr("skinwave.studies.tradeoff.FINEST", (1.2, 1.0))
     scene = loads(SHORT)
+    scene = replace(scene, body=replace(scene.body, width=0.06, height=0.06, sides="free"))
     chosen = [
         Candidate(model="point-kernel"),
         Candidate(model="fem", h=0.012),

@@ -307,7 +307,7 @@ def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
 
 
 def test_curves_are_drawn_read_and_zoomed_by_keys(page):
-    curve = "0,114,178,255" if not state(page, "dark") else "86,180,233,255"
+    curve = "0,0,0,255" if not state(page, "dark") else "255,255,255,255"
     assert ink(page, "waveform_plot").get(curve, 0) > 200
     plot = page.locator("#waveform_plot")
     before = ink(page, "waveform_plot")
