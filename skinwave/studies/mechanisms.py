@@ -267,5 +267,5 @@ def figure(ratios: Iterable[Ratio]) -> Figure:
              yscale="log")  # fmt: skip
     axes.grid(alpha=0.3)
     if curves:
-        axes.legend(frameon=False)
+        drawn.legend(loc="outside lower center", ncols=2, frameon=False)
     return drawn
