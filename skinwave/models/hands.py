@@ -16,7 +16,7 @@ from meshes.tetmesh import Floats
 from skinwave.scene import Body
 
 KINDS = ("palm", "mesh")
-COARSEST = 3.0  # cells far from the middle, over those of h
+COARSEST = 2.0  # cells far from the middle, over those of h
 DOWNWARDS = -0.7  # z of the normals of what rests on bone
 
 
@@ -34,7 +34,7 @@ def hand(body: Body, h: float) -> TetMesh:
     """
     if body.kind == "palm":
         # Cells wider than the rim is round would cut it off, and waves come back from the rim.
-        coarsest = min(COARSEST * h, max(h, body.relief.edge_radius))
+        coarsest = min(COARSEST * h, max(h, 2 * body.relief.edge_radius))
         sizing = graded(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest))
         mesh = palm_mesh(body.palm, h, sizing=sizing)
         cut = [mesh.facets["wrist"], mesh.facets["fingers"]]
