@@ -380,6 +380,28 @@ def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
         worker.close()
 
 
+@pytest.mark.parametrize("waits", [False, True])
+def test_a_process_that_dies_fails_the_question_that_is_awaited(waits):
+    told = []
+    worker = Worker(lambda *content: told.append(content))
+
+    class Ended:
+        def recv(self):
+            raise EOFError
+
+        def send(self, _):
+            raise BrokenPipeError
+
+    worker._start = lambda: None
+    worker._pipe = pipe = Ended()
+    worker.ask(1, None)
+    if waits:
+        worker.ask(2, None)
+    worker._listen(pipe)
+    assert [content[:2] for content in told] == [("failed", 2 if waits else 1)]
+    assert (worker._at, worker._waiting) == (None, None)
+
+
 # The state of a page, without a browser
 
 
