@@ -32,6 +32,7 @@ from skinwave.web import (
     plots,
     scenes,
     waves,
+    worker,
 )
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
@@ -359,31 +360,67 @@ def test_the_moving_body_is_what_its_probe_sees(scene):
 
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
     told = Queue()
-    worker = Worker(lambda *content: told.put(content))
+    asked = Worker(lambda *content: told.put(content))
     try:
         for number in range(1, 5):
-            worker.ask(number, scene)
+            asked.ask(number, scene)
         answered = []
         while 4 not in answered:
             what, number, _ = told.get(timeout=60)
             answered += [number] if what == "answer" else []
         assert answered[-1] == 4
         assert len(answered) <= 2
-        worker.ask(5, replace(scene, body=BODIES["palm"]))
+        asked.ask(5, replace(scene, body=BODIES["palm"]))
         while told.get(timeout=60)[:2] != ("progress", 5):
             pass
-        worker.cancel()
-        worker.ask(6, scene)
+        asked.cancel()
+        asked.ask(6, scene)
         while (last := told.get(timeout=60))[:2] != ("answer", 6):
             assert last[0] != "answer"
     finally:
-        worker.close()
+        asked.close()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device"), "No space left on device"),
+        (TimeoutError(), "TimeoutError"),
+        (MemoryError(), "not enough memory"),
+    ],
+)
+def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, error, said):
+    questions, sent = iter([1, 2]), []
+
+    class Pipe:
+        def recv(self):
+            if (number := next(questions, None)) is None:
+                raise EOFError
+            return number, None, False
+
+        def send(self, content):
+            sent.append(content)
+
+    answers = iter([error, "found"])
+
+    def answer(self, scene, tell, moving):
+        if isinstance(found := next(answers), Exception):
+            raise found
+        return found
+
+    monkeypatch.setattr(waves.Waves, "__call__", answer)
+    monkeypatch.setattr(worker, "_end_with_parent", lambda: None)
+    monkeypatch.setattr(worker.os, "nice", lambda _: None)
+    worker.answer_forever(Pipe())
+    assert sent[0][:2] == ("failed", 1)
+    assert said in sent[0][2]
+    assert sent[1:] == [("answer", 2, "found")]
 
 
 @pytest.mark.parametrize("waits", [False, True])
 def test_a_process_that_dies_fails_the_question_that_is_awaited(waits):
     told = []
-    worker = Worker(lambda *content: told.append(content))
+    asked = Worker(lambda *content: told.append(content))
 
     class Ended:
         def recv(self):
@@ -392,14 +429,14 @@ def test_a_process_that_dies_fails_the_question_that_is_awaited(waits):
         def send(self, _):
             raise BrokenPipeError
 
-    worker._start = lambda: None
-    worker._pipe = pipe = Ended()
-    worker.ask(1, None)
+    asked._start = lambda: None
+    asked._pipe = pipe = Ended()
+    asked.ask(1, None)
     if waits:
-        worker.ask(2, None)
-    worker._listen(pipe)
+        asked.ask(2, None)
+    asked._listen(pipe)
     assert [content[:2] for content in told] == [("failed", 2 if waits else 1)]
-    assert (worker._at, worker._waiting) == (None, None)
+    assert (asked._at, asked._waiting) == (None, None)
 
 
 # The state of a page, without a browser

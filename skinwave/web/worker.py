@@ -30,11 +30,16 @@ def answer_forever(pipe: Connection) -> None:
             number, scene, moving = pipe.recv()
             try:
                 found = waves(scene, _teller(pipe, number), moving)
-            except (ValueError, ArithmeticError, MemoryError) as error:
-                said = " ".join(str(error).split()) or "not enough memory for this body"
-                pipe.send(("failed", number, said))
+            except MemoryError as error:
+                pipe.send(("failed", number, _said(error) or "not enough memory for this body"))
+            except (ValueError, ArithmeticError, OSError) as error:  # a full disk, say
+                pipe.send(("failed", number, _said(error) or type(error).__name__))
             else:
                 pipe.send(("answer", number, found))
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def _end_with_parent() -> None:
