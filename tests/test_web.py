@@ -607,3 +607,15 @@ def test_an_address_begins_a_page_and_what_is_wrong_in_it_is_said(request):
     assert (session.state.am, session.state.size) == (77, STARTS["size"])
     assert "size: 900 mm is outside" in session.state.problem
     assert "application" not in session.state.problem
+
+
+def test_undo_after_a_new_beginning_goes_back_to_the_address(session):
+    with session.state:
+        session.restart("am=77&size=900")
+    assert "size: 900 mm is outside" in session.state.problem
+    assert not session.state.undoable
+    with session.state:
+        session.turn({"speed": 5})
+    with session.state:
+        session.undo()
+    assert (session.state.am, session.state.speed) == (77, STARTS["speed"])

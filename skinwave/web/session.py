@@ -100,9 +100,12 @@ class Session:
 
     def restart(self, query: str = "") -> None:
         """Begin anew with what an address says."""
-        self.pinned, self.history = (), History(STARTS)
+        values, refused = controls.from_query(query)
+        self.pinned, self.history = (), History(values)
         self.state.update({"hold": False, "pinned": False, "problem": ""})
-        self._take(controls.from_query(query)[0])
+        self._take(values)
+        if refused and not self.state.problem:
+            self.state.problem = "; ".join(refused)
 
     def undo(self) -> None:
         """Back to the values before the last move."""
