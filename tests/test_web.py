@@ -619,3 +619,15 @@ def test_undo_after_a_new_beginning_goes_back_to_the_address(session):
     with session.state:
         session.undo()
     assert (session.state.am, session.state.speed) == (77, STARTS["speed"])
+
+
+def test_progress_that_comes_after_cancel_is_not_shown(session):
+    with session.state:
+        session.state.body = "skin-slab"
+    number = session._number
+    with session.state:
+        session.cancel()
+    for late in (number, session._number):
+        with session.state:
+            session.told("progress", late, ("reduce", 0.5))
+    assert not session.state.busy

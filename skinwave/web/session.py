@@ -225,6 +225,8 @@ class Session:
         """The process that answers with a body has something to tell."""
         newest = number == self._number
         if what == "progress":
+            if self._good["body"] == "none":
+                return  # told before it was cancelled
             phase, done = content
             self.state.update({"busy": phase, "done": round(100 * max(0.0, min(1.0, done)))})
         elif what == "failed" and newest:
