@@ -631,3 +631,21 @@ def test_progress_that_comes_after_cancel_is_not_shown(session):
         with session.state:
             session.told("progress", late, ("reduce", 0.5))
     assert not session.state.busy
+
+
+def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
+    with session.state:
+        session.state.hold = True
+    with session.state:
+        session.preset("am210-stm10")
+    preset = controls.presets()["am210-stm10"]
+    assert {key: session.state[key] for key in preset} == preset
+    frequency = session.state.drawing_frequency
+    with session.state:
+        session.state.size = 12
+    assert session.state.drawing_frequency == pytest.approx(frequency), "held from then"
+    values = STARTS | {"size": 33.0, "speed": 4.0}
+    with session.state:
+        session.open_scene(dumps(scenes.scene_of(values)))
+    assert session.values == values
+    assert not session.state.errors

@@ -63,9 +63,9 @@ class Session:
         if moved:
             self.turn({key: self.state[key] for key in moved})
 
-    def turn(self, given: Values) -> None:
+    def turn(self, given: Values, whole: bool = False) -> None:
         """Set controls; what is refused is marked at its field, which keeps what was typed, for it
-        may be half of a number.
+        may be half of a number. A `whole` Tacton brings its own drawing frequency, held from then.
         """
         errors, typed, accepted = dict(self.state.errors), dict(self.state.typed), {}
         for key, value in given.items():
@@ -76,7 +76,8 @@ class Session:
             except ValueError as error:
                 errors[key], typed[key] = str(error), str(value)
         values = self._good | accepted
-        if self.state.hold and (moved := [k for k in ("shape", "size", "speed") if k in accepted]):
+        moved = [key for key in ("shape", "size", "speed") if key in accepted]
+        if self.state.hold and moved and not whole:
             try:
                 values |= scenes.held(values, moved[-1], self.state.held_frequency)
                 errors.pop("hold", None)
@@ -87,6 +88,8 @@ class Session:
         self.history.push(values)
         if accepted:
             self.refresh()
+        if whole:
+            self.on_hold(self.state.hold)
 
     def select(self, x: float, y: float) -> None:
         """Select the point of the area at x and y in mm."""
@@ -96,7 +99,7 @@ class Session:
 
     def preset(self, name: str) -> None:
         """Take one of the paper's Tactons."""
-        self.turn(controls.presets()[name])
+        self.turn(controls.presets()[name], whole=True)
 
     def restart(self, query: str = "") -> None:
         """Begin anew with what an address says."""
@@ -193,7 +196,7 @@ class Session:
             return
         self.own = scene.body if values["body"] == OWN_BODY else self.own
         self.state.bodies = shown.bodies(self.own)
-        self.turn(values)
+        self.turn(values, whole=True)
 
     # What follows from a move
 
