@@ -649,3 +649,11 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
         session.open_scene(dumps(scenes.scene_of(values)))
     assert session.values == values
     assert not session.state.errors
+
+
+def test_a_scene_file_that_is_too_large_is_refused_whole(session):
+    text = dumps(scenes.scene_of(STARTS | {"am": 90.0})).encode()
+    with session.state:
+        session.on_file({"content": text + b"#" * 2_500_000})
+    assert "2.5 MB exceeds 1 MB" in session.state.problem
+    assert session.state.am == STARTS["am"]

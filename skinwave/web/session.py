@@ -180,8 +180,14 @@ class Session:
         one = opened[0] if isinstance(opened, list) else opened
         content = one.get("content", b"")
         content = content if isinstance(content, bytes) else b"".join(content)
-        self.open_scene(content[:LARGEST_FILE].decode("utf-8", "replace"))
         self.state.opened = None
+        if len(content) > LARGEST_FILE:
+            self.state.problem = (
+                f"the scene cannot be opened: a file of {len(content) / 1e6:.3g} MB exceeds "
+                f"{LARGEST_FILE / 1e6:g} MB, far more than a scene needs"
+            )
+            return
+        self.open_scene(content.decode("utf-8", "replace"))
 
     def open_scene(self, text: str) -> None:
         """Take the scene of a TOML text; say why if it cannot be."""
