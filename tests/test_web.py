@@ -59,7 +59,7 @@ def scene():
 
 def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"pip install 'skinwave\[web\]'"):
+    with pytest.raises(ValueError, match=r"which are not installed; pip install 'skinwave\[web\]'"):
         check_extra()
     assert main(["web"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
