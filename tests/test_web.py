@@ -657,3 +657,17 @@ def test_a_scene_file_that_is_too_large_is_refused_whole(session):
         session.on_file({"content": text + b"#" * 2_500_000})
     assert "2.5 MB exceeds 1 MB" in session.state.problem
     assert session.state.am == STARTS["am"]
+
+
+def test_what_of_a_scene_is_beyond_its_control_is_left_out_and_said(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    server = get_server(request.node.name, client_type="vue3")
+    text = dumps(scenes.scene_of(STARTS | {"x": 150.0, "speed": 45.0, "am": 90.0}))
+    session = session_of(server, text)
+    assert session.values == STARTS | {"am": 90.0}
+    assert "x: 150 mm is outside -50 to 50 mm" in session.state.problem
+    assert "speed: 45 m/s is outside 0 to 40 m/s" in session.state.problem

@@ -169,6 +169,19 @@ def from_query(query: str) -> tuple[Values, tuple[str, ...]]:
     return values, tuple(refused)
 
 
+def in_range(values: Mapping[str, Any]) -> tuple[Values, tuple[str, ...]]:
+    """A scene's values, each out of its control's range as it is in `STARTS`; a sentence for each
+    of those.
+    """
+    found, refused = dict(STARTS), []
+    for key, given in values.items():
+        try:
+            found[key] = checked(key, given)
+        except ValueError as error:
+            refused.append(f"left out of the scene: {key}: {error}")
+    return found, tuple(refused)
+
+
 def presets() -> dict[str, Values]:
     """The paper's 15 Tactons by name: what each changes."""
     return {

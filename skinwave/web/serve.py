@@ -18,19 +18,21 @@ STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
 
 def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None) -> Any:
-    """A session with its page; the address's values, if it has any, before the scene's."""
+    """A session with its page; the address's values, if it has any, before the scene's. What of
+    either is out of range falls back to a control's start, and is said.
+    """
     from skinwave.scene_file import loads
     from skinwave.web import controls, scenes
     from skinwave.web.layout import lay_out
     from skinwave.web.session import Session
 
     start, own = None, None
+    refused: tuple[str, ...] = ()
     if scene:
         read = loads(scene)
-        start = scenes.values_of(read)
+        start, refused = controls.in_range(scenes.values_of(read))
         own = read.body if start["body"] == controls.OWN_BODY else None
     given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
-    refused: tuple[str, ...] = ()
     if given:
         start, refused = controls.from_query(urlencode(given))
     session = Session(server, start, own)
