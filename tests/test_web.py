@@ -9,6 +9,7 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from queue import Queue
+from unittest.mock import AsyncMock, Mock
 
 import numpy as np
 import pytest
@@ -671,3 +672,36 @@ def test_what_of_a_scene_is_beyond_its_control_is_left_out_and_said(request):
     assert session.values == STARTS | {"am": 90.0}
     assert "x: 150 mm is outside -50 to 50 mm" in session.state.problem
     assert "speed: 45 m/s is outside 0 to 40 m/s" in session.state.problem
+
+
+@pytest.mark.parametrize("says", [b"ready\n", b"", None])
+def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypatch, says):
+    web = pytest.importorskip("aiohttp.web")
+    from skinwave.web import front
+
+    ends = []
+
+    async def line():
+        return says if says is not None else await asyncio.sleep(60)
+
+    process, asked = Mock(), Mock()
+    process.stdin.drain = AsyncMock()
+    process.stdout.readline = line
+    process.terminate = lambda: ends.append(True)
+    asked.json = AsyncMock(return_value={"am": "77"})
+
+    async def started():
+        return process, 1
+
+    async def opened():
+        one = front.Front()
+        one._spare = asyncio.create_task(started())
+        answer = await one.open(asked)
+        assert isinstance(answer, web.Response)
+        assert answer.status == (200 if says else 500)
+        assert (len(one._sessions), len(ends)) == ((1, 0) if says else (0, 1))
+        await asyncio.sleep(0.2)
+        assert (len(one._sessions), len(ends)) == (0, 1)
+
+    monkeypatch.setattr(front, "PATIENCE", 0.1)
+    asyncio.run(opened())

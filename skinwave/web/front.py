@@ -52,15 +52,22 @@ class Front:
         spare, self._spare = self._spare, None
         asyncio.get_running_loop().call_later(LATER, self._make_ready)
         process, port = await (spare or _started())
-        given = {str(key): str(value) for key, value in asked.items()}
-        line = json.dumps({"scene": self.scene, "query": given}) + "\n"
-        process.stdin.write(line.encode())
-        await process.stdin.drain()
-        if await asyncio.wait_for(process.stdout.readline(), PATIENCE) != b"ready\n":
+        try:
+            given = {str(key): str(value) for key, value in asked.items()}
+            line = json.dumps({"scene": self.scene, "query": given}) + "\n"
+            process.stdin.write(line.encode())
+            await process.stdin.drain()
+            if await asyncio.wait_for(process.stdout.readline(), PATIENCE) != b"ready\n":
+                raise OSError
+        except (OSError, TimeoutError):
             _kill(process)
             return web.json_response({"error": "the session did not start"}, status=500)
+        except BaseException:
+            _kill(process)
+            raise
         name = uuid.uuid4().hex
         self._sessions[name] = (process, port)
+        asyncio.get_running_loop().call_later(PATIENCE, self._forget, name)
         return web.json_response({"sessionURL": f"ws://USE_HOST/session/{name}"})
 
     async def talk(self, request: web.Request) -> web.WebSocketResponse:
@@ -85,6 +92,11 @@ class Front:
             _kill(process)
             await page.close()
         return page
+
+    def _forget(self, name: str) -> None:
+        """End a session that no page has come to talk to."""
+        if (unclaimed := self._sessions.pop(name, None)) is not None:
+            _kill(unclaimed[0])
 
     async def _prepare(self, _: web.Application) -> None:
         self._make_ready()
