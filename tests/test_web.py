@@ -691,7 +691,7 @@ def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypat
     asked.json = AsyncMock(return_value={"am": "77"})
 
     async def started():
-        return process, 1
+        return process, 1, "secret"
 
     async def opened():
         one = front.Front()
@@ -705,3 +705,35 @@ def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypat
 
     monkeypatch.setattr(front, "PATIENCE", 0.1)
     asyncio.run(opened())
+
+
+def test_a_session_takes_only_its_own_password():
+    pytest.importorskip("trame")
+    import aiohttp
+    import msgpack
+    from wslink.chunking import UnChunker, generate_chunks
+
+    from skinwave.web import front
+
+    async def greeted(port, password):
+        hello = {"wslink": "1.0", "id": "system:c0:0", "method": "wslink.hello",
+                 "args": [{"secret": password}], "kwargs": {}}  # fmt: skip
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(f"ws://127.0.0.1:{port}/ws") as page,
+        ):
+            for chunk in generate_chunks(msgpack.packb(hello), 2**20):
+                await page.send_bytes(chunk)
+            return UnChunker().process_chunk((await page.receive(timeout=20)).data)
+
+    async def both():
+        process, port, password = await front._started()
+        try:
+            return await greeted(port, "wslink-secret"), await greeted(port, password)
+        finally:
+            front._kill(process)
+            await process.wait()
+
+    refused, taken = asyncio.run(both())
+    assert "error" in refused
+    assert "result" in taken

@@ -51,7 +51,7 @@ class Front:
         asked = await request.json()
         spare, self._spare = self._spare, None
         asyncio.get_running_loop().call_later(LATER, self._make_ready)
-        process, port = await (spare or _started())
+        process, port, password = await (spare or _started())
         try:
             given = {str(key): str(value) for key, value in asked.items()}
             line = json.dumps({"scene": self.scene, "query": given}) + "\n"
@@ -68,7 +68,9 @@ class Front:
         name = uuid.uuid4().hex
         self._sessions[name] = (process, port)
         asyncio.get_running_loop().call_later(PATIENCE, self._forget, name)
-        return web.json_response({"sessionURL": f"ws://USE_HOST/session/{name}"})
+        return web.json_response(
+            {"sessionURL": f"ws://USE_HOST/session/{name}", "secret": password}
+        )
 
     async def talk(self, request: web.Request) -> web.WebSocketResponse:
         """Between a page and its session, for as long as the page is open."""
@@ -112,12 +114,11 @@ class Front:
         if self._spare is not None:
             self._spare.cancel()
             with contextlib.suppress(asyncio.CancelledError, OSError, TimeoutError):
-                process, _port = await self._spare
-                _kill(process)
+                _kill((await self._spare)[0])
 
 
-async def _started() -> tuple[Any, int]:
-    """A process that waits for a page, and its port."""
+async def _started() -> tuple[Any, int, str]:
+    """A process that waits for a page, its port and what it takes as a password."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "skinwave.web.serve", stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE, env=os.environ | {"WSLINK_READY_MSG": ""},
@@ -125,7 +126,8 @@ async def _started() -> tuple[Any, int]:
     try:
         assert process.stdout is not None
         line = await asyncio.wait_for(process.stdout.readline(), PATIENCE)
-        return process, int(line)
+        port, password = line.decode().split()
+        return process, int(port), password
     except BaseException:
         _kill(process)
         raise

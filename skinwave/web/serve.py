@@ -1,4 +1,4 @@
-"""The process behind one page: says its port, waits for what the page asks, and serves it.
+"""The process behind one page: says its port and password, waits for what is asked, and serves it.
 
 python -m skinwave.web.serve      # started by `front`, not by hand
 """
@@ -6,6 +6,7 @@ python -m skinwave.web.serve      # started by `front`, not by hand
 import asyncio
 import json
 import os
+import secrets
 import sys
 import threading
 import traceback
@@ -57,7 +58,8 @@ def _on_one_thread() -> None:
 
 def main() -> None:
     """Serve one page until it is closed."""
-    sys.argv = sys.argv[:1]  # trame reads it
+    password = secrets.token_hex(32)  # so that nobody but the page talks to this port
+    sys.argv = [sys.argv[0], "--authKey", password]  # trame reads it
     _on_one_thread()
     from trame.app import get_server
 
@@ -69,7 +71,7 @@ def main() -> None:
 
     def begin(**_: Any) -> None:
         try:
-            print(server.port, flush=True)
+            print(server.port, password, flush=True)
         except OSError:
             os._exit(0)  # who started this has ended
         threading.Thread(target=listen, daemon=True).start()
