@@ -737,3 +737,25 @@ def test_a_session_takes_only_its_own_password():
     refused, taken = asyncio.run(both())
     assert "error" in refused
     assert "result" in taken
+
+
+def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    text = dumps(replace(scenes.scene_of(STARTS), body=Body(depth=0.008)))
+    server = get_server(request.node.name, client_type="vue3")
+    first = session_of(server, text)
+    query = dict([part.split("=") for part in first.state.query.replace("+", " ").split("&")])
+    assert query == {"body": controls.OWN_BODY}
+    again = session_of(server, text, query)
+    assert again.scene.body == Body(depth=0.008)
+    assert again.state.problem == ""
+    with again.state:
+        again.restart(first.state.query)
+    assert again.scene.body == Body(depth=0.008)
+    lost = session_of(server, "", query)
+    assert lost.state.body == "none"
+    assert "the scene that it came from is not open" in lost.state.problem

@@ -35,7 +35,7 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
         own = read.body if start["body"] == controls.OWN_BODY else None
     given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
     if given:
-        start, refused = controls.from_query(urlencode(given))
+        start, refused = controls.from_query(urlencode(given), own is not None)
     session = Session(server, start, own)
     lay_out(session)
     if refused:

@@ -103,7 +103,7 @@ class Session:
 
     def restart(self, query: str = "") -> None:
         """Begin anew with what an address says."""
-        values, refused = controls.from_query(query)
+        values, refused = controls.from_query(query, self.own is not None)
         self.pinned, self.history = (), History(values)
         self.state.update({"hold": False, "pinned": False, "problem": ""})
         self._take(values)
@@ -133,7 +133,7 @@ class Session:
         back, kept = self.state.pinned_query, controls.to_query(self.values)
         self.pinned = tuple(a for a in (self.kernel, self.current_waves) if a)
         self.state.pinned_query = kept
-        self._take(controls.from_query(back)[0])
+        self._take(controls.from_query(back, self.own is not None)[0])
 
     def cancel(self) -> None:
         """Stop computing waves, and show none."""
