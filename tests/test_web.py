@@ -184,7 +184,7 @@ def test_a_scene_goes_through_its_file_and_back_to_the_controls():
 
 def test_a_body_of_ones_own_stays():
     own = Body(depth=0.008)
-    values = scenes.values_of(replace(scenes.scene_of(STARTS), body=own))
+    values = scenes.values_of(scenes.scene_of(STARTS | {"body": controls.OWN_BODY}, own))
     assert values["body"] == controls.OWN_BODY
     assert scenes.scene_of(values, own).body == own
 
@@ -745,7 +745,8 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
 
     from skinwave.web.serve import session_of
 
-    text = dumps(replace(scenes.scene_of(STARTS), body=Body(depth=0.008)))
+    values = STARTS | {"body": controls.OWN_BODY}
+    text = dumps(scenes.scene_of(values, Body(depth=0.008)))
     server = get_server(request.node.name, client_type="vue3")
     first = session_of(server, text)
     query = dict([part.split("=") for part in first.state.query.replace("+", " ").split("&")])
@@ -759,3 +760,25 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
     lost = session_of(server, "", query)
     assert lost.state.body == "none"
     assert "the scene that it came from is not open" in lost.state.problem
+
+
+@pytest.mark.parametrize(
+    ("focus", "said"),
+    [
+        ("peak_pressure_pa = 80", "a peak_pressure_pa of 80 cannot be turned here"),
+        ('drive = "pressure_squared"\ndepth_of_modulation = 0.5', "a depth_of_modulation of 0.5"),
+        ('profile = "array"', "profile = array of the focus"),
+    ],
+)
+def test_a_focus_that_no_control_says_is_refused(focus, said):
+    with pytest.raises(ValueError, match=said):
+        scenes.values_of(loads(f"[focus]\n{focus}\n"))
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted(Path(__file__).parents[1].joinpath("examples").glob("*.toml")),
+    ids=lambda p: p.stem,
+)
+def test_every_example_can_be_turned(path):
+    assert controls.in_range(scenes.values_of(loads(path.read_text())))[1] == ()
