@@ -9,6 +9,7 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from queue import Queue
+from unittest.mock import AsyncMock, Mock
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ from skinwave.web import (
     plots,
     scenes,
     waves,
+    worker,
 )
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
@@ -58,7 +60,7 @@ def scene():
 
 def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"pip install 'skinwave\[web\]'"):
+    with pytest.raises(ValueError, match=r"which are not installed; pip install 'skinwave\[web\]'"):
         check_extra()
     assert main(["web"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -182,7 +184,7 @@ def test_a_scene_goes_through_its_file_and_back_to_the_controls():
 
 def test_a_body_of_ones_own_stays():
     own = Body(depth=0.008)
-    values = scenes.values_of(replace(scenes.scene_of(STARTS), body=own))
+    values = scenes.values_of(scenes.scene_of(STARTS | {"body": controls.OWN_BODY}, own))
     assert values["body"] == controls.OWN_BODY
     assert scenes.scene_of(values, own).body == own
 
@@ -359,25 +361,83 @@ def test_the_moving_body_is_what_its_probe_sees(scene):
 
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
     told = Queue()
-    worker = Worker(lambda *content: told.put(content))
+    asked = Worker(lambda *content: told.put(content))
     try:
         for number in range(1, 5):
-            worker.ask(number, scene)
+            asked.ask(number, scene)
         answered = []
         while 4 not in answered:
             what, number, _ = told.get(timeout=60)
             answered += [number] if what == "answer" else []
         assert answered[-1] == 4
         assert len(answered) <= 2
-        worker.ask(5, replace(scene, body=BODIES["palm"]))
+        asked.ask(5, replace(scene, body=BODIES["palm"]))
         while told.get(timeout=60)[:2] != ("progress", 5):
             pass
-        worker.cancel()
-        worker.ask(6, scene)
+        asked.cancel()
+        asked.ask(6, scene)
         while (last := told.get(timeout=60))[:2] != ("answer", 6):
             assert last[0] != "answer"
     finally:
-        worker.close()
+        asked.close()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device"), "No space left on device"),
+        (TimeoutError(), "TimeoutError"),
+        (MemoryError(), "not enough memory"),
+    ],
+)
+def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, error, said):
+    questions, sent = iter([1, 2]), []
+
+    class Pipe:
+        def recv(self):
+            if (number := next(questions, None)) is None:
+                raise EOFError
+            return number, None, False
+
+        def send(self, content):
+            sent.append(content)
+
+    answers = iter([error, "found"])
+
+    def answer(self, scene, tell, moving):
+        if isinstance(found := next(answers), Exception):
+            raise found
+        return found
+
+    monkeypatch.setattr(waves.Waves, "__call__", answer)
+    monkeypatch.setattr(worker, "_end_with_parent", lambda: None)
+    monkeypatch.setattr(worker.os, "nice", lambda _: None)
+    worker.answer_forever(Pipe())
+    assert sent[0][:2] == ("failed", 1)
+    assert said in sent[0][2]
+    assert sent[1:] == [("answer", 2, "found")]
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_a_process_that_dies_fails_the_question_that_is_awaited(waits):
+    told = []
+    asked = Worker(lambda *content: told.append(content))
+
+    class Ended:
+        def recv(self):
+            raise EOFError
+
+        def send(self, _):
+            raise BrokenPipeError
+
+    asked._start = lambda: None
+    asked._pipe = pipe = Ended()
+    asked.ask(1, None)
+    if waits:
+        asked.ask(2, None)
+    asked._listen(pipe)
+    assert [content[:2] for content in told] == [("failed", 2 if waits else 1)]
+    assert (asked._at, asked._waiting) == (None, None)
 
 
 # The state of a page, without a browser
@@ -548,3 +608,177 @@ def test_an_address_begins_a_page_and_what_is_wrong_in_it_is_said(request):
     assert (session.state.am, session.state.size) == (77, STARTS["size"])
     assert "size: 900 mm is outside" in session.state.problem
     assert "application" not in session.state.problem
+
+
+def test_undo_after_a_new_beginning_goes_back_to_the_address(session):
+    with session.state:
+        session.restart("am=77&size=900")
+    assert "size: 900 mm is outside" in session.state.problem
+    assert not session.state.undoable
+    with session.state:
+        session.turn({"speed": 5})
+    with session.state:
+        session.undo()
+    assert (session.state.am, session.state.speed) == (77, STARTS["speed"])
+
+
+def test_progress_that_comes_after_cancel_is_not_shown(session):
+    with session.state:
+        session.state.body = "skin-slab"
+    number = session._number
+    with session.state:
+        session.cancel()
+    for late in (number, session._number):
+        with session.state:
+            session.told("progress", late, ("reduce", 0.5))
+    assert not session.state.busy
+
+
+def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
+    with session.state:
+        session.state.hold = True
+    with session.state:
+        session.preset("am210-stm10")
+    preset = controls.presets()["am210-stm10"]
+    assert {key: session.state[key] for key in preset} == preset
+    frequency = session.state.drawing_frequency
+    with session.state:
+        session.state.size = 12
+    assert session.state.drawing_frequency == pytest.approx(frequency), "held from then"
+    values = STARTS | {"size": 33.0, "speed": 4.0}
+    with session.state:
+        session.open_scene(dumps(scenes.scene_of(values)))
+    assert session.values == values
+    assert not session.state.errors
+
+
+def test_a_scene_file_that_is_too_large_is_refused_whole(session):
+    text = dumps(scenes.scene_of(STARTS | {"am": 90.0})).encode()
+    with session.state:
+        session.on_file({"content": text + b"#" * 2_500_000})
+    assert "2.5 MB exceeds 1 MB" in session.state.problem
+    assert session.state.am == STARTS["am"]
+
+
+def test_what_of_a_scene_is_beyond_its_control_is_left_out_and_said(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    server = get_server(request.node.name, client_type="vue3")
+    text = dumps(scenes.scene_of(STARTS | {"x": 150.0, "speed": 45.0, "am": 90.0}))
+    session = session_of(server, text)
+    assert session.values == STARTS | {"am": 90.0}
+    assert "x: 150 mm is outside -50 to 50 mm" in session.state.problem
+    assert "speed: 45 m/s is outside 0 to 40 m/s" in session.state.problem
+
+
+@pytest.mark.parametrize("says", [b"ready\n", b"", None])
+def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypatch, says):
+    web = pytest.importorskip("aiohttp.web")
+    from skinwave.web import front
+
+    ends = []
+
+    async def line():
+        return says if says is not None else await asyncio.sleep(60)
+
+    process, asked = Mock(), Mock()
+    process.stdin.drain = AsyncMock()
+    process.stdout.readline = line
+    process.terminate = lambda: ends.append(True)
+    asked.json = AsyncMock(return_value={"am": "77"})
+
+    async def started():
+        return process, 1, "secret"
+
+    async def opened():
+        one = front.Front()
+        one._spare = asyncio.create_task(started())
+        answer = await one.open(asked)
+        assert isinstance(answer, web.Response)
+        assert answer.status == (200 if says else 500)
+        assert (len(one._sessions), len(ends)) == ((1, 0) if says else (0, 1))
+        await asyncio.sleep(0.2)
+        assert (len(one._sessions), len(ends)) == (0, 1)
+
+    monkeypatch.setattr(front, "PATIENCE", 0.1)
+    asyncio.run(opened())
+
+
+def test_a_session_takes_only_its_own_password():
+    pytest.importorskip("trame")
+    import aiohttp
+    import msgpack
+    from wslink.chunking import UnChunker, generate_chunks
+
+    from skinwave.web import front
+
+    async def greeted(port, password):
+        hello = {"wslink": "1.0", "id": "system:c0:0", "method": "wslink.hello",
+                 "args": [{"secret": password}], "kwargs": {}}  # fmt: skip
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(f"ws://127.0.0.1:{port}/ws") as page,
+        ):
+            for chunk in generate_chunks(msgpack.packb(hello), 2**20):
+                await page.send_bytes(chunk)
+            return UnChunker().process_chunk((await page.receive(timeout=20)).data)
+
+    async def both():
+        process, port, password = await front._started()
+        try:
+            return await greeted(port, "wslink-secret"), await greeted(port, password)
+        finally:
+            front._kill(process)
+            await process.wait()
+
+    refused, taken = asyncio.run(both())
+    assert "error" in refused
+    assert "result" in taken
+
+
+def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    values = STARTS | {"body": controls.OWN_BODY}
+    text = dumps(scenes.scene_of(values, Body(depth=0.008)))
+    server = get_server(request.node.name, client_type="vue3")
+    first = session_of(server, text)
+    query = dict([part.split("=") for part in first.state.query.replace("+", " ").split("&")])
+    assert query == {"body": controls.OWN_BODY}
+    again = session_of(server, text, query)
+    assert again.scene.body == Body(depth=0.008)
+    assert again.state.problem == ""
+    with again.state:
+        again.restart(first.state.query)
+    assert again.scene.body == Body(depth=0.008)
+    lost = session_of(server, "", query)
+    assert lost.state.body == "none"
+    assert "the scene that it came from is not open" in lost.state.problem
+
+
+@pytest.mark.parametrize(
+    ("focus", "said"),
+    [
+        ("peak_pressure_pa = 80", "a peak_pressure_pa of 80 cannot be turned here"),
+        ('drive = "pressure_squared"\ndepth_of_modulation = 0.5', "a depth_of_modulation of 0.5"),
+        ('profile = "array"', "profile = array of the focus"),
+    ],
+)
+def test_a_focus_that_no_control_says_is_refused(focus, said):
+    with pytest.raises(ValueError, match=said):
+        scenes.values_of(loads(f"[focus]\n{focus}\n"))
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted(Path(__file__).parents[1].joinpath("examples").glob("*.toml")),
+    ids=lambda p: p.stem,
+)
+def test_every_example_can_be_turned(path):
+    assert controls.in_range(scenes.values_of(loads(path.read_text())))[1] == ()

@@ -21,6 +21,7 @@ def check_extra() -> None:
 
     if missing := [name for name in EXTRA if find_spec(name) is None]:
         raise ValueError(
-            f"the interactive tool needs {', '.join(missing)}, which is not installed; "
+            f"the interactive tool needs {' and '.join(missing)}, which "
+            f"{'is' if len(missing) == 1 else 'are'} not installed; "
             "pip install 'skinwave[web]'"
         )

@@ -151,22 +151,39 @@ def to_query(values: Mapping[str, Any]) -> str:
     changed = {
         key: f"{values[key]:.10g}" if key in NUMBERS else values[key]
         for key in KEYS
-        if values[key] != STARTS[key] and values[key] != OWN_BODY
+        if values[key] != STARTS[key]
     }
     return urlencode(changed, safe="/:,")
 
 
-def from_query(query: str) -> tuple[Values, tuple[str, ...]]:
-    """Values of an address, and a sentence for everything in it that was left out."""
+def from_query(query: str, own: bool = False) -> tuple[Values, tuple[str, ...]]:
+    """Values of an address, and a sentence for everything in it that was left out; such as a
+    scene's body where there is not one of its `own`.
+    """
     values, refused = dict(STARTS), []
     for key, given in parse_qsl(query):
         try:
             if key not in KEYS:
                 raise ValueError("is not known here")
+            if given == OWN_BODY and not own:
+                raise ValueError("the scene that it came from is not open; open it again")
             values[key] = checked(key, given)
         except ValueError as error:
             refused.append(f"left out of the address: {key}: {error}")
     return values, tuple(refused)
+
+
+def in_range(values: Mapping[str, Any]) -> tuple[Values, tuple[str, ...]]:
+    """A scene's values, each out of its control's range as it is in `STARTS`; a sentence for each
+    of those.
+    """
+    found, refused = dict(STARTS), []
+    for key, given in values.items():
+        try:
+            found[key] = checked(key, given)
+        except ValueError as error:
+            refused.append(f"left out of the scene: {key}: {error}")
+    return found, tuple(refused)
 
 
 def presets() -> dict[str, Values]:

@@ -51,17 +51,26 @@ class Front:
         asked = await request.json()
         spare, self._spare = self._spare, None
         asyncio.get_running_loop().call_later(LATER, self._make_ready)
-        process, port = await (spare or _started())
-        given = {str(key): str(value) for key, value in asked.items()}
-        line = json.dumps({"scene": self.scene, "query": given}) + "\n"
-        process.stdin.write(line.encode())
-        await process.stdin.drain()
-        if await asyncio.wait_for(process.stdout.readline(), PATIENCE) != b"ready\n":
+        process, port, password = await (spare or _started())
+        try:
+            given = {str(key): str(value) for key, value in asked.items()}
+            line = json.dumps({"scene": self.scene, "query": given}) + "\n"
+            process.stdin.write(line.encode())
+            await process.stdin.drain()
+            if await asyncio.wait_for(process.stdout.readline(), PATIENCE) != b"ready\n":
+                raise OSError
+        except (OSError, TimeoutError):
             _kill(process)
             return web.json_response({"error": "the session did not start"}, status=500)
+        except BaseException:
+            _kill(process)
+            raise
         name = uuid.uuid4().hex
         self._sessions[name] = (process, port)
-        return web.json_response({"sessionURL": f"ws://USE_HOST/session/{name}"})
+        asyncio.get_running_loop().call_later(PATIENCE, self._forget, name)
+        return web.json_response(
+            {"sessionURL": f"ws://USE_HOST/session/{name}", "secret": password}
+        )
 
     async def talk(self, request: web.Request) -> web.WebSocketResponse:
         """Between a page and its session, for as long as the page is open."""
@@ -86,6 +95,11 @@ class Front:
             await page.close()
         return page
 
+    def _forget(self, name: str) -> None:
+        """End a session that no page has come to talk to."""
+        if (unclaimed := self._sessions.pop(name, None)) is not None:
+            _kill(unclaimed[0])
+
     async def _prepare(self, _: web.Application) -> None:
         self._make_ready()
 
@@ -100,12 +114,11 @@ class Front:
         if self._spare is not None:
             self._spare.cancel()
             with contextlib.suppress(asyncio.CancelledError, OSError, TimeoutError):
-                process, _port = await self._spare
-                _kill(process)
+                _kill((await self._spare)[0])
 
 
-async def _started() -> tuple[Any, int]:
-    """A process that waits for a page, and its port."""
+async def _started() -> tuple[Any, int, str]:
+    """A process that waits for a page, its port and what it takes as a password."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "skinwave.web.serve", stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE, env=os.environ | {"WSLINK_READY_MSG": ""},
@@ -113,7 +126,8 @@ async def _started() -> tuple[Any, int]:
     try:
         assert process.stdout is not None
         line = await asyncio.wait_for(process.stdout.readline(), PATIENCE)
-        return process, int(line)
+        port, password = line.decode().split()
+        return process, int(port), password
     except BaseException:
         _kill(process)
         raise

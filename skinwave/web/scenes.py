@@ -39,8 +39,7 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
     pressure = MovingPressure(
         tacton=tacton,
-        # The published model has the main lobe; exact waves and elements a Gaussian of its width.
-        focus="main_lobe" if body.kind == "none" else "gaussian",
+        focus=_profile(body),
         drive=values["drive"],
         height=values["height"] / 1e3,
     )
@@ -50,15 +49,21 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     )  # fmt: skip
 
 
+def _profile(body: Body) -> str:
+    """The published model has the main lobe; exact waves and elements a Gaussian of its width."""
+    return "main_lobe" if body.kind == "none" else "gaussian"
+
+
 def values_of(scene: Scene) -> Values:
-    """The controls' values that give a scene, probed at its first probe.
+    """The controls' values that give a scene, probed at its first probe; name and further probes
+    are not asked for.
 
     Raises
     ------
     ValueError
         If it has what no control says.
     """
-    tacton, path = scene.tacton, scene.tacton.trajectory
+    tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
     known = {body: name for name, body in BODIES.items()}
     ratio = {weights: name for name, weights in RATIOS.items()}.get(tacton.superposition)
     even = tuple(k / len(tacton.foci) for k in range(len(tacton.foci)))
@@ -69,6 +74,11 @@ def values_of(scene: Scene) -> Values:
         or path.sweep != "there_and_back",
         "a sampled signal": tacton.signal is not None,
         "a superposition that is none of the five": ratio is None,
+        f"a peak_pressure_pa of {pressure.peak_pressure:g}": pressure.peak_pressure
+        != MovingPressure.peak_pressure,
+        f"a depth_of_modulation of {pressure.depth_of_modulation:g}": pressure.drive != "linear"
+        and pressure.depth_of_modulation != MovingPressure.depth_of_modulation,
+        f"profile = {pressure.focus} of the focus": pressure.focus != _profile(scene.body),
     }  # fmt: skip
     if said := [what for what, holds in beyond.items() if holds]:
         raise ValueError(f"{' and '.join(said)} cannot be turned here; use skinwave run")

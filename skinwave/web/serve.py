@@ -1,4 +1,4 @@
-"""The process behind one page: says its port, waits for what the page asks, and serves it.
+"""The process behind one page: says its port and password, waits for what is asked, and serves it.
 
 python -m skinwave.web.serve      # started by `front`, not by hand
 """
@@ -6,6 +6,7 @@ python -m skinwave.web.serve      # started by `front`, not by hand
 import asyncio
 import json
 import os
+import secrets
 import sys
 import threading
 import traceback
@@ -18,21 +19,23 @@ STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
 
 def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None) -> Any:
-    """A session with its page; the address's values, if it has any, before the scene's."""
+    """A session with its page; the address's values, if it has any, before the scene's. What of
+    either is out of range falls back to a control's start, and is said.
+    """
     from skinwave.scene_file import loads
     from skinwave.web import controls, scenes
     from skinwave.web.layout import lay_out
     from skinwave.web.session import Session
 
     start, own = None, None
+    refused: tuple[str, ...] = ()
     if scene:
         read = loads(scene)
-        start = scenes.values_of(read)
+        start, refused = controls.in_range(scenes.values_of(read))
         own = read.body if start["body"] == controls.OWN_BODY else None
     given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
-    refused: tuple[str, ...] = ()
     if given:
-        start, refused = controls.from_query(urlencode(given))
+        start, refused = controls.from_query(urlencode(given), own is not None)
     session = Session(server, start, own)
     lay_out(session)
     if refused:
@@ -55,7 +58,8 @@ def _on_one_thread() -> None:
 
 def main() -> None:
     """Serve one page until it is closed."""
-    sys.argv = sys.argv[:1]  # trame reads it
+    password = secrets.token_hex(32)  # so that nobody but the page talks to this port
+    sys.argv = [sys.argv[0], "--authKey", password]  # trame reads it
     _on_one_thread()
     from trame.app import get_server
 
@@ -67,7 +71,7 @@ def main() -> None:
 
     def begin(**_: Any) -> None:
         try:
-            print(server.port, flush=True)
+            print(server.port, password, flush=True)
         except OSError:
             os._exit(0)  # who started this has ended
         threading.Thread(target=listen, daemon=True).start()

@@ -63,9 +63,9 @@ class Session:
         if moved:
             self.turn({key: self.state[key] for key in moved})
 
-    def turn(self, given: Values) -> None:
+    def turn(self, given: Values, whole: bool = False) -> None:
         """Set controls; what is refused is marked at its field, which keeps what was typed, for it
-        may be half of a number.
+        may be half of a number. A `whole` Tacton brings its own drawing frequency, held from then.
         """
         errors, typed, accepted = dict(self.state.errors), dict(self.state.typed), {}
         for key, value in given.items():
@@ -76,7 +76,8 @@ class Session:
             except ValueError as error:
                 errors[key], typed[key] = str(error), str(value)
         values = self._good | accepted
-        if self.state.hold and (moved := [k for k in ("shape", "size", "speed") if k in accepted]):
+        moved = [key for key in ("shape", "size", "speed") if key in accepted]
+        if self.state.hold and moved and not whole:
             try:
                 values |= scenes.held(values, moved[-1], self.state.held_frequency)
                 errors.pop("hold", None)
@@ -87,6 +88,8 @@ class Session:
         self.history.push(values)
         if accepted:
             self.refresh()
+        if whole:
+            self.on_hold(self.state.hold)
 
     def select(self, x: float, y: float) -> None:
         """Select the point of the area at x and y in mm."""
@@ -96,13 +99,16 @@ class Session:
 
     def preset(self, name: str) -> None:
         """Take one of the paper's Tactons."""
-        self.turn(controls.presets()[name])
+        self.turn(controls.presets()[name], whole=True)
 
     def restart(self, query: str = "") -> None:
         """Begin anew with what an address says."""
-        self.pinned, self.history = (), History(STARTS)
+        values, refused = controls.from_query(query, self.own is not None)
+        self.pinned, self.history = (), History(values)
         self.state.update({"hold": False, "pinned": False, "problem": ""})
-        self._take(controls.from_query(query)[0])
+        self._take(values)
+        if refused and not self.state.problem:
+            self.state.problem = "; ".join(refused)
 
     def undo(self) -> None:
         """Back to the values before the last move."""
@@ -127,7 +133,7 @@ class Session:
         back, kept = self.state.pinned_query, controls.to_query(self.values)
         self.pinned = tuple(a for a in (self.kernel, self.current_waves) if a)
         self.state.pinned_query = kept
-        self._take(controls.from_query(back)[0])
+        self._take(controls.from_query(back, self.own is not None)[0])
 
     def cancel(self) -> None:
         """Stop computing waves, and show none."""
@@ -174,8 +180,14 @@ class Session:
         one = opened[0] if isinstance(opened, list) else opened
         content = one.get("content", b"")
         content = content if isinstance(content, bytes) else b"".join(content)
-        self.open_scene(content[:LARGEST_FILE].decode("utf-8", "replace"))
         self.state.opened = None
+        if len(content) > LARGEST_FILE:
+            self.state.problem = (
+                f"the scene cannot be opened: a file of {len(content) / 1e6:.3g} MB exceeds "
+                f"{LARGEST_FILE / 1e6:g} MB, far more than a scene needs"
+            )
+            return
+        self.open_scene(content.decode("utf-8", "replace"))
 
     def open_scene(self, text: str) -> None:
         """Take the scene of a TOML text; say why if it cannot be."""
@@ -190,7 +202,7 @@ class Session:
             return
         self.own = scene.body if values["body"] == OWN_BODY else self.own
         self.state.bodies = shown.bodies(self.own)
-        self.turn(values)
+        self.turn(values, whole=True)
 
     # What follows from a move
 
@@ -222,6 +234,8 @@ class Session:
         """The process that answers with a body has something to tell."""
         newest = number == self._number
         if what == "progress":
+            if self._good["body"] == "none":
+                return  # told before it was cancelled
             phase, done = content
             self.state.update({"busy": phase, "done": round(100 * max(0.0, min(1.0, done)))})
         elif what == "failed" and newest:

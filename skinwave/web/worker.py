@@ -30,11 +30,16 @@ def answer_forever(pipe: Connection) -> None:
             number, scene, moving = pipe.recv()
             try:
                 found = waves(scene, _teller(pipe, number), moving)
-            except (ValueError, ArithmeticError, MemoryError) as error:
-                said = " ".join(str(error).split()) or "not enough memory for this body"
-                pipe.send(("failed", number, said))
+            except MemoryError as error:
+                pipe.send(("failed", number, _said(error) or "not enough memory for this body"))
+            except (ValueError, ArithmeticError, OSError) as error:  # a full disk, say
+                pipe.send(("failed", number, _said(error) or type(error).__name__))
             else:
                 pipe.send(("answer", number, found))
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def _end_with_parent() -> None:
@@ -125,7 +130,8 @@ class Worker:
 
     def _send(self, number: int, scene: Any, moving: bool) -> None:
         self._at = number
-        self._pipe.send((number, scene, moving))
+        with contextlib.suppress(OSError):  # it has ended: `_listen` is about to tell
+            self._pipe.send((number, scene, moving))
 
     def _end(self) -> None:
         if self._process is not None:
@@ -143,10 +149,11 @@ class Worker:
             if what != "progress":
                 self._next(number)
         with self._lock:
-            lost = self._at if pipe is self._pipe else None
+            lost = None
             if pipe is self._pipe:
+                lost = self._waiting[0] if self._waiting else self._at
                 self._at = self._waiting = self._process = self._pipe = None
-        if lost is not None:
+        if lost is not None:  # the newest: of an older one nothing is awaited any more
             self._told("failed", lost, "the process that answers has ended; choose the body again")
 
     def _next(self, number: int) -> None:
