@@ -25,6 +25,7 @@ from fem.surface import (
     facet_normals,
     facet_points,
     load_operator,
+    on_surface,
     pressure_force,
     probe_operator,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "mean_power",
     "modes",
     "nonlinear",
+    "on_surface",
     "poles",
     "pressure_force",
     "probe_operator",

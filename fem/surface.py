@@ -6,12 +6,14 @@ nodal forces = P q at the facets' quadrature points,  displacement into the body
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.elements import shape_derivatives, shape_functions, triangle_rule
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
+
+BESIDE = 1e-9  # barycentric: how far beside a facet a point still counts as on it
 
 
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
@@ -91,7 +93,12 @@ def probe_operator(
     if not len(nodes):
         raise ValueError("there are no facets to read; name a facet set that is not empty")
     points = points[:, :2]
-    owner, barycentric = _locate(mesh.points[nodes[:, :3], :2], points)
+    owner, barycentric = _nearest(mesh.points[nodes[:, :3], :2], points)
+    if (beside := (barycentric < -BESIDE).any(axis=1)).any():
+        x_mm, y_mm = 1e3 * points[beside][0]
+        raise ValueError(
+            f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
+        )
     if mesh.order == 2:
         barycentric = _on_curved(mesh.points[nodes[owner], :2], barycentric, points)
     normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
@@ -141,8 +148,16 @@ def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:
     return barycentric
 
 
-def _locate(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
-    """Which triangle (p,) of (k, 3, 2) each point (p, 2) lies in, and where (p, 3)."""
+def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> NDArray[np.bool_]:
+    """Whether `probe_operator` can read at points (p, 2) in metre."""
+    _, barycentric = _nearest(mesh.points[facet_set(mesh, facets)[:, :3], :2], points)
+    return np.all(barycentric >= -BESIDE, axis=1)
+
+
+def _nearest(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """Which triangle (p,) of (k, 3, 2) each point (p, 2) lies in, or the least beside, and its
+    barycentric coordinates (p, 3) there.
+    """
     origin, edges = triangles[:, 0], triangles[:, 1:] - triangles[:, :1]
     area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     standing = np.abs(area) < 1e-12 * (edges**2).sum(axis=(1, 2))
@@ -154,11 +169,6 @@ def _locate(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
         third = (y * edges[:, 0, 0] - x * edges[:, 0, 1]) * inverse_area
         inside = np.minimum(np.minimum(second, third), 1 - second - third)
         owner = int(np.nanargmax(inside))
-        if inside[owner] < -1e-9:
-            x_mm, y_mm = 1e3 * point
-            raise ValueError(
-                f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
-            )
         owners.append(owner)
         coordinates.append([1 - second[owner] - third[owner], second[owner], third[owner]])
     return np.array(owners), np.array(coordinates)

@@ -80,9 +80,10 @@ def point_response(
         part = slice(start, start + BATCH)
         lift = _lift(compliance, r, w[part], width)
         if lift != before or start % (CHECKED_EACH * BATCH) == 0:
-            n = _enough_nodes(compliance, r, w[part], width, n if lift == before else FEWEST_NODES)
+            least = n if lift == before else FEWEST_NODES
+            n = _enough_nodes(compliance, r, w[part], width, lift, least)
         before = lift
-        found[part] = _integrated(compliance, r, w[part], width, n)
+        found[part] = _integrated(compliance, r, w[part], width, lift, n)
         if np.abs(found[part]).max() < negligible * np.abs(found[: part.stop]).max():
             break
     return found
@@ -213,21 +214,28 @@ def _check(pressure: MovingPressure) -> None:
 def _lift(compliance: Compliance, r: Floats, w: Complex, width: float) -> float:
     """How far above the real axis, 1/m, the path of integration runs."""
     highest = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
-    return min(highest, compliance.clearance(w))
+    lift = min(highest, compliance.clearance(w))
+    if not lift > 0:
+        raise ArithmeticError(UNRESOLVED)
+    return lift
 
 
-def _enough_nodes(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> int:
-    """The fewest wavenumbers that twice as many do not improve on."""
-    coarse = _integrated(compliance, r, w, width, n)
+def _enough_nodes(
+    compliance: Compliance, r: Floats, w: Complex, width: float, lift: float, n: int
+) -> int:
+    """The fewest wavenumbers, from n, that twice as many do not improve on."""
+    coarse = _integrated(compliance, r, w, width, lift, n)
     while n < MOST_NODES:
-        fine = _integrated(compliance, r, w, width, 2 * n)
+        fine = _integrated(compliance, r, w, width, lift, 2 * n)
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
             return n
         coarse, n = fine, 2 * n
     raise ArithmeticError(UNRESOLVED)
 
 
-def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: int) -> Complex:
+def _integrated(
+    compliance: Compliance, r: Floats, w: Complex, width: float, lift: float, n: int
+) -> Complex:
     """The wavenumber integral by Gauss-Legendre nodes on panels along the raised path."""
     nodes, weights = np.polynomial.legendre.leggauss(16)
     # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
@@ -235,9 +243,6 @@ def _integrated(compliance: Compliance, r: Floats, w: Complex, width: float, n: 
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     x = (middle[:, None] + half[:, None] * nodes).ravel()
     dx = (half[:, None] * weights).ravel()
-    lift = _lift(compliance, r, w, width)
-    if not lift > 0:
-        raise ArithmeticError(UNRESOLVED)
     ramp = np.tanh(x / lift)
     k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
     spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)

@@ -1,12 +1,14 @@
 """Results for other programs: tables, sound, and fields that ParaView opens."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
+from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import step
 from skinwave.pictures.views import View
@@ -22,12 +24,24 @@ def write_probes(stem: Path, response: Response) -> None:
     kind = "pressure" if response.unit == "Pa" else "displacement"
     places = [f"({1e3 * x:g}, {1e3 * y:g}) mm" for x, y in response.probes]
     with open(stem.with_suffix(".csv"), "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)])
-        for t, row in zip(response.times, response.displacement, strict=True):
-            writer.writerow([f"{t:.9g}", *(f"{value:.9g}" for value in row)])
+        header = ["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)]
+        write_table(file, header, [response.times, *response.displacement.T])
     arrays = {"t": response.times, "probes": response.probes, kind: response.displacement}
     np.savez(stem.with_suffix(".npz"), **arrays)  # type: ignore[arg-type]
+
+
+def write_table(file: TextIO, header: Iterable[str], columns: Sequence[Floats]) -> None:
+    """Columns (t,) as CSV to nine digits, below their names."""
+    writer = csv.writer(file)
+    writer.writerow(header)
+    writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+
+
+def sampled(response: Response, probe: int) -> tuple[NDArray[np.int16], float]:
+    """A probe's waveform about its mean in 16 bit, and what of it is the largest that they hold."""
+    motion = response.displacement[:, probe] - response.displacement[:, probe].mean()
+    largest = float(np.abs(motion).max())
+    return np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16), largest
 
 
 def write_sound(folder: Path, response: Response, probe: int) -> Path:
@@ -37,12 +51,10 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     """
     from scipy.io import wavfile
 
-    motion = response.displacement[:, probe] - response.displacement[:, probe].mean()
-    largest = float(np.abs(motion).max())
+    samples, largest = sampled(response, probe)
     unit, per = ("Pa", 1.0) if response.unit == "Pa" else ("um", 1e6)
     x, y = 1e3 * response.probes[probe]
     path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{per * largest:.4g}_{unit}.wav"
-    samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
     wavfile.write(path, round(1 / step(response.times)), samples)
     return path
 

@@ -220,6 +220,12 @@ def bending_equivalent(material: Material, ratio: float) -> Material:
     )
 
 
+def has_exact_waves(body: Body) -> bool:
+    """Whether exact waves of an endless slab stand for a body, but for what its sides send back."""
+    layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
+    return layer and body.is_plain
+
+
 def compliance(body: Body) -> Compliance:
     """How an endless body of the same section gives way; a sheet vibrates in vacuum.
 

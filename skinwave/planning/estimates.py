@@ -1,7 +1,6 @@
 """How wrong an answer will be, estimated before it is computed."""
 
 from dataclasses import replace
-from math import isfinite
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
 from simple_model.trajectory import BY_POINTS
-from skinwave.models.bodies import compliance
+from skinwave.models.bodies import compliance, has_exact_waves
 from skinwave.scene import Scene
 
 REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
@@ -48,9 +47,7 @@ def highest_line(frequencies: Floats, shares: Floats, tolerance: float) -> float
 
 def is_flat(scene: Scene) -> bool:
     """Whether there are exact waves for the scene, but for what its sides send back."""
-    body = scene.body
-    layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
-    return layer and body.is_plain and scene.pressure.focus == "gaussian"
+    return has_exact_waves(scene.body) and scene.pressure.focus == "gaussian"
 
 
 def waves_returned(

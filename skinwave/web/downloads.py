@@ -1,7 +1,6 @@
 """What a page gives to keep: the scene, waveforms as tables and sound, a figure, the report."""
 
 import asyncio
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO, StringIO
@@ -9,10 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
 from simple_model.response import step
-from skinwave.exports import FULL_SCALE
+from skinwave.exports import sampled, write_table
+from skinwave.pictures.figures import colour
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, influenced
@@ -43,17 +41,13 @@ def csv_of(answers: Sequence[Answer]) -> bytes:
     """Time in s and a column an answer, with its unit and place in the header."""
     x, y = 1e3 * answers[0].response.probes[0]
     kinds = {"Pa": "pressure", "m": "displacement"}
+    header = ["time, s"] + [
+        f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
+        for a in answers
+    ]
     text = StringIO()
-    writer = csv.writer(text)
-    writer.writerow(
-        ["time, s"]
-        + [
-            f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
-            for a in answers
-        ]
-    )
     columns = [answers[0].response.times, *(a.response.displacement[:, 0] for a in answers)]
-    writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+    write_table(text, header, columns)
     return text.getvalue().encode()
 
 
@@ -61,11 +55,8 @@ def wav_of(answer: Answer) -> bytes:
     """The waveform about its mean (16 bit, mono) at its own rate, as loud as the format holds."""
     from scipy.io import wavfile
 
-    motion = answer.response.displacement[:, 0]
-    motion = motion - motion.mean()
-    largest = float(np.abs(motion).max()) or 1.0
     buffer = BytesIO()
-    samples = np.round(motion / largest * FULL_SCALE).astype(np.int16)
+    samples, _ = sampled(answer.response, 0)
     wavfile.write(buffer, round(1 / step(answer.response.times)), samples)
     return buffer.getvalue()
 
@@ -78,13 +69,11 @@ def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
     from skinwave.reports.scene_report import write_report
     from skinwave.run import Run
 
-    known = (name for name, body in BODIES.items() if body == scene.body)
-    names = {"Pa": "none", "m": next(known, scene.body.kind)}
     with TemporaryDirectory() as folder:
         results, out = Path(folder, "results"), Path(folder, "report")
         out.mkdir()
         for answer in answers:
-            response, name = answer.response, names[answer.response.unit]
+            response, name = answer.response, _body_of(scene, answer)
             response = replace(response, effort=replace(response.effort, versions=versions()))
             own = scene if name != "none" else with_body(scene, BODIES["none"])
             (results / name).mkdir(parents=True)
@@ -94,6 +83,13 @@ def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
         return (out / "index.html").read_bytes()
 
 
+def _body_of(scene: Scene, answer: Answer) -> str:
+    """The name of the body that answered."""
+    if answer.response.unit == "Pa":
+        return "none"
+    return next((n for n, body in BODIES.items() if body == scene.body), scene.body.kind)
+
+
 def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
     """Maps, waveform and spectrum; `kind` is "svg" or "png"."""
     from matplotlib.figure import Figure
@@ -101,7 +97,7 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
     for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
         unit, per = ("Pa", 1.0) if answer.response.unit == "Pa" else ("µm", 1e6)
-        edge = 1e3 * REACH
+        edge, line_style = 1e3 * REACH, {"lw": 1, "color": colour(_body_of(scene, answer))}
         image = row[0].imshow(
             per * answer.map.rms, extent=(-edge, edge, -edge, edge), origin="lower", cmap="cividis"
         )
@@ -116,9 +112,9 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
         row[0].set(xlabel="x, mm", ylabel="y, mm", title=answer.response.model)
         shown = answer.response.times <= 0.06
         row[1].plot(1e3 * answer.response.times[shown],
-                    per * answer.response.displacement[shown, 0], lw=1)  # fmt: skip
+                    per * answer.response.displacement[shown, 0], **line_style)  # fmt: skip
         row[1].set(xlabel="time, ms", ylabel=unit, title="waveform at the point")
-        row[2].plot(answer.frequencies, per * answer.spectrum, lw=1)
+        row[2].plot(answer.frequencies, per * answer.spectrum, **line_style)
         row[2].set(xlabel="frequency, Hz", ylabel=unit, title="spectrum", xlim=(0, 600))
     buffer = BytesIO()
     figure.savefig(buffer, format=kind, dpi=150)

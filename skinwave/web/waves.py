@@ -12,7 +12,6 @@ and read everywhere; another path needs another reduction, other controls none.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ from simple_model.steady import (
     path_knots,
 )
 from skinwave.effort import Progress
-from skinwave.models.bodies import build, compliance, operators, surface_load
+from skinwave.models.bodies import build, compliance, has_exact_waves, operators, surface_load
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
 from skinwave.scene import Body, Scene
@@ -78,7 +77,7 @@ class Reduced:
     load: Floats
     points: Floats
     read: Floats
-    within: Floats
+    within: NDArray[np.bool_]
     mesh: TetMesh
     shape: Shape
     nodes: Ints
@@ -96,7 +95,7 @@ class Waves:
         """The answer to a scene of one probe, with the motion of the whole body if `moving`;
         raises what `simulate` does.
         """
-        if is_exact(scene.body):
+        if has_exact_waves(scene.body):
             flat = (scene.body, scene.pressure.height)
             table = self._keep("table", flat, lambda: tabulate(*flat, progress))
             return flat_answer(table, scene, moving)
@@ -117,13 +116,6 @@ class Waves:
         while len(kept) > KEPT:
             del kept[next(iter(kept))]
         return found
-
-
-def is_exact(body: Body) -> bool:
-    """Whether exact waves of an endless body stand for it."""
-    return body.kind == "slab" and body.is_plain and (
-        body.base == "clamped" or not isfinite(body.depth)
-    )  # fmt: skip
 
 
 def tabulate(body: Body, height: float, progress: Progress) -> Table:
@@ -237,7 +229,7 @@ def reduced(
     )  # fmt: skip
     progress("read the surface", 1.0)
     inwards = (1 - 1e-6) * places()  # a body may end where the area does
-    within = _on(made.mesh, inwards)
+    within = fem.on_surface(made.mesh, inwards)
     read = fem.probe_operator(made.mesh, inwards[within]) @ model.basis
     shape, nodes = skin_of(made, body)
     return Reduced(
@@ -251,19 +243,6 @@ def reduced(
             estimate=model.estimate,
         ),
     )  # fmt: skip
-
-
-def _on(mesh: Any, points: Floats) -> Any:
-    """Which points (n,) lie on the top of a mesh, seen from above."""
-    a, b, c = np.moveaxis(mesh.points[mesh.facets["top"][:, :3], :2], 1, 0)
-    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
-    area = ux * vy - uy * vx
-    found = []
-    for part in np.array_split(points, len(points) // 64 + 1):
-        dx, dy = np.moveaxis(part[:, None] - a, -1, 0)
-        s, t = (dx * vy - dy * vx) / area, (ux * dy - uy * dx) / area
-        found.append(((s >= -1e-6) & (t >= -1e-6) & (s + t <= 1 + 1e-6)).any(axis=1))
-    return np.concatenate(found)
 
 
 def _probe(body: Reduced, at: Floats) -> Floats:
