@@ -1,6 +1,8 @@
 """Layers, placement and sides of bodies."""
 
+import csv
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import fem
 import meshes
 import skinwave
 from meshes import graded_axis
-from meshes.palm import Palm, level_set, surface
+from meshes.palm import level_set
 from meshes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.focus import along_axis, array_field, spot_width
@@ -20,6 +22,7 @@ from skinwave.planning.plan import plan
 from skinwave.scene import Body, Layer, Placement, Relief
 from skinwave.scene_file import dumps, loads
 
+HAND = Path(__file__).parents[1] / "examples/hand/generic-hand-right.glb"
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25, trajectory=PATH))
 SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
@@ -298,20 +301,23 @@ def test_tactons_are_compared_on_the_body_of_a_file(slab_file, tmp_path, monkeyp
 
 
 @pytest.mark.slow
-def test_a_surface_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, monkeypatch):
-    """A palm in millimetres whose palm looks along -y, as another program may have left it."""
+def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, monkeypatch):
+    """Of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
     monkeypatch.chdir(tmp_path)
-    found = surface(Palm(), 0.004)
-    x, y, z = 1e3 * found.points.T
-    corners = np.column_stack([x, -z, y])
-    lines = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in corners]
-    lines += ["f {} {} {}".format(*(triangle + 1)) for triangle in found.triangles]
-    (tmp_path / "hand.obj").write_text("\n".join(lines))
     scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.05)))
     (tmp_path / "scene.toml").write_text(dumps(scene))
-    ask = ["compare", "scene.toml", "--body", "hand.obj", "--unit", "mm", "--up", "-y", "--h", "5"]
+    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "8"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
-    assert (tmp_path / "both/index.html").exists()
+    page = (tmp_path / "both/index.html").read_text()
+    assert "Body from generic-hand-right.glb, -x towards the device" in page
+    assert "thicker sheet" not in page
+    assert "--up -x --h 8" in page
+    rows = list(csv.DictReader((tmp_path / "both/lines.csv").read_text().splitlines()))
+    moved = [
+        float(r["displacement_um"]) for r in rows if r["line"] == "f_AM" and r["body"] == "mesh"
+    ]
+    assert 0.1 < max(moved) < 10
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "both"}
 
 
 def test_what_is_seen_of_a_body_is_not_the_layer_around_it():

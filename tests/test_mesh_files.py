@@ -464,7 +464,7 @@ def test_a_damaged_file_takes_nobody_with_it(tmp_path, capfd, suffix):
 # skinwave mesh
 
 
-def test_a_public_hand_is_meshed_with_unit_and_up_only(tmp_path, monkeypatch, capsys):
+def test_a_hand_with_seams_is_meshed_with_unit_and_up_only(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     points, triangles = with_seams(*hand())
     write_glb(tmp_path / "hand.glb", points, triangles)

@@ -1,6 +1,7 @@
 """The point kernel beside finite elements: the main job."""
 
 import argparse
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ from skinwave.commands.common import add_mesh, add_output, metre, progress_of, s
 if TYPE_CHECKING:
     from skinwave.scene import Body
 
-TITLE = "The paper's 15 Tactons: point kernel, paper and skin"
+TITLE = "The paper's 15 Tactons: point kernel, {}"
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -31,8 +32,10 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import folder_name, output_folder
+    from skinwave.pictures.figures import label
     from skinwave.scene import with_body
     from skinwave.scene_file import read
+    from skinwave.studies import paper15
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
@@ -44,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
         for body in (bodies or {}).values():
             scene = with_body(scene, body)
         scenes = own_scenes(scene, folder_name(scene.name))
+    against = " and ".join(label(body) for body in bodies or paper15.MEASURED_ON)
     out = options.out or Path("paper-15" if paper else f"{Path(options.scene).stem}-compared")
     with (
         output_folder(out, overwrite=options.overwrite) as folder,
@@ -51,8 +55,8 @@ def run(options: argparse.Namespace) -> int:
     ):
         outcome = run_study(
             scenes, folder, progress,
-            title=TITLE if scene is None else scene.name,
-            command=f"skinwave compare {options.scene}",
+            title=TITLE.format(against) if scene is None else scene.name,
+            command=_again(options),
             h=metre(options.h), solver=options.solver,
         )  # fmt: skip
     held = sum(verdict.holds for verdict in outcome.verdicts)
@@ -73,6 +77,16 @@ def run(options: argparse.Namespace) -> int:
         f"hold; open {out}/index.html",
     )
     return 0 if outcome.runs == outcome.planned else 1
+
+
+def _again(options: argparse.Namespace) -> str:
+    """The command that makes the same comparison."""
+    words = ["--body", options.body] if options.body else []
+    if options.body and Path(options.body).is_file():
+        words += ["--unit", options.unit, "--up", options.up]
+    if options.h:
+        words += ["--h", f"{options.h:g}"]
+    return shlex.join(["skinwave", "compare", options.scene, *words])
 
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":

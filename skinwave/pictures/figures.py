@@ -19,8 +19,8 @@ COLOURS = {"none": "#000000", "paper-sheet": "#D55E00", "skin-slab": "#0072B2"}
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 LABELS = {
     "none": "point kernel",
-    "paper-sheet": "paper sheet (fem)",
-    "skin-slab": "skin slab (fem)",
+    "paper-sheet": "paper sheet",
+    "skin-slab": "skin slab",
 }
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
@@ -89,7 +89,12 @@ def marker(body: str) -> str:
 
 def label(body: str) -> str:
     """The name of a body in every legend."""
-    return LABELS.get(body, f"{body} (fem)")
+    return LABELS.get(body, body)
+
+
+def answered(run: Run) -> str:
+    """The name of a body and of the model that answered for it."""
+    return label(run.body) if run.body == "none" else f"{label(run.body)} ({run.model})"
 
 
 def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
@@ -98,7 +103,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     for run in runs:
         style: dict[str, Any] = {"color": colour(run.body), "marker": marker(run.body), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        labels.append(label(run.body) + (f", 1 = {_scale_text(run)}" if scales else ""))
+        labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
     figure.legend(
         handles,
         labels,

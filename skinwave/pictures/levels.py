@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from simple_model import sensation_level, threshold
 from simple_model.threshold import BAND, HIGHEST, LOWEST
-from skinwave.pictures.figures import colour, label, marker
+from skinwave.pictures.figures import answered, colour, marker
 from skinwave.pictures.styles import Style
 from skinwave.run import Run
 
@@ -69,7 +69,7 @@ def _draw(ax: Axes, run: Run, probe: int) -> None:
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
     ax.set_ylim(2e-3, 3e3)
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
-    ax.set_title(label(run.body))
+    ax.set_title(answered(run))
     ax.grid(alpha=0.25)
     ax.legend(loc="upper left", fontsize="small", frameon=False)
 

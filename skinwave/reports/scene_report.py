@@ -8,7 +8,7 @@ from typing import Any
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
-from skinwave.pictures.figures import label
+from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
@@ -19,7 +19,7 @@ from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
-from skinwave.studies.study import modelled
+from skinwave.studies.description import extent, modelled
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
@@ -92,14 +92,12 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
     )  # fmt: skip
     moved = f"{path.shape} of {1e3 * path.size:g} mm at {path.speed:g} m/s"
     f_d = path.drawing_frequency
-    size = f"{1e3 * body.width:g} x {1e3 * body.height:g} x {1e3 * body.depth:g} mm"
     return [
         ["focus", f"{moved}, drawn {f_d:.3f} times a second" if f_d else "at rest"],
         ["amplitude modulation", f"{tacton.am_frequency:g} Hz" if tacton.am_frequency else "none"],
         ["drive", f"{pressure.drive}, {pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
-        ["body", "none" if body.kind == "none" else f"{body.kind} of {size}, base {body.base}, "
-                 f"sides {body.sides}"],
+        ["body", extent(body)],
         ["duration", f"{tacton.duration:g} s"],
         ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
     ]  # fmt: skip
@@ -138,7 +136,7 @@ def _lines(runs: Sequence[Run]) -> str:
     header = ["line", "frequency, Hz"]
     for run in runs:
         pascal = run.response.unit == "Pa"
-        header += [f"{label(run.body)}, {'Pa' if pascal else 'µm'} peak"]
+        header += [f"{answered(run)}, {'Pa' if pascal else 'µm'} peak"]
         header += [] if pascal else ["dB re threshold"]
     x, y = 1e3 * runs[0].response.probes[probe]
     return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows)

@@ -13,13 +13,14 @@ from skinwave.effort import Progress, peak_memory
 from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
-from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
+from skinwave.pictures.figures import overview_figure, png, tacton_figure
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.simulation import check_knobs, simulate
 from skinwave.studies import paper15, tables
 from skinwave.studies.claims import Verdict, evaluate
+from skinwave.studies.description import modelled
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 
@@ -223,54 +224,9 @@ def _disagreements(verdicts: list[Verdict]) -> list[str]:
 OVERVIEW_CAPTION = (
     "Top: motion about its mean at one probe, relative to each model's largest motion at any "
     "probe. Middle: its spectrum; markers are the Tacton's own lines, unmarked peaks are pairs "
-    "with 2 f_AM and the free vibration that the start of the Tacton leaves in the sheet. "
+    "with 2 f_AM and the free vibration that the start of the Tacton leaves in a body. "
     "Bottom: how far the motion spreads."
 )
-LEFT_OUT = (
-    "The point kernel is drawn as published: linear drive law q = A M(t) S(D) with "
-    "S = sinc^2(D/D0) and no propagation. What it predicts is a stimulation in Pa. The bodies "
-    "are linear and elastic with viscous loss, on 10-node tetrahedra, with few unknowns left. "
-    "Their lines at 2 f_AM and, in AM+STM, at n f_d come from their drive law as much as from "
-    "waves: pressure_squared, because a device that modulates its sound pressure pushes with "
-    "the square of it.",
-    "The pressure at the focus is uncertain by a factor of 2, and all displacements with it.",
-)
-
-
-def modelled(runs: list[Run]) -> list[str]:
-    """What the bodies are, and what that leaves out, in sentences."""
-    sentences = [LEFT_OUT[0]]
-    for body in dict.fromkeys(run.body for run in runs if run.scene.body.kind != "none"):
-        mine = [run for run in runs if run.body == body]
-        sentences.append(f"{label(body)}: {_body_sentence(mine)}")
-    return [*sentences, LEFT_OUT[1]]
-
-
-def _body_sentence(runs: list[Run]) -> str:
-    body, solid = runs[0].scene.body, runs[0].scene.body.solid
-    text = (
-        f"{1e3 * body.width:g} x {1e3 * body.height:g} x {1e3 * body.depth:g} mm, base "
-        f"{body.base}, sides {body.sides}; density {solid.density:g} kg/m3, shear modulus "
-        f"{solid.shear_modulus / 1e3:.4g} kPa, Poisson's ratio {solid.poisson:g}, viscosity "
-        f"{solid.viscosity:g} Pa s, loss factor {solid.loss_factor:g}"
-    )
-    if solid.loss_factor:
-        text += " (as Rayleigh damping that fits it over 50-600 Hz)"
-    if solid.relaxing_modulus:
-        text += (
-            f", relaxing {solid.relaxing_modulus / 1e3:.4g} kPa in "
-            f"{1e3 * solid.relaxation_time:g} ms"
-        )
-    if body.kind == "slab":
-        return text + ". Left out: layers and curvature."
-    sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
-    return (
-        f"{text}. The mesh is a thicker sheet of the same bending stiffness and mass per area. "
-        "Left out: the air that moves along, a fifth to a third of the mass of office paper; and "
-        f"stretching: under its mean load this sheet sags by up to {sag:.1f} times its "
-        "thickness, and beyond about half a thickness a real one stiffens and its lowest modes "
-        "lie higher. Neither size nor support of the sheet that was measured is published."
-    )
 
 
 def caption(name: str, group: list[Run]) -> str:

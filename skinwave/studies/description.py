@@ -1,0 +1,122 @@
+"""What was modelled, and what that leaves out, in sentences that are true of the runs at hand."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from fem.materials import Material
+from skinwave.pictures.figures import answered
+from skinwave.run import Run
+from skinwave.scene import FLAT, Body
+
+ANSWERS = {
+    "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
+    "propagates, and what it predicts is a stimulation in Pa",
+    "flat-body": "exact linear waves of an endless flat body, without a mesh",
+    "fem": "linear waves on 10-node tetrahedra, with few unknowns left",
+    "fem-harmonic": "the steady state of linear waves on 10-node tetrahedra",
+    "fem-transient": "linear waves on 10-node tetrahedra, step by step",
+    "fem-nonlinear": "a sheet that stretches as it bends, in its modes, about its rest "
+    "under the mean pressure",
+    "fem-nonlinear-transient": "a sheet that stretches as it bends, on 10-node "
+    "tetrahedra, step by step",
+}
+SPOTS = {
+    "gaussian": "a Gaussian focus",
+    "main_lobe": "a focus S = sinc^2(D/D0)",
+    "array": "the array's whole field",
+}
+SQUARED = (
+    "Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law of the bodies as much as "
+    "from waves: pressure_squared, because a device that modulates its sound pressure pushes with "
+    "the square of it."
+)
+UNCERTAIN = (
+    "The pressure at the focus is uncertain by a factor of 2, and all displacements with it."
+)
+
+
+def modelled(runs: Iterable[Run]) -> list[str]:
+    """A paragraph a body and model, and what holds for all."""
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in runs:
+        groups.setdefault((run.body, run.model), []).append(run)
+    paragraphs = [_answered(group) for group in groups.values()]
+    on_bodies = [run for group in groups.values() for run in group if run.response.unit == "m"]
+    if any(run.is_am and run.scene.pressure.drive == "pressure_squared" for run in on_bodies):
+        paragraphs.append(SQUARED)
+    return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
+
+
+def _answered(runs: list[Run]) -> str:
+    """One body by one model."""
+    pressure, model = runs[0].scene.pressure, runs[0].model
+    load = f"drive law {pressure.drive}, {SPOTS[pressure.focus]}"
+    text = f"{_sentence(answered(runs[0]))}: {ANSWERS[model]}; {load}."
+    return text if model == "point-kernel" else f"{text} {_sentence(_body(runs))}"
+
+
+def _sentence(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def extent(body: Body) -> str:
+    """What a body is and how large."""
+    if body.kind == "none":
+        return "none"
+    if body.kind == "mesh":
+        size = f"body from {Path(body.file).name}, {body.up} towards the device"
+    else:
+        across = f"{1e3 * body.width:g} x {1e3 * body.height:g}"
+        deep = f" x {1e3 * body.depth:g}" if np.isfinite(body.depth) else ""
+        size = f"{body.kind} of {across}{deep} mm"
+    return f"{size}, base {body.base}, sides {body.sides}"
+
+
+def _body(runs: list[Run]) -> str:
+    body = runs[0].scene.body
+    endless = " of which the exact waves know only the depth," * (runs[0].model == "flat-body")
+    text = f"{extent(body)},{endless} of {_material(body.solid)}"
+    for thickness, material in ((layer.thickness, layer.material) for layer in body.layers):
+        of = material if isinstance(material, str) else _material(material)
+        text += f"; above it {1e3 * thickness:g} mm of {of}"
+    if body.placement != FLAT:
+        text += "; tilted or moved under the device"
+    if body.kind == "sheet":
+        return f"{text}. {_sheet(runs)}"
+    left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * (body.kind == "slab")
+    return f"{text}. Left out: {' and '.join(left_out)}." if left_out else f"{text}."
+
+
+def _material(solid: Material) -> str:
+    text = (
+        f"density {solid.density:g} kg/m3, shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
+        f"Poisson's ratio {solid.poisson:g}, viscosity {solid.viscosity:g} Pa s"
+    )
+    if solid.loss_factor:
+        text += f", loss factor {solid.loss_factor:g}"
+    if solid.relaxing_modulus:
+        text += (
+            f", relaxing {solid.relaxing_modulus / 1e3:.4g} kPa in "
+            f"{1e3 * solid.relaxation_time:g} ms"
+        )
+    return text
+
+
+def _sheet(runs: list[Run]) -> str:
+    text = ""
+    if runs[0].model in ("fem", "fem-transient") and runs[0].scene.body.solid.loss_factor:
+        text = "The loss factor is Rayleigh damping that fits it over 50-600 Hz. "
+    if runs[0].model.startswith("fem"):
+        text += "The mesh is a thicker sheet of the same bending stiffness and mass per area. "
+    text += "Left out: the air that moves along, a fifth to a third of the mass of office paper"
+    if not runs[0].model.startswith("fem-nonlinear"):
+        depth = runs[0].scene.body.depth
+        sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / depth
+        text += (
+            f"; and stretching: under its mean load this sheet sags by up to {sag:.1f} times its "
+            "thickness, and beyond about half a thickness a real one stiffens and its lowest "
+            "modes lie higher"
+        )
+    return f"{text}. Neither size nor support of the sheet that was measured is published."
