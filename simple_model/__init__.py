@@ -1,6 +1,6 @@
 """What is commanded, and every answer that needs no mesh."""
 
-from simple_model.flat_body import flat_body
+from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.point_kernel import point_kernel
 from simple_model.pressure import MovingPressure
@@ -30,6 +30,7 @@ __all__ = [
     "relative_intensity",
     "sensation_level",
     "spectrum",
+    "steady_state",
     "tacton_lines",
     "threshold",
 ]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from simple_model import Response, flat_body, point_kernel
+from simple_model import Response, flat_body, point_kernel, steady_state
 from simple_model.choices import choose
 from skinwave.effort import Progress, silent
 from skinwave.models.bodies import compliance
@@ -16,9 +16,10 @@ from skinwave.planning.plan import plan
 from skinwave.scene import Scene
 
 MODELS = (
-    "auto", "point-kernel", "flat-body", "fem", "fem-harmonic", "fem-transient", "fem-nonlinear",
-    "fem-nonlinear-transient",
+    "auto", "point-kernel", "flat-body", "flat-body-harmonic", "fem", "fem-harmonic",
+    "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
 )  # fmt: skip
+EXACT = {"flat-body": flat_body, "flat-body-harmonic": steady_state}
 
 
 def simulate(
@@ -38,10 +39,10 @@ def simulate(
     ----------
     scene : Scene
     model : "point-kernel"; "flat-body", exact waves in an endless body; "fem", the reduced model;
-        "fem-harmonic", the steady state line by line; "fem-transient", every time step;
-        "fem-nonlinear", a sheet that stretches as it bends, in its modes, about its rest under the
-        mean pressure; "fem-nonlinear-transient", the same with all unknowns; or "auto": what
-        `plan` chooses, which is linear
+        "fem-transient", every time step; "flat-body-harmonic" and "fem-harmonic", the steady state
+        line by line; "fem-nonlinear", a sheet that stretches as it bends, in its modes, about its
+        rest under the mean pressure; "fem-nonlinear-transient", the same with all unknowns; or
+        "auto": what `plan` chooses, which is linear
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : called with the name of the phase and the fraction done
     h : float, metre, element size; planned if not given, and with it how much of the body counts
@@ -75,13 +76,14 @@ def simulate(
     times = sample_times(scene)
     if model == "point-kernel":
         return point_kernel(scene.pressure, scene.probe_points, times)
-    if model == "flat-body":
+    if model in EXACT:
         if not scene.body.is_plain:
             raise ValueError(
-                "flat-body takes one material that lies flat across the beam, not layers or a "
+                f"{model} takes one material that lies flat across the beam, not layers or a "
                 "placement; use fem"
             )
-        return flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
+        waves = EXACT[model]
+        return waves(compliance(scene.body), scene.pressure, scene.probe_points, times)
     report = progress or silent
     if model == "fem-transient":
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)

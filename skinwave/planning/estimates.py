@@ -50,6 +50,21 @@ def is_flat(scene: Scene) -> bool:
     return has_exact_waves(scene.body) and scene.pressure.focus == "gaussian"
 
 
+def start_share(scene: Scene) -> float:
+    """The share of an endless slab's waveforms that is not their steady state, at most 1.
+
+    What the start leaves is taken for as large as the steady state, at the cut-off of shear waves
+    across the depth, w = pi c / 2 H: the lowest there is, which viscosity damps least.
+    """
+    solid, tacton = scene.body.solid, scene.tacton
+    if tacton.is_sampled or tacton.trajectory.shape == "recorded":
+        return 1.0
+    w = np.pi * solid.shear_speed / (2 * scene.body.depth)
+    modulus = solid.complex_modulus(w)
+    decayed = w * tacton.duration * modulus.imag / modulus.real
+    return float(1 / np.sqrt(max(decayed, 1.0)))
+
+
 def waves_returned(
     scene: Scene, half: Floats, highest: float, reflected: float | None = None
 ) -> float:

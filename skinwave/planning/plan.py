@@ -14,6 +14,7 @@ from skinwave.planning.estimates import (
     highest_line,
     is_flat,
     motion_lines,
+    start_share,
     waves_returned,
 )
 from skinwave.planning.extent import Row, extent, half_widths, left_out, symmetry
@@ -96,8 +97,9 @@ def plan(
         )
     ]
     returned = waves_returned(scene, half_widths(scene.body), highest) if is_flat(scene) else 1.0
-    if model == "flat-body" or (model is None and returned <= WAVES_SHARE * tolerance):
-        return _without_mesh(scene, tolerance, highest, returned, rows)
+    flat = model in ("flat-body", "flat-body-harmonic")
+    if flat or (model is None and returned <= WAVES_SHARE * tolerance):
+        return _without_mesh(scene, tolerance, model, highest, returned, rows)
     body, cut = extent(scene, tolerance, highest)
     if h:
         check_mesh(body, h)  # refuses what cannot be meshed before anything is computed
@@ -155,21 +157,35 @@ def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> P
 
 
 def _without_mesh(
-    scene: Scene, tolerance: float, highest: float, returned: float, rows: list[Row]
+    scene: Scene,
+    tolerance: float,
+    model: str | None,
+    highest: float,
+    returned: float,
+    rows: list[Row],
 ) -> Plan:
+    start = start_share(scene)
+    if model is None:
+        model = "flat-body-harmonic" if returned + start <= tolerance else "flat-body"
+    left = start if model == "flat-body-harmonic" else 0.0
     reason = "a homogeneous flat slab without sides that reflect: exact waves, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"waves that come back from the sides are {100 * returned:.2g} %: take none"
-    warnings = _exceeds(
-        "flat-body, which lets no wave return from the sides,", returned, tolerance, "fem is"
-    )
+    if left:
+        reason += f"; of how the motion starts at most {100 * start:.2g} % is left"
+    warnings = (
+        *_exceeds(f"{model}, which lets no wave return from the sides,", returned, tolerance,
+                  "fem is"),
+        *_exceeds(f"{model}, which leaves out how the motion starts,", left, tolerance,
+                  "flat-body is"),
+    )  # fmt: skip
     rows = [
         *rows,
-        Row(what="model", value="flat-body", reason="as asked" if warnings else reason),
+        Row(what="model", value=model, reason="as asked" if warnings else reason),
         *left_out(scene, highest),
     ]
     return Plan(
-        model="flat-body", body=scene.body, highest=highest, error=returned, seconds=2.0,
+        model=model, body=scene.body, highest=highest, error=returned + left, seconds=2.0,
         memory=3e8, rows=tuple(rows), warnings=warnings,
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ ANSWERS = {
     "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
     "propagates, and what it predicts is a stimulation in Pa",
     "flat-body": "exact linear waves of an endless flat body, without a mesh",
+    "flat-body-harmonic": "the steady state of exact linear waves of an endless flat body",
     "fem": "linear waves on 10-node tetrahedra, with few unknowns left",
     "fem-harmonic": "the steady state of linear waves on 10-node tetrahedra",
     "fem-transient": "linear waves on 10-node tetrahedra, step by step",
@@ -76,7 +77,9 @@ def extent(body: Body) -> str:
 
 def _body(runs: list[Run]) -> str:
     body = runs[0].scene.body
-    endless = " of which the exact waves know only the depth," * (runs[0].model == "flat-body")
+    endless = " of which the exact waves know only the depth," * runs[0].model.startswith(
+        "flat-body"
+    )
     text = f"{extent(body)},{endless} of {_material(body.solid)}"
     for thickness, material in ((layer.thickness, layer.material) for layer in body.layers):
         of = material if isinstance(material, str) else _material(material)
