@@ -133,6 +133,7 @@ def palm_mesh(
     ----------
     h, sizing, timeout : as for `tetrahedralise`.
     """
+    from meshes.smoothing import smoothed
     from meshes.tetrahedralise import tetrahedralise
 
     # Facets of the contour must be finer than elements, or the mesher keeps its corners.
@@ -140,7 +141,8 @@ def palm_mesh(
     # Coarser than the surface of a file may be, because boundary nodes are moved onto it.
     epsilon = EPSILON * min(h, palm.thickness / 4)
     mesh = tetrahedralise(body, h, sizing=sizing, timeout=timeout, epsilon=epsilon)
-    return shaped(palm, mesh)
+    even = smoothed(mesh, sizing, lambda points: onto(points, *_functions(palm)))
+    return shaped(palm, even)
 
 
 def shaped(palm: Palm, mesh: TetMesh) -> TetMesh:

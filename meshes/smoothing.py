@@ -13,36 +13,83 @@ import numpy as np
 from meshes.quality import angles_between_faces
 from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volumes
 
+Sizing = Callable[[Floats], Floats]
+
 STEPS, SHARE = 12, 0.7  # of the way that a node goes in each
+# Where else a node of a sharp element is tried: how far, of the edges around, and which way.
+TRIED = np.array([0.2, 0.1, 0.05, 0.025] * 2)
+DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
 GOOD = 25.0  # degrees: smaller angles may not shrink, larger ones not below it
 
 
-def smoothed(mesh: TetMesh, sizing: Callable[[Floats], Floats] | None = None) -> TetMesh:
-    """The 4-node mesh with its inner nodes moved; no least angle below 25 degrees gets less.
+def smoothed(
+    mesh: TetMesh, sizing: Sizing | None = None, onto: Callable[[Floats], Floats] | None = None
+) -> TetMesh:
+    """The 4-node mesh with its inner nodes moved; no least angle below 25 degrees gets less, and
+    those that there are get larger where one node's move can do it.
 
     Parameters
     ----------
     sizing : function of points (n, 3) in metre to edge lengths (n,) asked for; None if equal.
+    onto : function that moves points (n, 3) near the surface onto it, along which its nodes then
+        slide, each to the mean of its facets; without it they stay.
     """
     points, tets = np.array(mesh.points), mesh.tets
-    inner = np.ones(len(points), bool)
-    inner[boundary_facets(tets)] = False
+    facets = boundary_facets(tets)
+    outer = np.unique(facets)
     for _ in range(STEPS):
-        moved = np.where(inner[:, None], _means(points, tets, sizing), points)
+        moved = _means(points, tets, corner_volumes(points, tets), sizing)
+        moved[outer] = points[outer]
+        if onto:
+            moved[outer] = onto(_means(points, facets, _areas(points, facets), sizing)[outer])
         points = _no_worse(tets, points, points + SHARE * (moved - points))
+    on_surface = np.isin(np.arange(len(points)), outer)
+    for node in np.unique(tets[_least_angles(points, tets) < GOOD]):
+        if onto or not on_surface[node]:
+            kept = onto if on_surface[node] else None
+            _widen(points, tets[(tets == node).any(axis=1)], node, kept)
     return replace(mesh, points=points)
 
 
-def _means(points: Floats, tets: Ints, sizing: Callable[[Floats], Floats] | None) -> Floats:
-    """Weighted mean (n, 3) of the centroids of the elements at each node."""
-    centroids, weight = points[tets].mean(axis=1), corner_volumes(points, tets)
+def _widen(points: Floats, patch: Ints, node: int, onto: Callable[[Floats], Floats] | None) -> None:
+    """Move a node to where the least angle of the elements at it is largest, by trial."""
+    best = _least_angles(points, patch).min()
+    length = np.linalg.norm(np.ptp(points[patch], axis=1), axis=1).mean()
+    for reach in length * TRIED:
+        tried = points[node] + reach * DIRECTIONS
+        for place in onto(tried) if onto else tried:
+            before = points[node].copy()
+            points[node] = place
+            least = _least_angles(points, patch).min()
+            if least > best and (corner_volumes(points, patch) > 0).all():
+                best = least
+            else:
+                points[node] = before
+
+
+def _least_angles(points: Floats, tets: Ints) -> Floats:
+    return np.asarray(angles_between_faces(points, tets).min(axis=1))
+
+
+def _areas(points: Floats, facets: Ints) -> Floats:
+    a, b, c = np.moveaxis(points[facets], 1, 0)
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+
+def _means(points: Floats, simplices: Ints, measures: Floats, sizing: Sizing | None) -> Floats:
+    """Weighted mean (n, 3) of the centroids of the tetrahedra or triangles at each node, by their
+    volumes or areas over those that are asked for.
+    """
+    corners = simplices.shape[1]
+    centroids, weight = points[simplices].mean(axis=1), measures
     if sizing:
-        weight = weight / sizing(centroids) ** 3
-    nodes, weights = tets.ravel(), np.repeat(weight, 4)
-    total = np.bincount(nodes, weights, len(points))
+        weight = weight / sizing(centroids) ** (corners - 1)
+    nodes, weights = simplices.ravel(), np.repeat(weight, corners)
+    total = np.maximum(np.bincount(nodes, weights, len(points)), 1e-300)
     return np.column_stack(
         [
-            np.bincount(nodes, weights * np.repeat(centroids[:, axis], 4), len(points)) / total
+            np.bincount(nodes, weights * np.repeat(centroids[:, axis], corners), len(points))
+            / total
             for axis in range(3)
         ]
     )
@@ -50,9 +97,9 @@ def _means(points: Floats, tets: Ints, sizing: Callable[[Floats], Floats] | None
 
 def _no_worse(tets: Ints, points: Floats, moved: Floats) -> Floats:
     """Moved nodes go back at elements that lose by it."""
-    floor = np.minimum(angles_between_faces(points, tets).min(axis=1), GOOD)
+    floor = np.minimum(_least_angles(points, tets), GOOD)
     while True:
-        worse = angles_between_faces(moved, tets).min(axis=1) < floor
+        worse = _least_angles(moved, tets) < floor
         worse |= corner_volumes(moved, tets) <= 0
         nodes = np.unique(tets[worse])
         nodes = nodes[(moved[nodes] != points[nodes]).any(axis=1)]

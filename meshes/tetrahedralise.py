@@ -76,7 +76,7 @@ def tetrahedralise(
         "epsilon": np.array(epsilon / surface.diagonal),
         **grid,
     }
-    name = cache.key("tetrahedralise 2", *(inputs[part] for part in sorted(inputs)))
+    name = cache.key("tetrahedralise 3", *(inputs[part] for part in sorted(inputs)))
     entry = cache.load(name) or {}
     if {"points", "tets"} <= entry.keys():
         return _accepted(surface, epsilon, entry["points"], entry["tets"])

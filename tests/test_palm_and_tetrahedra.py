@@ -20,6 +20,7 @@ from meshes.crossings import self_crossings
 from meshes.smoothing import smoothed
 from meshes.surface import area, check, repaired, volume
 from meshes.tetmesh import TetMesh
+from skinwave.scene import BODIES
 
 tetra = sys.modules["meshes.tetrahedralise"]
 FLAT = Palm(cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0)
@@ -523,18 +524,19 @@ def test_smoothing_evens_out_sizes_and_spoils_no_angle():
 
 
 @pytest.mark.slow
-def test_the_palm_as_planned_is_meshed_within_its_bars(monkeypatch):
+@pytest.mark.parametrize("palm", [Palm(), BODIES["palm"].palm])
+def test_the_palm_as_planned_is_meshed_within_its_bars(monkeypatch, palm):
     monkeypatch.setenv("SKINWAVE_CACHE", "")
     sizing = meshes.graded(3e-3, meshes.Grading(radius=0.03, growth=1.25, coarsest=6e-3))
-    mesh = meshes.palm_mesh(Palm(), 3e-3, sizing=sizing)
+    mesh = meshes.palm_mesh(palm, 3e-3, sizing=sizing)
     assert meshes.dihedral_angles(mesh).min() >= 10
     assert meshes.jacobian_ratios(mesh.points, mesh.tets).min() >= 0.3
-    true = volume(shape.surface(Palm(), 1e-3))
+    true = volume(shape.surface(palm, 1e-3))
     assert enclosed(mesh) == pytest.approx(true, rel=5e-3)
     assert {"top", "wrist", "fingers", "back", "surface"} == set(mesh.facets)
     asked = sizing(mesh.points[mesh.tets[:, :4]].mean(axis=1))
     own = meshes.edge_lengths(mesh).mean(axis=1)
-    assert (np.abs(own / asked - 1) < 0.15).mean() > 0.88
+    assert (np.abs(own / asked - 1) < 0.15).mean() > 0.9
 
 
 @pytest.mark.slow
