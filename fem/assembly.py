@@ -24,11 +24,11 @@ from scipy import sparse
 from fem.boundary import dashpots, fixed_dofs
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from fem.materials import Material, rayleigh_damping
+from fem.pattern import UPPER, Pattern, from_blocks, from_masses
 from fem.relaxation import Branch, on_free
 from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import EDGES, Floats, Ints
 
-UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
 LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, below which 10-node tetrahedra need no remedy
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
@@ -127,44 +127,6 @@ def _relaxing_shares(materials: list[Material]) -> dict[float, Floats]:
     }
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pattern:
-    """Where each pair of element nodes is summed: CSR pattern on nodes and a slot per pair."""
-
-    indptr: Ints
-    indices: Ints
-    slot: Ints  # (e, a, b)
-
-    @staticmethod
-    def of(tets: Ints, n_nodes: int) -> "Pattern":
-        """The pattern of a mesh; one sort of pair number and origin packed into one integer."""
-        key = (tets[:, :, None] * n_nodes + tets[:, None, :]).ravel()
-        bits = int(key.size).bit_length()
-        if int(n_nodes**2).bit_length() + bits > 63:
-            raise MeshError(f"{len(tets)} tetrahedra are too many for one assembly; coarsen")
-        packed = np.sort((key << bits) | np.arange(key.size))
-        key, origin = packed >> bits, packed & ((1 << bits) - 1)
-        first = np.append(True, key[1:] != key[:-1])
-        slot = np.empty(key.size, np.int64)
-        slot[origin] = np.cumsum(first) - 1
-        rows, indices = np.divmod(key[first], n_nodes)
-        indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
-        return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
-
-    def mirrored(self) -> Ints:
-        """The slot (slots,) of each pair taken the other way round."""
-        n = len(self.indptr) - 1
-        slots = sparse.csr_array(
-            (np.arange(len(self.indices)), self.indices, self.indptr), shape=(n, n)
-        )
-        return slots.tocsc().data
-
-    def sum(self, values: Floats) -> Floats:
-        """Element values (e, a, b) summed into the slots."""
-        summed = np.bincount(self.slot.ravel(), values.ravel(), len(self.indices))
-        return summed.astype(np.float64, copy=False)
-
-
 def _volume_operators(
     mesh: TetMesh,
     pattern: Pattern,
@@ -180,7 +142,7 @@ def _volume_operators(
     By element C is mass_rate M + stiffness_lag K, and what relaxes its share of K.
     """
     blocks, masses = element_matrices(mesh, rho, mu, lam)
-    K, M = from_blocks(pattern, blocks), _from_masses(pattern, masses)
+    K, M = from_blocks(pattern, blocks), from_masses(pattern, masses)
     branches = tuple(
         Branch(K=_scaled(pattern, K, blocks, share), time=time)
         for time, share in relaxing_shares.items()
@@ -190,7 +152,7 @@ def _volume_operators(
         return K, C + mass_rate[0] * M if mass_rate[0] else C, M, branches
     blocks *= stiffness_lag[:, None, None]
     masses *= mass_rate[:, None, None]
-    return K, from_blocks(pattern, blocks) + _from_masses(pattern, masses), M, branches
+    return K, from_blocks(pattern, blocks) + from_masses(pattern, masses), M, branches
 
 
 def _scaled(
@@ -246,7 +208,7 @@ def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
     none = np.zeros(len(layer))
     part = replace(mesh, tets=mesh.tets[layer], region=mesh.region[layer], facets={})
     masses[layer] = element_matrices(part, rate[layer], none, none)[1]
-    R = _from_masses(pattern, masses)
+    R = from_masses(pattern, masses)
     R.eliminate_zeros()
     return R
 
@@ -293,30 +255,6 @@ def _jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, 
             "straighten its mid-side nodes or remesh"
         )
     return cofactors, determinants, determinants * weights / 6
-
-
-def from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
-    """Symmetric matrix (3 n, 3 n) of element blocks (k, e, a, b), components UPPER[k]."""
-    data = np.empty((len(pattern.indices), 3, 3))
-    mirrored = pattern.mirrored()
-    for k, (i, j) in enumerate(UPPER):
-        data[:, i, j] = component = pattern.sum(blocks[k])
-        if i != j:
-            data[:, j, i] = component[mirrored]
-    n = 3 * (len(pattern.indptr) - 1)
-    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n)).tocsr()
-
-
-def _from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
-    """The mass matrix of nodes, repeated for each of the three components."""
-    nodal, lengths = pattern.sum(masses), np.repeat(np.diff(pattern.indptr), 3)
-    indptr = np.concatenate([[0], np.cumsum(lengths)])
-    # Entry k of a row comes from entry k of its node's row.
-    source = np.arange(indptr[-1]) + np.repeat(
-        np.repeat(pattern.indptr[:-1], 3) - indptr[:-1], lengths
-    )
-    component = np.repeat(np.tile(np.arange(3), len(pattern.indptr) - 1), lengths)
-    return sparse.csr_array((nodal[source], 3 * pattern.indices[source] + component, indptr))
 
 
 def by_region(

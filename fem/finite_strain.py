@@ -17,20 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.assembly import (
-    LOSS_BAND,
-    SLAB,
-    UPPER,
-    Operators,
-    Pattern,
-    assemble,
-    by_region,
-    from_blocks,
-    gradients,
-    is_straight,
-)
+from fem.assembly import LOSS_BAND, SLAB, Operators, assemble, by_region, gradients, is_straight
 from fem.elements import shape_derivatives, triangle_rule
 from fem.materials import Material, rayleigh_damping
+from fem.pattern import UPPER, Pattern, from_blocks
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 

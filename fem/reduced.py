@@ -15,7 +15,7 @@ answered in the space of the next moments, where Galerkin's method makes the two
 solve the residual equation, carried on by the rate at which it has been shrinking.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.assembly import Operators
-from fem.linear_solver import factorise
+from fem.linear_solver import Factor, factorise
 from fem.relaxation import Branch, relaxing_stiffness
 from meshes.tetmesh import Floats
 
@@ -87,57 +87,39 @@ def reduce(
     ValueError
         If the tolerance is out of reach, or no probe can move.
     """
-    K, C, M, free = operators.K, operators.C, operators.M, operators.free
+    free, branches = operators.free, operators.branches
     seeds = probes[:, free].toarray().T
     moving = seeds[:, seeds.any(axis=0)]  # a probe on a clamped edge stays where it is
     if not moving.size:
         raise ValueError("no probe can move, all lie where the body is held; move one inwards")
-    branches = operators.branches
     shift = 2 * np.pi * RELAXING_SHIFT * band if branches else SHIFT
+    K, C, M = operators.K, operators.C, operators.M
     shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift)
     factor = factorise(shifted, backend=solver)
-    loads = None if loads is None else loads[free]
     space = _Space(M, moving.shape[1] * (MOST_MOMENTS + 1))
     large = [K, C, *(branch.K for branch in branches)]
     small = [np.empty((0, 0)) for _ in large]
-    lags = [branch.time / (1 + shift * branch.time) for branch in branches]
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift, what has relaxed):
-    # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
-    taken = np.zeros((2 + len(lags), space.size, 0))
-    upper = space.extend(factor.solve(moving))
-    relaxed = [(1 - shift * lag) * upper for lag in lags]
-    newest = np.stack([upper, np.zeros_like(upper), *relaxed])
     errors: list[float] = []
     before = None
+    grown = _moments(space, operators, shift, factor, moving)
     for moment in range(1, MOST_MOMENTS + 1):
+        next(grown)
         new = space.basis[:, len(small[0]) :]
         small = [
             _bordered(part, space.basis.T @ (whole @ new))
             for part, whole in zip(small, large, strict=True)
         ]
-        if moment % (RELAXING_BATCH if branches else BATCH) == 0:
-            weights = None if loads is None else space.basis.T @ loads
-            relaxing = _branches(small[2:], branches)
-            model = (small[0], small[1], relaxing)
-            now = _probe_response(*model, space.basis.T @ seeds, weights, band)
-            errors += [] if before is None else [_change(before, now)]
-            before = now
-            if progress and errors:
-                progress(min(1.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
-            if len(errors) > 1 and _tail(errors) <= tolerance:
-                break
-        taken, newest = _append(taken, newest)
-        y, y_before, *y_relaxed = (space.basis @ part for part in newest)
-        rest = C @ y + 2 * shift * (M @ y) + shift * (M @ y_before)
-        for branch, lag, part in zip(branches, lags, y_relaxed, strict=True):
-            rest += lag * (branch.K @ part)
-        upper = space.extend(-factor.solve(rest))
-        lower, _, *before_relaxed = (_padded(part, len(upper)) for part in newest)
-        relaxed = [
-            (1 - shift * lag) * upper - lag * part
-            for lag, part in zip(lags, before_relaxed, strict=True)
-        ]
-        newest = np.stack([upper, lower / shift, *relaxed])
+        if moment % (RELAXING_BATCH if branches else BATCH):
+            continue
+        weights = None if loads is None else space.basis.T @ loads[free]
+        model = (small[0], small[1], _branches(small[2:], branches))
+        now = _probe_response(*model, space.basis.T @ seeds, weights, band)
+        errors += [] if before is None else [_change(before, now)]
+        before = now
+        if progress and errors:
+            progress(min(1.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
+        if len(errors) > 1 and _tail(errors) <= tolerance:
+            break
     else:
         raise ValueError(
             f"{MOST_MOMENTS} moments leave an error of {_tail(errors):.2g}, above the tolerance "
@@ -154,6 +136,33 @@ def reduce(
         solver=factor.backend,
         branches=_branches(small[2:], branches),
     )
+
+
+def _moments(
+    space: "_Space", operators: Operators, shift: float, factor: Factor, seeds: Floats
+) -> Iterator[None]:
+    """Adds the next moment of seeds (n, p) to the space at each turn."""
+    C, M, branches = operators.C, operators.M, operators.branches
+    lags = [branch.time / (1 + shift * branch.time) for branch in branches]
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift, what has relaxed):
+    # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
+    taken = np.zeros((2 + len(lags), 0, 0))
+    upper = space.extend(factor.solve(seeds))
+    relaxed = [(1 - shift * lag) * upper for lag in lags]
+    newest = np.stack([upper, np.zeros_like(upper), *relaxed])
+    while True:
+        yield
+        taken, newest = _append(taken, newest)
+        y, y_before, *y_relaxed = (space.basis @ part for part in newest)
+        rest = C @ y + 2 * shift * (M @ y) + shift * (M @ y_before)
+        for branch, lag, part in zip(branches, lags, y_relaxed, strict=True):
+            rest += lag * (branch.K @ part)
+        upper = space.extend(-factor.solve(rest))
+        lower, _, *before = (_padded(part, len(upper)) for part in newest)
+        relaxed = [
+            (1 - shift * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
+        ]
+        newest = np.stack([upper, lower / shift, *relaxed])
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:

@@ -31,7 +31,8 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
     from skinwave.studies.assumptions import DEVICE_RATES, check_rate
-    from skinwave.studies.relax import climb, sentence, write
+    from skinwave.studies.relax import climb
+    from skinwave.studies.relax_page import sentence, write
 
     h = metre(options.h)
     check_knobs("auto", h=h)

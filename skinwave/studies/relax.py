@@ -5,30 +5,22 @@ one. Each is answered in a process of its own, with nothing kept from before, so
 and its memory are its own.
 """
 
-import csv
-import json
 import os
 import time
-from collections.abc import Iterable
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from simple_model import Response, lines, tacton_lines
-from skinwave import document
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
-from skinwave.pictures.figures import png
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
 from skinwave.studies.assumptions import (
-    ASSUMPTIONS,
     DEVICE_RATES,
     beside,
     check_rate,
@@ -214,124 +206,3 @@ def line_changes(
             ratio = max(new[k, probe], floor) / max(old[k, probe], floor)
             changes[name] = float(20 * np.log10(ratio))
     return changes
-
-
-def sentence(e: Effect) -> str:
-    """What a user is told about an assumption."""
-    x, y = (1e3 * v for v in e.where)
-    text = (
-        f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at ({x:g}, {y:g}) mm by "
-    )
-    text += f"{100 * e.waveform:.3g} %"
-    if e.decibel:
-        line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
-        text += f" and the {line} line by {e.decibel[line]:+.1f} dB"
-    cost = f"costs {e.seconds:.1f} s more" if e.seconds > 0.05 else "costs nothing more"
-    return f"{text}, and {cost}."
-
-
-def write(folder: Path, found: Ladder) -> None:
-    """index.html, relax.png, relax.csv, relax.json and the waveforms, responses.npz."""
-    effects = found.effects()
-    record = {
-        "effects": [asdict(e) for e in effects],
-        "rungs": [_record(rung) for rung in found.every],
-    }
-    (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
-    _write_lines(folder / "relax.csv", found)
-    answered = [r for r in found.every if r.response]
-    arrays = {r.name: r.response.displacement for r in answered if r.response}
-    first = next(r.response for r in answered if r.response)
-    arrays |= {"t": first.times, "probes": first.probes}
-    np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
-    drawn = png(figure(effects), dpi=130)
-    (folder / "relax.png").write_bytes(drawn)
-    parts = [
-        document.paragraph(
-            "From the published model to the richest one that this scene has, one assumption after "
-            "another. Waveforms are compared after the factor that fits best where one is a "
-            "pressure and the other a displacement."
-        ),
-        document.section(
-            "What each assumption changes", *map(document.paragraph, map(sentence, effects))
-        ),
-        document.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
-        document.table(*effect_table(effects)),
-        document.section("Rungs", document.table(*rung_table(found))),
-    ]
-    title = f"{found.scene.name}: assumptions, one by one"
-    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
-
-
-def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]:
-    """Header and rows, the greatest effect first."""
-    rows = [
-        [
-            e.name, f"{100 * e.waveform:.3g}", f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
-            "" if e.alone is None else f"{100 * e.alone:.3g}", f"{e.seconds:+.1f}",
-            ", ".join(f"{name} {value:+.1f}" for name, value in e.decibel.items()),
-        ]
-        for e in effects
-    ]  # fmt: skip
-    header = ["assumption dropped", "waveform changes by, %", "at, mm"]
-    header += ["if it is the only one kept, %", "costs, s", "lines change by, dB"]
-    return header, rows
-
-
-def rung_table(found: Ladder) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of what was answered, in the order of the ladder."""
-    rows = []
-    for rung in found.every:
-        dofs = f"{rung.response.effort.dofs:,}" if rung.response else ""
-        memory = f"{rung.memory / 2**30:.2f}" if rung.response else ""
-        rows.append([rung.name, rung.model, dofs, f"{rung.seconds:.1f}", memory, rung.error])
-    return ["rung", "model", "unknowns", "seconds, all from the start", "GiB", "why not"], rows
-
-
-def figure(effects: list[Effect]) -> Figure:
-    """Effect against cost, one point an assumption, its name beside it."""
-    drawn = Figure(figsize=(8, 4.6), layout="constrained")
-    axes = drawn.add_subplot()
-    for e in effects:
-        axes.plot(max(e.seconds, 0.01), 100 * e.waveform, "o", color="#0072B2")
-    changes = [100 * e.waveform for e in effects] or [1.0]
-    axes.set(xscale="log", yscale="log", xlabel="cost of dropping it, s (0.01 or less at the left)",
-             ylabel="change of the worst probe's waveform, %")  # fmt: skip
-    axes.set_ylim(max(min(changes) / 2, 1e-6), 2 * max(changes))
-    axes.margins(x=0.35)
-    for e in effects:
-        axes.annotate(e.name, (max(e.seconds, 0.01), 100 * e.waveform), (6, 5),
-                      textcoords="offset points", fontsize=9)  # fmt: skip
-    axes.grid(alpha=0.3)
-    return drawn
-
-
-def _record(rung: Rung) -> dict[str, object]:
-    effort = asdict(rung.response.effort) if rung.response else {}
-    kept = ("name", "dropped", "model", "seconds", "memory", "error")
-    return {name: getattr(rung, name) for name in kept} | {"effort": effort}
-
-
-def _write_lines(path: Path, found: Ladder) -> None:
-    """Every line's change at each probe, from the rung before and from the richest."""
-    names = {n: f for n, f in tacton_lines(found.scene.tacton, 3).items() if f < HIGHEST}
-    answered = [r for r in found.rungs if r.response]
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz",
-                         "from_rung_before_db", "from_richest_db"])  # fmt: skip
-        for before, rung in found.pairs():
-            ratios = [_ratios(rung, other, names) for other in (before, answered[-1])]
-            for k, (name, f) in enumerate(names.items()):
-                for p, (x, y) in enumerate(found.scene.probes):
-                    changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
-                    row = [rung.name, rung.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
-                    writer.writerow(row)
-
-
-def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:
-    assert rung.response
-    assert other.response
-    found = compare(other.response, rung.response, tuple(names.values()))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return 20 * np.log10(found.line_ratios)
