@@ -73,10 +73,13 @@ def prepare(
     clock = Clock()
     build = meshed(body, h, clock, silent, symmetry)
     mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
+    # A file may call other facets of the same mesh its top, or hold others.
+    named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     name = cache.key(
         mesh.points,
         mesh.tets,
         mesh.region,
+        *named,
         build.material,
         *ends,
         probes,
