@@ -229,7 +229,7 @@ OVERVIEW_CAPTION = (
 LEFT_OUT = (
     "The point kernel is drawn as published: linear drive law q = A M(t) S(D) with "
     "S = sinc^2(D/D0) and no propagation. What it predicts is a stimulation in Pa. The bodies "
-    "are linear and elastic with viscous loss, on 10-node tetrahedra, with few unknowns left. "
+    "are linear and elastic with viscous loss, on 10-node tetrahedra, with few unknowns left.",
     "Their lines at 2 f_AM and, in AM+STM, at n f_d come from their drive law as much as from "
     "waves: pressure_squared, because a device that modulates its sound pressure pushes with "
     "the square of it.",
@@ -239,11 +239,14 @@ LEFT_OUT = (
 
 def modelled(runs: list[Run]) -> list[str]:
     """What the bodies are, and what that leaves out, in sentences."""
-    sentences = [LEFT_OUT[0]]
-    for body in dict.fromkeys(run.body for run in runs if run.scene.body.kind != "none"):
+    said, squared, uncertain = LEFT_OUT
+    moved = [run for run in runs if run.scene.body.kind != "none"]
+    of_drive = bool(moved) and all(run.scene.pressure.drive == "pressure_squared" for run in moved)
+    sentences = [f"{said} {squared}" if of_drive else said]
+    for body in dict.fromkeys(run.body for run in moved):
         mine = [run for run in runs if run.body == body]
         sentences.append(f"{label(body)}: {_body_sentence(mine)}")
-    return [*sentences, LEFT_OUT[1]]
+    return [*sentences, uncertain]
 
 
 def _body_sentence(runs: list[Run]) -> str:
@@ -261,8 +264,14 @@ def _body_sentence(runs: list[Run]) -> str:
             f", relaxing {solid.relaxing_modulus / 1e3:.4g} kPa in "
             f"{1e3 * solid.relaxation_time:g} ms"
         )
-    if body.kind == "slab":
-        return text + ". Left out: layers and curvature."
+    if body.layers:
+        names = (x.material if isinstance(x.material, str) else "another" for x in body.layers)
+        thick = (f"{1e3 * x.thickness:g} mm" for x in body.layers)
+        above = ", ".join(f"{t} of {name}" for t, name in zip(thick, names, strict=True))
+        text += f"; above that {above}"
+    if body.kind != "sheet":
+        absent = ["layers"] * (not body.layers) + ["curvature"] * (body.kind == "slab")
+        return f"{text}. Left out: {' and '.join(absent)}." if absent else f"{text}."
     sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
     return (
         f"{text}. The mesh is a thicker sheet of the same bending stiffness and mass per area. "
