@@ -13,7 +13,7 @@ import skinwave
 from meshes import graded_axis
 from meshes.palm import level_set
 from meshes.structured import Grading, with_planes
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare, simulate
 from skinwave.cli import main
@@ -231,6 +231,17 @@ def test_a_mesh_in_a_file_is_a_body_of_a_scene(slab_file, tmp_path):
     required = plan(read, 0.1)
     assert required.model == "fem"
     assert any("not known" in warning for warning in required.warnings)
+
+
+def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
+    body = Body(width=0.03, height=0.03, depth=0.01, base="absorbing", sides="free")
+    tacton = Tacton(am_frequency=140, duration=0.2)
+    moved = {}
+    for drive in ("linear", "pressure_squared"):  # the second has a mean, and half the line
+        pressure = MovingPressure(tacton=tacton, drive=drive)
+        scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.005, 0.0)))
+        moved[drive] = lines(simulate(scene, "fem", h=0.005), [140.0])
+    np.testing.assert_allclose(moved["pressure_squared"], moved["linear"] / 2, rtol=1e-3)
 
 
 def test_layers_of_a_body_from_a_file_lie_below_its_top(slab_file):

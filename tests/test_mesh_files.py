@@ -16,6 +16,8 @@ from meshes import MeshError, TetMesh, files
 from meshes.palm import Palm, level_set
 from meshes.surface import Surface, check, volume
 from skinwave.cli import main
+from skinwave.models.prepared import prepare
+from skinwave.scene import Body
 
 GMSH_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]  # of gmsh's manual, 10-node tets
 
@@ -520,6 +522,20 @@ def test_a_mesh_is_taken_as_it_is(tmp_path, monkeypatch, capsys):
     assert main(["mesh", "slab.msh", "--quiet"]) == 2
     assert "exists and is kept; pass --overwrite" in capsys.readouterr().err
     assert main(["mesh", "slab.msh", "--quiet", "--overwrite"]) == 0
+
+
+def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
+    block = meshes.block((0.02, 0.02, 0.01), 0.005)
+    body = Body(kind="mesh", file=str(tmp_path / "body.vtu"), sides="clamped")
+    read = []
+    for held, pushed in (("sides", "top"), ("left", "top"), ("left", "part")):
+        part = block.facets["top"][block.points[block.facets["top"]][..., 0].max(axis=1) < 1e-9]
+        facets = {"sides": block.facets[held], "top": {**block.facets, "part": part}[pushed]}
+        meshes.write(body.file, replace(block, facets=facets))
+        read.append(prepare(body, np.array([(-0.004, 0.001)]), h=0.005))
+    stiffness = [np.abs(prepared.poles.values[:3]).sum() for prepared in read]
+    assert stiffness[0] != pytest.approx(stiffness[1], rel=1e-3)
+    assert len(read[1].points) == 2 * len(read[2].points)
 
 
 @pytest.mark.parametrize(

@@ -73,10 +73,13 @@ def prepare(
     clock = Clock()
     build = meshed(body, h, clock, silent, symmetry)
     mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
+    # A file may call other facets of the same mesh its top, or hold others.
+    named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     name = cache.key(
         mesh.points,
         mesh.tets,
         mesh.region,
+        *named,
         build.material,
         *ends,
         probes,
@@ -165,8 +168,9 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         power = fem.mean_power(*damping, forces, motion, frequencies, prepared.branches)
         imbalance, radiated = energy_balance(power)
         lines, start = motion @ prepared.read.T, start @ prepared.read.T
-        strength = np.abs(lines).max(axis=1)
-        heard = strength > NEGLIGIBLE_LINE * strength.max()
+        # The mean is not what others are weighed by: it is boundless where nothing holds a body.
+        strength, mean = np.abs(lines).max(axis=1), frequencies == 0
+        heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
         rates = np.concatenate([2j * np.pi * frequencies[heard], prepared.poles.values])
         displacement = fem.exponential_sum(rates, np.vstack([lines[heard], start]), times)
     effort = replace(

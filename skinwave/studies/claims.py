@@ -55,10 +55,15 @@ Judgement = tuple[bool, float, float, str]
 
 
 def _is_single(run: Run) -> bool:
-    """Whether a run is of the kind that was measured: one focus, modulated evenly throughout."""
+    """Whether a run is of the kind that was measured: one focus, modulated evenly throughout by
+    one tone at most.
+    """
     tacton = run.scene.tacton
-    plain = len(tacton.foci) == 1 and not tacton.is_sampled
-    return plain and tacton.trajectory.shape != "recorded"
+    plain = len(tacton.foci) == 1 and not tacton.is_sampled and not tacton.envelope_frequency
+    # Of two sinusoids the first is the one that statements are about, and is heard alone.
+    w1, w2 = tacton.superposition
+    one = (w1 > 0 or not tacton.am_frequency) and not (w2 > 0 and tacton.second_am_frequency)
+    return bool(plain and one and tacton.trajectory.shape != "recorded")
 
 
 def _single_line(runs: list[Run]) -> Judgement:
