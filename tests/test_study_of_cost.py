@@ -11,6 +11,7 @@ from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
 from skinwave.models.prepared import answer, prepare
+from skinwave.planning.estimates import waves_returned
 from skinwave.planning.plan import plan
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.studies.paper15 import scenes, tactons
@@ -88,9 +89,51 @@ def test_sides_that_send_nothing_back_need_no_elements():
         "material = {density_kg_m3=1000, shear_modulus_pa=10e3, poisson=0.499, viscosity_pa_s=9}"
     )
     text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
-    required = plan(loads(text), 0.05)
+    required = plan(loads(text), 0.06)
     assert required.model == "flat-body"
-    assert 0 < required.error < 0.05
+    assert 0 < required.error < 0.06
+
+
+@pytest.mark.parametrize(
+    ("material", "width", "duration", "low"),
+    [("silicone", 100, 0.03, 0.15), ("overdamped", 60, 0.02, 0.4)],
+)
+def test_what_free_sides_send_back_is_judged_in_time(material, width, duration, low):
+    """A load that only begins has no line that comes back, and viscous stress no front."""
+    modulus, poisson, viscosity = {"silicone": (25e3, 0.4999, 3), "overdamped": (1e3, 0.499, 50)}[
+        material
+    ]
+    scene = loads(
+        f"""
+[tacton]
+duration_s = {duration}
+[body]
+sides = "free"
+width_mm = {width}
+height_mm = {width}
+material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
+             viscosity_pa_s={viscosity}}}
+""".replace(",\n", ",")
+    )
+    returned = waves_returned(scene)
+    found = compare(simulate(scene, "fem", h=0.005), simulate(scene, "flat-body")).relative_l2
+    assert low < found.max() < 1.5 * returned
+    assert returned < 6 * found.max()
+
+
+def test_a_body_that_nothing_holds_is_warned_of():
+    text = SHORT.replace("width_mm = 60", 'width_mm = 30\nbase = "absorbing"')
+    scene = loads(text)
+    assert any("nothing holds" in said for said in plan(scene, 0.3, h=0.01).warnings)
+    steady = simulate(scene, "fem-harmonic", h=0.01).displacement
+    assert np.abs(steady).max() < 1e-4  # and no mean, which would have no bound
+
+
+def test_a_loss_factor_is_warned_of_where_its_fit_is_far_off():
+    text = "[tacton]\nam_frequency_hz = {}\nduration_s = 0.3\n[body]\nkind = 'sheet'"
+    (said,) = (w for w in plan(loads(text.format(15)), 0.5, h=0.005).warnings if "loss" in w)
+    assert "fitted over 50 to 600 Hz" in said
+    assert not any("loss" in w for w in plan(loads(text.format(200)), 0.5, h=0.005).warnings)
 
 
 def test_only_as_much_of_a_body_is_meshed_as_waves_come_back_from():

@@ -150,7 +150,8 @@ def harmonic_answer(
     threshold: float = 1e-3,
     mapped: Map = map,
 ) -> Response:
-    """The steady state: one factorisation for each line of the load above the threshold.
+    """The steady state: one factorisation for each line of the load above the threshold, but for
+    the mean if nothing holds the body.
 
     `mapped` is shaped like the built-in `map`; it may spread the lines over other machines.
     """
@@ -170,6 +171,8 @@ def harmonic_answer(
         weights = path_weights(scene.pressure)[:, None]
         spots = along_path((scene.pressure.spot(points, knots) * weights).T)
         frequencies, pressures = lines.gather(spots.T)
+        if "xyz" not in build.fixed.values():  # a mean would push what nothing holds ever further
+            frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         total = fem.Spent()
         report("lines", 0.0)

@@ -6,15 +6,17 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Trajectory
-from simple_model.flat_body import point_response, steady_lines
+from simple_model.flat_body import flat_body, point_response, steady_lines
 from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
 from simple_model.trajectory import BY_POINTS
 from skinwave.models.bodies import compliance, has_exact_waves
+from skinwave.models.prepared import sample_times
 from skinwave.scene import Scene
 
 REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
 FAR = 0.25  # m, beyond which waves are not followed
+FOLLOWED = 0.5  # s that waves which return are followed for
 
 
 def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
@@ -65,43 +67,63 @@ def start_share(scene: Scene) -> float:
     return float(1 / np.sqrt(max(decayed, 1.0)))
 
 
-def waves_returned(
-    scene: Scene, half: Floats, highest: float, reflected: float | None = None
-) -> float:
-    """Motion that sides `half` (2,) metre away send back to the probes, over their own; at most 1.
+def waves_returned(scene: Scene) -> float:
+    """Motion that the sides send back to the probes, over their own; at most 1.
+
+    What a side sends back to a probe is what an endless body would have at the probe's mirror
+    image in it; twice the root of the four energies, because they may add up in step. Sides that
+    absorb send nothing back.
+    """
+    body, probes = scene.body, scene.probe_points
+    if body.sides == "absorbing":
+        return 0.0
+    half = np.array([body.width, body.height]) / 2
+    if _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
+        return 1.0
+    seen = np.vstack([probes, *_mirrored(probes, half)])
+    times = sample_times(scene)
+    times = times[: max(2, np.searchsorted(times, FOLLOWED))]
+    u = flat_body(compliance(body), scene.pressure, seen, times).displacement
+    own, *returned = (u**2).sum(axis=0).reshape(-1, len(probes))
+    return min(1.0, 2 * float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max())))
+
+
+def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
+    """Steady motion that absorbing sides `half` (2,) metre away send back, over the probes' own.
 
     By mirror images of the focus in the four sides and the exact waves of the endless body, for
-    the lines that the load is made of. Waves that have no time to come back do not count, nor,
-    unless `reflected` says how much they send back, do sides that absorb.
+    the lines that the load is made of.
     """
     body, width = scene.body, spot_width(scene.pressure.height)
-    if reflected is None:
-        reflected = 0.0 if body.sides == "absorbing" else 1.0
-    path, probes = _along(scene.tacton.trajectory), scene.probe_points
-    edge = (half - np.abs(np.vstack([path, probes])).max(axis=0)).min()
-    if not reflected:
-        return 0.0
-    if edge < 2 * width:
+    path = _along(scene.tacton.trajectory)
+    if _to_edge(scene, half) < 2 * width:
         return 1.0
-    foci = [path] + [
-        np.where(np.arange(2) == axis, 2 * sign * half - path, path)
-        for axis in (0, 1)
-        for sign in (-1, 1)
-    ]
-    distances = np.linalg.norm(probes[:, None] - np.array(foci)[:, None], axis=-1)  # (5, p, k)
-    stiffest = 1 + body.solid.relaxing_modulus / body.solid.shear_modulus
-    fastest = body.solid.shear_speed * stiffest**0.5
-    if distances[1:].min() > 1.5 * fastest * scene.tacton.duration:
-        return 0.0
+    foci = np.array([path, *_mirrored(path, half)])
+    distances = np.linalg.norm(scene.probe_points[:, None] - foci[:, None], axis=-1)  # (5, p, k)
     lines = load_lines(replace(scene.pressure, focus="gaussian"), 1e-2)
     kept = lines.frequencies <= max(highest, 1.0)
     frequencies, which = np.unique(lines.frequencies[kept], return_inverse=True)
-    strength = np.bincount(which, np.abs(lines.coefficients[kept]) ** 2)
+    strength = np.bincount(which, lines.strengths[kept] ** 2)
     table = np.arange(0.0, FAR, width / 2)
     g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
     share = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
-    return min(1.0, reflected * float(np.sqrt(share.max())))
+    return min(1.0, REFLECTED * float(np.sqrt(share.max())))
+
+
+def _mirrored(points: Floats, half: Floats) -> list[Floats]:
+    """Images (n, 2) of points (n, 2) in the four sides."""
+    return [
+        np.where(np.arange(2) == axis, 2 * sign * half - points, points)
+        for axis in (0, 1)
+        for sign in (-1, 1)
+    ]
+
+
+def _to_edge(scene: Scene, half: Floats) -> float:
+    """From the path or the probes to the nearest side, metre."""
+    used = np.vstack([_along(scene.tacton.trajectory), scene.probe_points])
+    return float((half - np.abs(used).max(axis=0)).min())
 
 
 def _along(path: Trajectory) -> Floats:

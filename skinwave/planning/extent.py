@@ -4,10 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model.focus import spot_width
 from skinwave.models.speeds import air_mass
-from skinwave.planning.estimates import FAR, REFLECTED, mean_gain, waves_returned
+from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
 
 
@@ -29,23 +28,18 @@ def symmetry(scene: Scene) -> str:
     return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
 
 
-def half_widths(body: Body) -> Floats:
-    """Half of width and height in metre."""
-    return np.array([body.width, body.height]) / 2
-
-
 def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
     """The body as far as waves come back from, and the reason if that is not all of it."""
     body = scene.body
     if body.kind != "slab" or body.base != "clamped" or not body.is_plain:
         return body, []
-    half = half_widths(body)
+    half = np.array([body.width, body.height]) / 2
     cut = half.copy()
     for axis in (0, 1):
         alone = np.where(np.arange(2) == axis, half, FAR)
         for shorter in np.arange(0.03, min(0.8 * half[axis], FAR), 0.01):
             alone[axis] = shorter
-            if waves_returned(scene, alone, highest, REFLECTED) <= tolerance / 10:
+            if absorbed_returned(scene, alone, highest) <= tolerance / 10:
                 cut[axis] = shorter
                 break
     if (cut == half).all():

@@ -10,6 +10,7 @@ from skinwave.models.bodies import check_mesh
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
+from skinwave.planning.cautions import exceeds, other_loss, under_resolved, unheld, unknown
 from skinwave.planning.estimates import (
     highest_line,
     is_flat,
@@ -17,7 +18,7 @@ from skinwave.planning.estimates import (
     start_share,
     waves_returned,
 )
-from skinwave.planning.extent import Row, extent, half_widths, left_out, symmetry
+from skinwave.planning.extent import Row, extent, left_out, symmetry
 from skinwave.planning.refinement import AIM, ORDER, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import FLAT, Body, Scene
@@ -96,7 +97,7 @@ def plan(
             f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    returned = waves_returned(scene, half_widths(scene.body), highest) if is_flat(scene) else 1.0
+    returned = waves_returned(scene) if is_flat(scene) else 1.0
     flat = model in ("flat-body", "flat-body-harmonic")
     if flat or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, model, highest, returned, rows)
@@ -115,14 +116,16 @@ def plan(
         memory=found.prepared.effort.peak_memory,
         rows=(*rows, *_element_rows(scene, tolerance, axes, found, highest, h)),
         warnings=(
-            *_unknown(found),
-            *_exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
+            *unknown(found),
+            *unheld(scene),
+            *other_loss(scene, *spectrum, tolerance),
+            *exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
                       f"about {1e3 * _enough(found, tolerance):.2g} mm is"),
-            *_exceeds(f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
+            *exceeds(f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
                       "a smaller one is"),
-            *_exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
+            *exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
                       tolerance, "fem is"),
-            *_under_resolved(found.h, spot_width(scene.pressure.height)),
+            *under_resolved(found.h, spot_width(scene.pressure.height)),
         ),
         prepared=found.prepared,
     )  # fmt: skip
@@ -130,7 +133,7 @@ def plan(
 
 def _kernel(scene: Scene, tolerance: float) -> Plan:
     row = Row(what="model", value="point-kernel", reason="as asked; nothing propagates in it")
-    warning = _exceeds("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
+    warning = exceeds("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
     return Plan(
         model="point-kernel", body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning
     )
@@ -152,7 +155,7 @@ def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> P
         ),
         *(row for row in left_out(scene, 0.0) if row.what != "left out: stretching"),
     )  # fmt: skip
-    warnings = _exceeds(f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are")
+    warnings = exceeds(f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are")
     return Plan(model=model, body=scene.body, h=size, error=error, rows=rows, warnings=warnings)
 
 
@@ -174,9 +177,9 @@ def _without_mesh(
     if left:
         reason += f"; of how the motion starts at most {100 * start:.2g} % is left"
     warnings = (
-        *_exceeds(f"{model}, which lets no wave return from the sides,", returned, tolerance,
+        *exceeds(f"{model}, which lets no wave return from the sides,", returned, tolerance,
                   "fem is"),
-        *_exceeds(f"{model}, which leaves out how the motion starts,", left, tolerance,
+        *exceeds(f"{model}, which leaves out how the motion starts,", left, tolerance,
                   "flat-body is"),
     )  # fmt: skip
     rows = [
@@ -237,24 +240,6 @@ def _enough(found: Refined, tolerance: float) -> float:
     return found.h * (aim / max(aim, found.error)) ** (1 / ORDER)
 
 
-def _unknown(found: Refined) -> tuple[str, ...]:
-    if np.isfinite(found.error):
-        return ()
-    return (
-        "how wrong this mesh makes the answer is not known, because its file has only one; give a "
-        "finer one and compare",
-    )
-
-
-def _exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
-    if not error > tolerance:
-        return ()
-    return (
-        f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
-        f"{100 * tolerance:g} %; {cure} enough",
-    )
-
-
 def _why_elements(scene: Scene) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
@@ -266,12 +251,3 @@ def _why_elements(scene: Scene) -> str:
     if body.placement != FLAT:
         return "the body is tilted or moved; exact waves are for a flat one across the beam"
     return f"the {body.sides} sides of this {body.kind} reflect; exact waves are endless"
-
-
-def _under_resolved(h: float, width: float) -> tuple[str, ...]:
-    if h <= 2 * width:
-        return ()
-    return (
-        f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focus, "
-        f"{1e3 * width:.2g} mm: they keep its force but not its shape; make them smaller",
-    )

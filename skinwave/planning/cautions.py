@@ -1,0 +1,75 @@
+"""Warnings of what was asked for and is not enough, each with its number and its cure."""
+
+import numpy as np
+
+from fem.assembly import LOSS_BAND
+from fem.materials import rayleigh_damping
+from meshes.tetmesh import Floats
+from skinwave.planning.estimates import mean_gain
+from skinwave.planning.refinement import Refined
+from skinwave.scene import Scene
+
+LOSS_ERROR = 0.4  # of a loss factor, of which the fit differs by 0.3 within its band
+
+
+def unknown(found: Refined) -> tuple[str, ...]:
+    """Of a mesh beside which there is no other."""
+    if np.isfinite(found.error):
+        return ()
+    return (
+        "how wrong this mesh makes the answer is not known, because its file has only one; give a "
+        "finer one and compare",
+    )
+
+
+def unheld(scene: Scene) -> tuple[str, ...]:
+    """Of a body that a mean pressure pushes away."""
+    if "clamped" in (scene.body.base, scene.body.sides) or not mean_gain(scene):
+        return ()
+    return (
+        "nothing holds this body, and a lasting pressure pushes it ever further: only motion about "
+        "the mean counts; clamp its base or its sides, or take depth_mm = inf",
+    )
+
+
+def other_loss(
+    scene: Scene, frequencies: Floats, shares: Floats, tolerance: float
+) -> tuple[str, ...]:
+    """Where Rayleigh damping is far from the loss factor that it stands for."""
+    asked = scene.body.solid.loss_factor
+    if not asked:
+        return ()
+    by_mass, by_stiffness = rayleigh_damping(asked, LOSS_BAND)
+    w = 2 * np.pi * np.maximum(frequencies, 1e-9)
+    ratio = (by_mass / w + by_stiffness * w) / asked
+    heard = (frequencies > 0) & (np.sqrt(shares.max(axis=1)) > tolerance)
+    beyond = heard & (abs(ratio - 1) > LOSS_ERROR)
+    if not beyond.any():
+        return ()
+    worst = np.argmax(np.where(beyond, abs(np.log(ratio)), 0))
+    low, high = LOSS_BAND
+    return (
+        f"at {frequencies[worst]:.3g} Hz the loss factor is {ratio[worst]:.2g} times the one asked "
+        f"for, which is fitted over {low:g} to {high:g} Hz: a resonance there is "
+        f"{1 / ratio[worst]:.2g} times as high as it should be; no model here has it right",
+    )
+
+
+def exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
+    """Of what will be more wrong than it may be."""
+    if not error > tolerance:
+        return ()
+    return (
+        f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
+        f"{100 * tolerance:g} %; {cure} enough",
+    )
+
+
+def under_resolved(h: float, width: float) -> tuple[str, ...]:
+    """Of elements that are too wide for the focus."""
+    if h <= 2 * width:
+        return ()
+    return (
+        f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focus, "
+        f"{1e3 * width:.2g} mm: they keep its force but not its shape; make them smaller",
+    )
