@@ -11,12 +11,11 @@ from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
 from simple_model.trajectory import BY_POINTS
 from skinwave.models.bodies import compliance, has_exact_waves
-from skinwave.models.prepared import sample_times
 from skinwave.scene import Scene
 
 REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
 FAR = 0.25  # m, beyond which waves are not followed
-FOLLOWED = 0.5  # s that waves which return are followed for
+FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: how waves that return are followed
 
 
 def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
@@ -81,8 +80,8 @@ def waves_returned(scene: Scene) -> float:
     if _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
         return 1.0
     seen = np.vstack([probes, *_mirrored(probes, half)])
-    times = sample_times(scene)
-    times = times[: max(2, np.searchsorted(times, FOLLOWED))]
+    duration = min(scene.tacton.duration, FOLLOWED)
+    times = np.arange(max(2, round(duration * FOLLOWED_AT))) / FOLLOWED_AT
     u = flat_body(compliance(body), scene.pressure, seen, times).displacement
     own, *returned = (u**2).sum(axis=0).reshape(-1, len(probes))
     return min(1.0, 2 * float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max())))
