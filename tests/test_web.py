@@ -29,6 +29,7 @@ from skinwave.web import (
     downloads,
     drawings,
     model,
+    moves,
     moving,
     plots,
     scenes,
@@ -37,6 +38,7 @@ from skinwave.web import (
 )
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
+from skinwave.web.session import told
 from skinwave.web.worker import Worker
 
 
@@ -130,6 +132,7 @@ def test_an_address_carries_every_control():
         "duration": 0.7, "shape": "triangle", "size": 31.5, "speed": 4.2, "height": 150.0,
         "drive": "force_corrected", "body": "palm", "foci": 3, "sharing": "time_multiplexed",
         "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
+        "drawn": 42.5, "paths": "circle/20/-15/0, line/10/15/0.5, point/0/0/-20",
     }  # fmt: skip
     assert set(changed) == set(STARTS)
     assert all(changed[key] != STARTS[key] for key in STARTS)
@@ -243,9 +246,10 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
 
 
 def test_the_influenced_area_ends_a_main_lobe_from_the_path():
-    path = scenes.scene_of(STARTS).tacton.trajectory
+    tacton = scenes.scene_of(STARTS).tacton
     outer, inner = (
-        sorted(model.influenced(path, 0.2), key=lambda x: -np.linalg.norm(x, axis=1).max())[:1] * 2
+        sorted(model.influenced(tacton, 0.2), key=lambda x: -np.linalg.norm(x, axis=1).max())[:1]
+        * 2
     )
     assert outer is inner  # D0 exceeds the radius: no hole
     assert np.linalg.norm(outer, axis=1) == pytest.approx(0.01 + lobe_width(0.2), rel=0.01)
@@ -465,7 +469,7 @@ def test_a_move_changes_what_is_shown(session):
     assert session.scene.tacton.am_frequency == 200
     assert session.state.undoable
     with session.state:
-        session.undo()
+        moves.undo(session)
     assert session.state.am == 140
     assert session.state.spectrum_plot == before
 
@@ -473,16 +477,16 @@ def test_a_move_changes_what_is_shown(session):
 def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
     before = session.state.spectrum_plot
     with session.state:
-        session.turn({"size": "70"})
+        moves.turn(session, {"size": "70"})
     assert "outside 0 to 60 mm" in session.state.errors["size"]
     assert session.state.size == STARTS["size"]
     assert session.state.typed == {"size": "70"}
     assert session.state.spectrum_plot == before
     with session.state:
-        session.turn({"size": "30"})
+        moves.turn(session, {"size": "30"})
     assert (session.state.errors, session.state.typed) == ({}, {})
     with session.state:
-        session.turn({"pulses": "5/5", "ramp": 100})
+        moves.turn(session, {"pulses": "5/5", "ramp": 100})
     assert "ramp" in session.state.problem
     assert session.state.stale
 
@@ -494,13 +498,13 @@ def test_waves_are_stale_until_they_are_answered(session):
     assert [d["name"] for d in session.state.waveform_plot["data"]] == ["point kernel, Pa"]
     answer = waves.Waves()(session.scene, nothing)
     with session.state:
-        session.told("answer", session._number - 1, answer)
+        told(session, "answer", session.number - 1, answer)
     assert session.state.waves_stale, "an older answer is not shown"
     with session.state:
-        session.told("progress", session._number, ("reduce", 0.5))
+        told(session, "progress", session.number, ("reduce", 0.5))
     assert (session.state.busy, session.state.done) == ("reduce", 50)
     with session.state:
-        session.told("answer", session._number, answer)
+        told(session, "answer", session.number, answer)
     assert not session.state.waves_stale
     drawn = {d["name"]: d for d in session.state.spectrum_plot["data"]}
     assert drawn["waves (flat-body), µm"]["opacity"] == 1
@@ -510,10 +514,10 @@ def test_waves_are_stale_until_they_are_answered(session):
     drawn = {d["name"]: d for d in session.state.waveform_plot["data"]}
     assert drawn["waves (flat-body), µm — being computed"]["opacity"] == plots.STALE
     with session.state:
-        session.told("failed", session._number, "it cannot be")
+        told(session, "failed", session.number, "it cannot be")
     assert session.state.problem == "it cannot be"
     with session.state:
-        session.cancel()
+        moves.cancel(session)
     assert session.state.body == "none"
     assert not session.state.busy
 
@@ -531,23 +535,23 @@ def test_a_held_frequency_and_a_preset(session):
     with session.state:
         session.state.hold = False
     with session.state:
-        session.preset("am210-stm10")
+        moves.preset(session, "am210-stm10")
     assert (session.state.am, session.state.size, session.state.errors) == (210, 10, {})
 
 
 def test_pinning_keeps_and_exchanges(session):
     with session.state:
-        session.pin()
+        moves.pin(session)
         session.state.am = 90
     assert any(d["name"] == "pinned kernel, Pa" for d in session.state.spectrum_plot["data"])
     with session.state:
-        session.take_pinned()
+        moves.exchange(session)
     assert session.state.am == 140
     with session.state:
-        session.take_pinned()
+        moves.exchange(session)
     assert session.state.am == 90
     with session.state:
-        session.pin()
+        moves.pin(session)
     assert len(session.state.waveform_plot["data"]) == 1
 
 
@@ -556,12 +560,12 @@ def test_what_is_saved_can_be_opened(session):
     from scipy.io import wavfile
 
     with session.state:
-        session.turn({"pulses": "100/50", "am": 90, "size": 12})
+        moves.turn(session, {"pulses": "100/50", "am": 90, "size": 12})
     files = downloads.offered(session)
     kept, values = files["scene_toml"]().decode(), session.values
     with session.state:
-        session.preset("am80")
-        session.open_scene(kept)
+        moves.preset(session, "am80")
+        moves.open_scene(session, kept)
     assert session.values == values
     rate, samples = wavfile.read(BytesIO(files["waveform_wav"]()))
     assert (rate, len(samples)) == (10_000, 10_000)
@@ -575,25 +579,25 @@ def test_what_is_saved_can_be_opened(session):
     assert "http" not in re.sub(r"http://www.w3.org|xmlns", "", report).split("<style>")[0]
     assert Image.open(BytesIO(files["figure"]("png"))).width > 1000
     with session.state:
-        session.open_scene("[tacton]\nam = 5")
+        moves.open_scene(session, "[tacton]\nam = 5")
     assert "the scene cannot be opened" in session.state.problem
     with session.state:
-        session.on_file({"content": kept.encode()})
+        session.state.opened = {"content": kept.encode()}
     assert session.state.problem == ""
 
 
 def test_zooming_in_shows_the_carrier(session):
     assert "envelope" in session.state.commanded_plot["title"]
     with session.state:
-        session.zoom(10.0, 11.0)
+        moves.zoom(session, 10.0, 11.0)
     assert "with its 40 kHz carrier" in session.state.commanded_plot["title"]
     for beyond in ((-500.0, -400.0), (2000.0, 3000.0), (7.0, 7.0)):
         with session.state:
-            session.zoom(*beyond)
+            moves.zoom(session, *beyond)
         low, high = session.state.commanded_plot["x"]["range"]
         assert 0 <= low < high <= 1000
     with session.state:
-        session.zoom()
+        moves.zoom(session)
     assert "envelope" in session.state.commanded_plot["title"]
 
 
@@ -612,25 +616,25 @@ def test_an_address_begins_a_page_and_what_is_wrong_in_it_is_said(request):
 
 def test_undo_after_a_new_beginning_goes_back_to_the_address(session):
     with session.state:
-        session.restart("am=77&size=900")
+        moves.restart(session, "am=77&size=900")
     assert "size: 900 mm is outside" in session.state.problem
     assert not session.state.undoable
     with session.state:
-        session.turn({"speed": 5})
+        moves.turn(session, {"speed": 5})
     with session.state:
-        session.undo()
+        moves.undo(session)
     assert (session.state.am, session.state.speed) == (77, STARTS["speed"])
 
 
 def test_progress_that_comes_after_cancel_is_not_shown(session):
     with session.state:
         session.state.body = "skin-slab"
-    number = session._number
+    number = session.number
     with session.state:
-        session.cancel()
-    for late in (number, session._number):
+        moves.cancel(session)
+    for late in (number, session.number):
         with session.state:
-            session.told("progress", late, ("reduce", 0.5))
+            told(session, "progress", late, ("reduce", 0.5))
     assert not session.state.busy
 
 
@@ -638,7 +642,7 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
     with session.state:
         session.state.hold = True
     with session.state:
-        session.preset("am210-stm10")
+        moves.preset(session, "am210-stm10")
     preset = controls.presets()["am210-stm10"]
     assert {key: session.state[key] for key in preset} == preset
     frequency = session.state.drawing_frequency
@@ -647,7 +651,7 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
     assert session.state.drawing_frequency == pytest.approx(frequency), "held from then"
     values = STARTS | {"size": 33.0, "speed": 4.0}
     with session.state:
-        session.open_scene(dumps(scenes.scene_of(values)))
+        moves.open_scene(session, dumps(scenes.scene_of(values)))
     assert session.values == values
     assert not session.state.errors
 
@@ -655,7 +659,7 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
 def test_a_scene_file_that_is_too_large_is_refused_whole(session):
     text = dumps(scenes.scene_of(STARTS | {"am": 90.0})).encode()
     with session.state:
-        session.on_file({"content": text + b"#" * 2_500_000})
+        session.state.opened = {"content": text + b"#" * 2_500_000}
     assert "2.5 MB exceeds 1 MB" in session.state.problem
     assert session.state.am == STARTS["am"]
 
@@ -755,7 +759,7 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
     assert again.scene.body == Body(depth=0.008)
     assert again.state.problem == ""
     with again.state:
-        again.restart(first.state.query)
+        moves.restart(again, first.state.query)
     assert again.scene.body == Body(depth=0.008)
     lost = session_of(server, "", query)
     assert lost.state.body == "none"

@@ -13,7 +13,7 @@ from skinwave.exports import sampled, write_table
 from skinwave.pictures.figures import colour
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
-from skinwave.web.model import REACH, Answer, influenced
+from skinwave.web.model import REACH, Answer, drawn_paths, influenced
 
 
 def offered(session: Any) -> dict[str, Callable[..., Any]]:
@@ -22,17 +22,14 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
     Waves are those of a body if it has answered; a file of several answers has the kernel's, too.
     """
 
-    def current() -> list[Answer]:
-        return [a for a in (session.kernel, session.current_waves) if a]
-
     async def report() -> bytes:
-        return await asyncio.to_thread(report_of, session.scene, current())
+        return await asyncio.to_thread(report_of, session.scene, session.answers)
 
     return {
         "scene_toml": lambda: dumps(session.scene).encode(),
-        "waveform_csv": lambda: csv_of(current()),
-        "waveform_wav": lambda: wav_of(current()[-1]),
-        "figure": lambda kind: figure_of(session.scene, current(), kind),
+        "waveform_csv": lambda: csv_of(session.answers),
+        "waveform_wav": lambda: wav_of(session.answers[-1]),
+        "figure": lambda kind: figure_of(session.scene, session.answers, kind),
         "report": report,
     }
 
@@ -102,9 +99,9 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
             per * answer.map.rms, extent=(-edge, edge, -edge, edge), origin="lower", cmap="cividis"
         )
         figure.colorbar(image, ax=row[0], label=f"RMS, {unit}")
-        path = scene.tacton.trajectory
-        row[0].plot(*(1e3 * path.outline.T), color="#56B4E9")
-        for line in influenced(path, scene.pressure.height):
+        for line in drawn_paths(scene.tacton):
+            row[0].plot(*(1e3 * line.T), color="#56B4E9")
+        for line in influenced(scene.tacton, scene.pressure.height):
             row[0].plot(*(1e3 * line.T), color="white", ls="dotted")
         for line in answer.map.felt:
             row[0].plot(*(1e3 * line.T), color="#ff2fd0", lw=1)
