@@ -14,7 +14,7 @@ from unittest.mock import AsyncMock, Mock
 import numpy as np
 import pytest
 
-from simple_model import commanded, spectrum
+from simple_model import Tacton, Trajectory, commanded, spectrum
 from simple_model.flat_body import steady_lines
 from simple_model.focus import lobe_width
 from skinwave.cli import main
@@ -153,6 +153,12 @@ def test_an_address_carries_every_control():
         ("pulses", "0/10", "lasts longer than 0 ms"),
         ("phases", "0, half", "'half' is no phase"),
         ("phases", "0, 100", "100 % is outside"),
+        ("paths", "circle/20/0", "path 1: 'circle/20/0' is none; give shape/size/x/y in mm"),
+        ("paths", "line/10/0/0, circel/20/0/0", "did you mean 'circle'"),
+        ("paths", "square/61/0/0", "path 1: 61 mm is outside 0 to 60 mm"),
+        ("paths", "point/0/0/nan", "its centre must be finite"),
+        ("paths", "circle/20/45/0", "path 1 reaches to 55 mm, beyond the 50 mm of the area"),
+        ("paths", ", ".join(["point/0/0/0"] * 9), "9 paths exceed 8"),
     ],
 )
 def test_what_is_wrong_is_said(key, given, said):
@@ -183,6 +189,48 @@ def test_a_scene_goes_through_its_file_and_back_to_the_controls():
     assert scenes.values_of(loads(dumps(scenes.scene_of(values)))) == values
     with pytest.raises(ValueError, match="2 phases of 3 foci"):
         scenes.scene_of(values | {"foci": 3})
+
+
+OWN = {"foci": 3, "drawn": 90.0, "paths": "circle/20/-20/0, square/15/20/0.5, line/20/0/20"}
+
+
+def test_paths_of_their_own_go_through_a_file_and_back_to_the_controls():
+    every = "triangle/12.5/0/0, point/0/-20/10, circle/60/10/0, square/15/20/0.5, line/20/0/20"
+    for paths in (OWN["paths"], every, "circle/20/3/4"):
+        values = STARTS | OWN | {"paths": paths, "foci": len(paths.split(",")), "pulses": "30/20"}
+        scene = scenes.scene_of(values)
+        assert scene.tacton.drawing_frequency == pytest.approx(90)
+        assert scenes.values_of(loads(dumps(scene))) == values
+        assert controls.from_query(controls.to_query(values)) == (values, ())
+    with pytest.raises(ValueError, match="3 paths of 2 foci"):
+        scenes.scene_of(STARTS | OWN | {"foci": 2})
+    t = np.linspace(0, 0.1, 500)
+    places = np.column_stack([0.02 * np.sin(80 * t), 0.02 * np.cos(70 * t)])
+    for count in (2, 3, 4, 5, 133, 500):
+        path = Trajectory(shape="recorded", points=tuple(map(tuple, places[:count].tolist())),
+                          times=tuple(t[:count].tolist()))  # fmt: skip
+        other = replace(scene, pressure=replace(
+            scene.pressure, tacton=Tacton(trajectory=path))
+        )  # fmt: skip
+        with pytest.raises(ValueError, match="a path of its own points"):
+            scenes.values_of(other)
+
+
+def test_what_is_shown_of_paths_of_their_own_is_their_pressure():
+    scene = scenes.scene_of(STARTS | OWN)
+    t = np.random.default_rng(1).random(4000)
+    sampled = scene.pressure(model.places(), t).std(axis=0).reshape(model.SIDE, model.SIDE)
+    found = model.kernel(scene)
+    assert np.abs(found.map.rms - sampled).max() < 0.05 * sampled.max()
+    names = {line.name: line.frequency for line in found.lines}
+    assert names["f_d-f_AM"] == pytest.approx(50)
+    assert names["f_d+f_AM"] == pytest.approx(230)
+    assert len(model.drawn_paths(scene.tacton)) == 3
+    # At another frequency nothing is found anew: the places are the same.
+    model.harmonics_of.cache_clear()
+    for drawn in (90.0, 33.0, 71.3):
+        model.kernel(scenes.scene_of(STARTS | OWN | {"drawn": drawn}))
+    assert model.harmonics_of.cache_info().misses == 1
 
 
 def test_a_body_of_ones_own_stays():
@@ -296,6 +344,39 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
     shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
     exact = simulate(scene, "flat-body").displacement[:, 0]
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}])
+def test_tabulated_waves_follow_paths_of_their_own(scene, more):
+    values = STARTS | OWN | {"body": "skin-slab", "duration": 0.1} | more
+    scene = scenes.scene_of(values)
+    shown = waves.Waves()(scene, nothing)
+    exact = simulate(scene, "flat-body").displacement[:, 0]
+    error = shown.response.displacement[:, 0] - exact
+    assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(exact)
+
+
+@pytest.mark.slow
+def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
+    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+    paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
+    values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
+    answered, scene = waves.Waves(), scenes.scene_of(values, own)
+    shown = answered(scene, nothing, moving=True)
+    alone = simulate(scene, "fem", h=5e-3).displacement[:, 0]
+    assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
+    said = []
+    again = answered(
+        scenes.scene_of(values | {"drawn": 71.0}, own), lambda *told: said.append(told)
+    )
+    assert not said, "nothing was reduced anew"
+    assert again.lines
+    sent = moving.sent_motion(shown.moving, scene.pressure)
+    sides = np.frombuffer(sent["path"], "<f4").reshape(-1, 2, 3)
+    assert np.linalg.norm(np.diff(sides[..., :2], axis=1), axis=2).max() < 1, "no line joins them"
+    foci = np.frombuffer(sent["foci"], "<f4").reshape(sent["count"], 3, 3)
+    assert np.ptp(foci[:, 0, 0]) == pytest.approx(10, abs=0.5)
 
 
 def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
@@ -553,6 +634,60 @@ def test_pinning_keeps_and_exchanges(session):
     with session.state:
         moves.pin(session)
     assert len(session.state.waveform_plot["data"]) == 1
+
+
+def test_foci_follow_paths_of_their_own(session):
+    with session.state:
+        moves.turn(session, {"foci": 2})
+    with session.state:
+        moves.follow(session, "own")
+    assert session.state.paths == "circle/20/-20/0, circle/20/20/0"
+    assert session.state.drawing_frequency == pytest.approx(STARTS["drawn"])
+    assert session.state.path.count("M") == 2
+    assert session.state.own_speeds == "6.28, 6.28 m/s"
+    with session.state:
+        session.state.foci = 3
+    assert session.state.paths.endswith(", circle/20/0/20")
+    with session.state:
+        moves.own_path(session, 2, 0, "square")
+    with session.state:
+        moves.own_path(session, 2, 2, "4,5")
+    assert session.state.paths.endswith(", square/20/4.5/20")
+    assert session.state.foci_at[2] == [14.5, -30]
+    before = session.state.kernel_map
+    with session.state:
+        moves.own_path(session, 0, 1, "far")
+    assert "path 1: 'circle/far/-20/0' is none" in session.state.errors["paths"]
+    assert session.state.typed["paths"].startswith("circle/far")
+    assert session.state.kernel_map == before
+    with session.state:
+        moves.own_path(session, 0, 1, "15")
+    assert (session.state.errors, session.state.typed) == ({}, {})
+    assert session.state.kernel_map != before
+    kept, values = dumps(session.scene), session.values
+    with session.state:
+        session.state.foci = 1
+    assert session.state.paths == "circle/15/-20/0"
+    with session.state:
+        moves.undo(session)
+    assert session.values == values
+    with session.state:
+        moves.follow(session, "one")
+    assert (session.state.paths, session.state.foci) == ("", 3)
+    with session.state:
+        moves.open_scene(session, kept)
+    assert session.state.paths == values["paths"]
+    with session.state:
+        moves.preset(session, "am80")
+    assert (session.state.paths, session.state.foci) == ("", 1)
+
+
+def test_foci_run_once_along_their_own_path(session):
+    with session.state:
+        moves.turn(session, {"paths": "line/20/-20/0, line/10/20/0"})
+    with session.state:
+        session.state.phase = 50
+    assert session.state.foci_at == [[-10, 0], [25, 0]]
 
 
 def test_what_is_saved_can_be_opened(session):

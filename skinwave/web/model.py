@@ -169,7 +169,7 @@ def drawn_paths(tacton: Tacton) -> tuple[Floats, ...]:
     return tuple(line for line in lines if np.ptp(line, axis=0).any())
 
 
-@lru_cache(maxsize=4)  # some MB each
+@lru_cache(maxsize=2)  # up to 13 MB each
 def harmonics_of(
     path: Trajectory, n_paths: int, height: float, focus: str
 ) -> NDArray[np.complex128]:
