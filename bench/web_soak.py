@@ -35,9 +35,14 @@ COMMAND = [sys.executable, "-m", "skinwave", "web", "--port", "0"]
 Page = Any
 
 
+def there(page: Page) -> list[str]:
+    """The numbers that can be turned now."""
+    return [key for key in NUMBERS if page.locator(f"#{key}-field").count()]
+
+
 def press(page: Page, rng: random.Random) -> None:
     """Some steps of a slider."""
-    key = rng.choice([k for k in NUMBERS if k != "ramp"])
+    key = rng.choice(there(page))
     slider = page.locator(f".sw-row:has(#{key}-field) [role=slider]")
     for _ in range(rng.randint(1, 8)):
         slider.press(rng.choice(["ArrowRight", "ArrowLeft"]))
@@ -45,18 +50,58 @@ def press(page: Page, rng: random.Random) -> None:
 
 def fill(page: Page, rng: random.Random) -> None:
     """A number in a field, now and then a wrong one."""
-    key = rng.choice([k for k in NUMBERS if k != "ramp"])
+    key = rng.choice(there(page))
     number = NUMBERS[key]
     value = rng.choice([rng.uniform(number.low, number.high)] * 6 + [1e9])
     page.locator(f"#{key}-field").fill(f"{round(value) if key == 'foci' else value:.4g}")
 
 
 def rhythm(page: Page, rng: random.Random) -> None:
-    page.locator("#pulses-field").fill(rng.choice(PULSES))
+    """Pulses as text, by buttons, by keys or drawn with the pointer."""
+    handles = page.locator("#timeline .sw-handle")
+    way = rng.choice(["text", "add", "remove", "key", "draw"])
+    if way == "text" or not (count := handles.count()):
+        page.locator("#pulses-field").fill(rng.choice(PULSES))
+    elif way in ("add", "remove"):
+        page.evaluate("id => document.getElementById(id).click()", f"pulse-{way}")
+    elif way == "key":
+        handle = handles.nth(rng.randrange(count))
+        handle.press(rng.choice(["ArrowLeft", "ArrowRight", "PageUp", "Home", "Delete"]))
+    else:
+        drawn(page, handles.nth(rng.randrange(count)), rng.uniform(-60, 60))
+
+
+def drawn(page: Page, handle: Page, far: float) -> None:
+    """Draw a handle so many pixels to the right."""
+    handle.scroll_into_view_if_needed()
+    box = handle.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + far, y, steps=5)
+    page.mouse.up()
+
+
+def own(page: Page, rng: random.Random) -> None:
+    """One path or paths of their own, or something of one of these, now and then a wrong one."""
+    shapes = page.locator("#own select")
+    if not (count := shapes.count()) or rng.random() < 0.2:
+        page.locator(f"#follow-{rng.choice(['one', 'own', 'own'])}").click()
+        return
+    which, part = rng.randrange(count), rng.randrange(4)
+    if part == 0:
+        shapes.nth(which).select_option(rng.choice(CHOICES["shape"][:5]))
+        return
+    cell = page.locator(f"#own-{part}-{which}")
+    if cell.is_enabled():
+        cell.fill(rng.choice([f"{rng.uniform(0, 30):.1f}"] * 6 + ["400", "x"]))
+        cell.press("Tab")
 
 
 def shape(page: Page, rng: random.Random) -> None:
-    page.locator(f"#shape-{rng.choice(CHOICES['shape'][:5])}").click()
+    button = page.locator(f"#shape-{rng.choice(CHOICES['shape'][:5])}")
+    if button.count():
+        button.click()
 
 
 def choose(page: Page, rng: random.Random) -> None:
@@ -116,7 +161,7 @@ def reopen(page: Page, rng: random.Random) -> None:
 
 MOVES: dict[Callable[[Page, random.Random], None], int] = {
     press: 30, fill: 12, select: 12, button: 12, shape: 6, choose: 6, zoom: 5, preset: 4,
-    rhythm: 3, save: 2, reopen: 1,
+    rhythm: 8, own: 8, save: 2, reopen: 1,
 }  # fmt: skip
 
 

@@ -37,7 +37,9 @@ def paths_of(text: str) -> tuple[Trajectory, ...]:
 def text_of(paths: tuple[Trajectory, ...]) -> str:
     """The text that `paths_of` reads."""
     return ", ".join(
-        "/".join([path.shape, *(f"{round(1e3 * v, 6) + 0.0:.10g}" for v in (path.size, *path.centre))])
+        "/".join(
+            [path.shape, *(f"{round(1e3 * v, 6) + 0.0:.10g}" for v in (path.size, *path.centre))]
+        )
         for path in paths
     )
 
