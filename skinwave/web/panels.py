@@ -32,6 +32,8 @@ LEFT_OUT = (
     "With a body the focus is a Gaussian of the same width as the main lobe that the point kernel "
     "alone has. Side lobes, and what several simultaneous foci do to each other, are left out: "
     "simultaneous and time-multiplexed foci push alike here, devices differ.",
+    "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
+    "polygon, nowhere further from it than 0.01 mm.",
     "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
     "above the threshold for a focal spot; point kernel: 4.4 Pa, just felt with AM at 200 Hz. "
     "Maps of a rhythm are those of its pulses while they are on.",
