@@ -76,7 +76,7 @@ def test_what_is_cancelled_ends_with_all_that_it_has_started(way):
 import multiprocessing, subprocess, sys, time
 from skinwave.web import worker
 def busy(pipe):
-    worker._end_with_parent()
+    worker.end_with_parent()
     child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
     print(child.pid, flush=True)
     child.wait()
@@ -495,7 +495,7 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
         return found
 
     monkeypatch.setattr(waves.Waves, "__call__", answer)
-    monkeypatch.setattr(worker, "_end_with_parent", lambda: None)
+    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
     monkeypatch.setattr(worker.os, "nice", lambda _: None)
     worker.answer_forever(Pipe())
     assert sent[0][:2] == ("failed", 1)
@@ -707,18 +707,29 @@ def test_what_is_saved_can_be_opened(session):
     lines = files["waveform_csv"]().decode().splitlines()
     assert lines[0] == '"time, s","pressure at (10, 0) mm, Pa (point-kernel)"'
     assert len(lines) == 10_001
-    assert b"<svg" in files["figure"]("svg")
+    assert b"<svg" in asyncio.run(files["figure"]("svg"))
     report = asyncio.run(files["report"]()).decode()
     assert "How far to trust it" in report
     assert "am_frequency_hz = 90" in report
     assert "http" not in re.sub(r"http://www.w3.org|xmlns", "", report).split("<style>")[0]
-    assert Image.open(BytesIO(files["figure"]("png"))).width > 1000
+    assert Image.open(BytesIO(asyncio.run(files["figure"]("png")))).width > 1000
     with session.state:
         moves.open_scene(session, "[tacton]\nam = 5")
     assert "the scene cannot be opened" in session.state.problem
     with session.state:
         session.state.opened = {"content": kept.encode()}
     assert session.state.problem == ""
+
+
+def test_a_report_says_how_often_paths_of_their_own_are_drawn():
+    scene = scenes.scene_of(STARTS | OWN | {"duration": 0.1})
+    said = downloads.report_of(scene, [model.kernel(scene)]).decode()
+    assert "3 paths, drawn 90.000 times a second" in said
+
+
+def test_what_is_made_elsewhere_and_fails_is_said():
+    with pytest.raises(RuntimeError, match="has ended without it"):
+        asyncio.run(downloads.elsewhere(downloads.wav_of, None))
 
 
 def test_zooming_in_shows_the_carrier(session):

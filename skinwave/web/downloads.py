@@ -1,9 +1,11 @@
 """What a page gives to keep: the scene, waveforms as tables and sound, a figure, the report."""
 
 import asyncio
+import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO, StringIO
+from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,6 +16,7 @@ from skinwave.pictures.figures import colour
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
+from skinwave.web.worker import end_with_parent
 
 
 def offered(session: Any) -> dict[str, Callable[..., Any]]:
@@ -23,15 +26,50 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
     """
 
     async def report() -> bytes:
-        return await asyncio.to_thread(report_of, session.scene, session.answers)
+        return await elsewhere(report_of, session.scene, session.answers)
+
+    async def figure(kind: str) -> bytes:
+        return await elsewhere(figure_of, session.scene, session.answers, kind)
 
     return {
         "scene_toml": lambda: dumps(session.scene).encode(),
         "waveform_csv": lambda: csv_of(session.answers),
         "waveform_wav": lambda: wav_of(session.answers[-1]),
-        "figure": lambda kind: figure_of(session.scene, session.answers, kind),
+        "figure": figure,
         "report": report,
     }
+
+
+async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:
+    """What a function makes, in a process of its own: the page stays live, and all that drawing
+    takes of memory is gone with it.
+
+    Raises
+    ------
+    RuntimeError
+        If the process ends without it.
+    """
+    return await asyncio.to_thread(_elsewhere, make, given)
+
+
+def _elsewhere(make: Callable[..., bytes], given: tuple[Any, ...]) -> bytes:
+    context = multiprocessing.get_context("spawn")
+    mine, other = context.Pipe(duplex=False)
+    process = context.Process(target=_make, args=(other, make, given), daemon=True)
+    process.start()
+    other.close()
+    try:
+        return bytes(mine.recv())
+    except EOFError:
+        raise RuntimeError(f"the process of {make.__name__} has ended without it") from None
+    finally:
+        process.join()
+        mine.close()
+
+
+def _make(pipe: Connection, make: Callable[..., bytes], given: tuple[Any, ...]) -> None:
+    end_with_parent()
+    pipe.send(make(*given))
 
 
 def csv_of(answers: Sequence[Answer]) -> bytes:
