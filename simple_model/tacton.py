@@ -38,7 +38,7 @@ class Tacton:
     duration : float, s, above 0 and at most 10
     trajectory : Trajectory
     foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the
-        same path
+        same path; for paths of their own see `simple_model.joined`
     sharing : how the array makes several foci, each of which pushes with 1/n of the pressure that
         one alone would have, so that the total force stays the same. "simultaneous": all at once,
         each at 1/sqrt(n) of the sound pressure, which conserves the acoustic power; that the

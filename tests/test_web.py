@@ -661,6 +661,11 @@ def test_foci_follow_paths_of_their_own(session):
     assert session.state.typed["paths"].startswith("circle/far")
     assert session.state.kernel_map == before
     with session.state:
+        session.state.foci = 4
+    assert (session.state.errors, session.state.typed) == ({}, {}), "as what was typed is gone"
+    with session.state:
+        moves.undo(session)
+    with session.state:
         moves.own_path(session, 0, 1, "15")
     assert (session.state.errors, session.state.typed) == ({}, {})
     assert session.state.kernel_map != before

@@ -27,9 +27,9 @@ def connect(session: Session) -> None:
         (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest")), (phase, ("phase",)),
         (solid, ("solid",)), (opened, ("opened",)),
     )  # fmt: skip
-    for follow, keys in watched:
-        session.state.change(*keys)(_without_state(follow, session))
-    for move in (select, restart, zoom, follow, own_path):
+    for answered, keys in watched:
+        session.state.change(*keys)(_without_state(answered, session))
+    for move in (select, restart, zoom, own_path):
         session.server.trigger(move.__name__)(partial(move, session))
     for name, made in offered(session).items():
         session.server.trigger(name)(made)
@@ -48,18 +48,14 @@ def turn(session: Session, given: Values, whole: bool = False) -> None:
     be half of a number. A `whole` Tacton brings its own drawing frequency, held from then.
     """
     state = session.state
-    errors, typed, accepted = dict(state.errors), dict(state.typed), {}
-    for key, value in given.items():
-        try:
-            accepted[key] = controls.checked(key, value)
-            errors.pop(key, None)
-            typed.pop(key, None)
-        except ValueError as error:
-            errors[key], typed[key] = str(error), str(value)
+    accepted, errors, typed = _checked(session, given)
     values = session.good | accepted
     for key in ("foci", "paths"):
         if key in accepted:
             values = controls.with_its_paths(values, key)
+    if values["paths"] != session.good["paths"]:  # what was typed of paths is not there any more
+        errors.pop("paths", None)
+        typed.pop("paths", None)
     moved = [key for key in ("shape", "size", "speed") if key in accepted]
     if state.hold and moved and not whole and not values["paths"]:
         try:
@@ -74,6 +70,20 @@ def turn(session: Session, given: Values, whole: bool = False) -> None:
         refresh(session)
     if whole:
         hold(session)
+
+
+def _checked(session: Session, given: Values) -> tuple[Values, dict[str, str], dict[str, str]]:
+    """What is accepted; what is wrong and was typed of each field, with what was so before."""
+    accepted: Values = {}
+    errors, typed = dict(session.state.errors), dict(session.state.typed)
+    for key, value in given.items():
+        try:
+            accepted[key] = controls.checked(key, value)
+            errors.pop(key, None)
+            typed.pop(key, None)
+        except ValueError as error:
+            errors[key], typed[key] = str(error), str(value)
+    return accepted, errors, typed
 
 
 def setter(session: Session, key: str) -> Callable[[Any], None]:
