@@ -85,7 +85,7 @@ def shape(page: Page, rng: random.Random) -> None:
 def choose(page: Page, rng: random.Random) -> None:
     key = rng.choice(["ratio", "drive", "span", "highest", "sharing"])
     page.locator(f".v-field:has(#{key})").click()
-    options = page.get_by_role("option")
+    options = page.locator(".v-overlay [role=option]:visible")
     options.first.wait_for()
     options.nth(rng.randrange(options.count())).click()
 
