@@ -14,110 +14,24 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from bench.web import ARGUMENTS, CHROMIUM, DRAWN
-from skinwave.web.controls import CHOICES, NUMBERS, OWN_BODY, presets
+from bench.web_moves import MOVES, body
+from skinwave.web.controls import CHOICES, OWN_BODY
 from skinwave.web.front import LATER
 from skinwave.web.waves import KEPT
 
 WARM = 0.2  # of the time
 OFTEN = 5  # in about a hundred moves another body
-SAVED = ("scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "report-html")
-PULSES = ("", "100/50", "40/20, 10/30", "5/5")
 PATIENCE = 60_000  # ms; a page that is not ready by then has failed
 BUILT = 600_000  # ms in which a body is built, whatever else the machine does
 MOST = 50.0  # MB of growth
 COMMAND = [sys.executable, "-m", "skinwave", "web", "--port", "0"]
 Page = Any
-
-
-def press(page: Page, rng: random.Random) -> None:
-    """Some steps of a slider."""
-    key = rng.choice([k for k in NUMBERS if k != "ramp"])
-    slider = page.locator(f".sw-row:has(#{key}-field) [role=slider]")
-    for _ in range(rng.randint(1, 8)):
-        slider.press(rng.choice(["ArrowRight", "ArrowLeft"]))
-
-
-def fill(page: Page, rng: random.Random) -> None:
-    """A number in a field, now and then a wrong one."""
-    key = rng.choice([k for k in NUMBERS if k != "ramp"])
-    number = NUMBERS[key]
-    value = rng.choice([rng.uniform(number.low, number.high)] * 6 + [1e9])
-    page.locator(f"#{key}-field").fill(f"{round(value) if key == 'foci' else value:.4g}")
-
-
-def rhythm(page: Page, rng: random.Random) -> None:
-    page.locator("#pulses-field").fill(rng.choice(PULSES))
-
-
-def shape(page: Page, rng: random.Random) -> None:
-    page.locator(f"#shape-{rng.choice(CHOICES['shape'][:5])}").click()
-
-
-def choose(page: Page, rng: random.Random) -> None:
-    key = rng.choice(["ratio", "drive", "span", "highest", "sharing"])
-    page.locator(f".v-field:has(#{key})").click()
-    options = page.get_by_role("option")
-    options.first.wait_for()
-    options.nth(rng.randrange(options.count())).click()
-
-
-def body(page: Page, rng: random.Random, bodies: Sequence[str]) -> None:
-    name = rng.choice([*bodies, "skin-slab", "skin-slab"])
-    page.locator(".v-field:has(#body)").click()
-    page.get_by_role("option", name=name, exact=True).click()
-
-
-def preset(page: Page, rng: random.Random) -> None:
-    page.locator("#presets").click()
-    page.locator(f"#preset-{rng.choice(list(presets()))}").click()
-
-
-def select(page: Page, rng: random.Random) -> None:
-    page.locator("#kernel-map").click(
-        position={"x": rng.uniform(40, 200), "y": rng.uniform(20, 180)}
-    )
-
-
-def button(page: Page, rng: random.Random) -> None:
-    page.evaluate(
-        "id => document.getElementById(id)?.click()",
-        rng.choice(["undo", "redo", "pin", "swap", "solid", "theme", "cancel", "body-play"]),
-    )
-
-
-def zoom(page: Page, rng: random.Random) -> None:
-    plot = page.locator(f"#{rng.choice(['commanded_plot', 'waveform_plot', 'spectrum_plot'])}")
-    for key in rng.choices(["+", "-", "ArrowLeft", "ArrowRight", "Home"], k=4):
-        plot.press(key)
-
-
-def save(page: Page, rng: random.Random) -> None:
-    page.locator("#save").click()
-    with page.expect_download() as saved:
-        page.locator(f"#save-{rng.choice(SAVED)}").click()
-    saved.value.delete()
-
-
-def reopen(page: Page, rng: random.Random) -> None:
-    """Save the scene, and open it again."""
-    page.locator("#save").click()
-    with page.expect_download() as saved, tempfile.TemporaryDirectory() as folder:
-        page.locator("#save-scene-toml").click()
-        path = Path(folder, "scene.toml")
-        saved.value.save_as(path)
-        page.locator("input[type=file]").set_input_files(path)
-
-
-MOVES: dict[Callable[[Page, random.Random], None], int] = {
-    press: 30, fill: 12, select: 12, button: 12, shape: 6, choose: 6, zoom: 5, preset: 4,
-    rhythm: 3, save: 2, reopen: 1,
-}  # fmt: skip
 
 
 def family(pid: int) -> list[int]:

@@ -2,6 +2,7 @@
 
 from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import array_field, focal_spot, relative_intensity
+from simple_model.joined import evenly, joined
 from simple_model.point_kernel import point_kernel
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, lines, spectrum, tacton_lines
@@ -22,8 +23,10 @@ __all__ = [
     "Trajectory",
     "array_field",
     "commanded",
+    "evenly",
     "flat_body",
     "focal_spot",
+    "joined",
     "lines",
     "modulation",
     "point_kernel",

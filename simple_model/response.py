@@ -114,10 +114,10 @@ def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
     f_AM, n f_AM, f_d, n f_d, n f_d-f_AM and n f_d+f_AM (as a positive frequency); also with the
     second AM frequency f_AM2, the envelope f_e and the rhythm's f_r, one over its period, where
     they are used. Harmonics of f_d that several foci cancel are left out, and those of a recording
-    that is run through once.
+    that is run through once. Foci on paths of their own have one f_d, that of each path.
     """
-    f_d = tacton.trajectory.drawing_frequency
-    if tacton.trajectory.shape == "recorded" and f_d * tacton.duration < 1.5 * len(tacton.foci):
+    f_d = tacton.drawing_frequency
+    if tacton.trajectory.shape == "recorded" and f_d * tacton.duration < 1.5:
         f_d = 0.0  # run through once
     w1, w2 = tacton.superposition
     tones = {
@@ -127,7 +127,8 @@ def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
         "f_r": 1 / tacton.rhythm.period if tacton.rhythm else 0.0,
     }
     tones = {name: f for name, f in tones.items() if f > 0}
-    drawn = {f"{_times(n)}f_d": n * f_d for n in _drawn(tacton.foci, harmonics) if f_d > 0}
+    on_path = tacton.foci if tacton.n_paths == 1 else (0.0,)
+    drawn = {f"{_times(n)}f_d": n * f_d for n in _drawn(on_path, harmonics) if f_d > 0}
     found = {
         f"{_times(n)}{name}": n * f for name, f in tones.items() for n in range(1, harmonics + 1)
     }

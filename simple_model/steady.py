@@ -12,6 +12,7 @@ cannot feel what comes after.
 """
 
 from dataclasses import dataclass
+from math import lcm
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from scipy import sparse
 
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
-from simple_model.tacton import modulation_at_phases, tones
+from simple_model.tacton import Tacton, modulation_at_phases, tones
 from simple_model.trajectory import Floats
 
 Complex = NDArray[np.complex128]
@@ -29,6 +30,7 @@ KNOTS_PER_WIDTH = 8  # of the spot, which makes corners right to 1e-4
 PHASES = 8  # of each sinusoid: the drive laws are polynomials of second degree
 HIGHEST = 10_000.0  # Hz of what is kept of pulses and recordings: the rest moves bodies by 0.1 %
 SAMPLED = 40_000.0  # Hz at which a rhythm or signal is averaged
+MOST_SAMPLED = 50_000_000  # lines of a rhythm or signal, some hundred megabytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,13 +131,31 @@ def _knot_phases(pressure: MovingPressure) -> Floats:
         return np.zeros(1)
     width = spot_width(pressure.height)
     if path.shape == "recorded":
-        parts, period = len(path.times) - 1, path.times[-1]
-        enough = max(KNOTS_PER_WIDTH * path.length / width, 2.5 * HIGHEST * period)
-        k = parts * int(np.ceil(max(enough, FEWEST_KNOTS) / parts))
+        enough, whole = _recorded_knots(pressure.tacton, width)
     else:
-        enough = max(FEWEST_KNOTS, KNOTS_PER_WIDTH * path.length / width)
-        k = 12 * int(np.ceil(enough / 12))
+        enough, whole = KNOTS_PER_WIDTH * path.length / width, 12
+    k = whole * int(np.ceil(max(enough, FEWEST_KNOTS) / whole))
     return (np.arange(k) + 0.5) / k
+
+
+def _recorded_knots(tacton: Tacton, width: float) -> tuple[float, int]:
+    """How many knots a recording needs for a spot of a width in metre, and of what they are a
+    multiple: enough for all lines that are kept or, if nothing about it is abrupt within a path,
+    for its fastest part.
+    """
+    path, n = tacton.trajectory, tacton.n_paths
+    clock, period = np.array(path.times), path.times[-1]
+    steps = np.diff(clock)
+    moves = steps > 0
+    even = np.ptp(steps[moves]) < 1e-9 * period
+    whole = lcm(int(moves.sum()), n) if even else 12 * n
+    lines = 2.5 * HIGHEST * period
+    jumps = clock[1:][~moves] * n / period
+    if path.levels or path.hold or np.abs(jumps - np.round(jumps)).max(initial=0.0) > 1e-9:
+        return max(KNOTS_PER_WIDTH * path.length / width, lines), whole
+    lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
+    fastest = float((lengths[moves] / steps[moves]).max())
+    return min(KNOTS_PER_WIDTH * fastest * period / width, lines), whole
 
 
 def _swept(pressure: MovingPressure) -> Floats:
@@ -149,6 +169,11 @@ def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Float
     """Frequencies (n, k) in Hz and coefficients (n, k) in Pa of the gain as harmonics n see it.
 
     Sampled averages of the gain; averaging takes sin(x)/x off its lines, which is put back.
+
+    Raises
+    ------
+    ValueError
+        If there are more than `MOST_SAMPLED` of them.
     """
     tacton = pressure.tacton
     count = max(2, int(np.ceil(tacton.duration * SAMPLED)))
@@ -156,6 +181,11 @@ def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Float
     t = (np.arange(count) + 0.5) * dt
     gain = pressure.gain(t, over=dt)
     k = np.arange(min(count // 2, int(HIGHEST * tacton.duration) + 1))
+    if len(n) * len(k) > MOST_SAMPLED:
+        raise ValueError(
+            f"a rhythm or signal on this path makes {len(n) * len(k):,} lines, the limit is "
+            f"{MOST_SAMPLED:,}; shorten the Tacton or the path, or put the rhythm into its levels"
+        )
     middle = np.exp(-1j * np.pi * k / count) / count
     f_d = tacton.trajectory.drawing_frequency
     c = np.empty((len(n), len(k)), np.complex128)

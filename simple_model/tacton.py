@@ -21,6 +21,7 @@ CARRIER = 40e3  # Hz
 LONGEST = 10.0  # s
 MOST_FOCI = 8  # what devices make at a time
 SHARINGS = ("simultaneous", "time_multiplexed")
+SAME = 1e-9  # of a drawing period, within which phases are the same
 SUPERPOSITIONS = ((1.0, 0.0), (0.75, 0.25), (0.5, 0.5), (0.25, 0.75), (0.0, 1.0))
 
 
@@ -37,7 +38,7 @@ class Tacton:
     duration : float, s, above 0 and at most 10
     trajectory : Trajectory
     foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the
-        same path
+        same path; for paths of their own see `simple_model.joined`
     sharing : how the array makes several foci, each of which pushes with 1/n of the pressure that
         one alone would have, so that the total force stays the same. "simultaneous": all at once,
         each at 1/sqrt(n) of the sound pressure, which conserves the acoustic power; that the
@@ -49,8 +50,8 @@ class Tacton:
     Raises
     ------
     ValueError
-        If a value is not finite or out of range, or a recorded path is given a rhythm or a signal:
-        its levels are its own.
+        If a value is not finite or out of range, or a path with levels of its own is given a rhythm
+        or a signal.
     """
 
     amplitude: float = 1.0
@@ -99,7 +100,7 @@ class Tacton:
         for phase in self.foci:
             if not 0 <= phase <= 1:
                 raise ValueError(f"focus phase {phase} is outside 0..1 of the drawing period")
-        if self.is_sampled and self.trajectory.shape == "recorded":
+        if self.is_sampled and self.trajectory.levels:
             raise ValueError(
                 "a recorded path has levels of its own; put the rhythm or signal into them, or "
                 "leave it out"
@@ -109,6 +110,20 @@ class Tacton:
     def is_sampled(self) -> bool:
         """Whether the amplitude follows more than sinusoids."""
         return self.rhythm is not None or self.signal is not None
+
+    @property
+    def n_paths(self) -> int:
+        """How many paths there are: n of a recording that n foci share evenly, see `joined`."""
+        n = len(self.foci)
+        shared = self.trajectory.shape == "recorded" and all(
+            abs(phase - k / n) < SAME for k, phase in enumerate(sorted(self.foci))
+        )
+        return n if shared else 1
+
+    @property
+    def drawing_frequency(self) -> float:
+        """How many times a second each path is drawn, Hz; 0 where the foci do not move."""
+        return self.n_paths * self.trajectory.drawing_frequency
 
 
 def modulation(tacton: Tacton, t: ArrayLike) -> Floats:

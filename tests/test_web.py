@@ -14,7 +14,7 @@ from unittest.mock import AsyncMock, Mock
 import numpy as np
 import pytest
 
-from simple_model import commanded, spectrum
+from simple_model import Tacton, Trajectory, commanded, spectrum
 from simple_model.flat_body import steady_lines
 from simple_model.focus import lobe_width
 from skinwave.cli import main
@@ -29,6 +29,7 @@ from skinwave.web import (
     downloads,
     drawings,
     model,
+    moves,
     moving,
     plots,
     scenes,
@@ -37,6 +38,7 @@ from skinwave.web import (
 )
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
+from skinwave.web.session import told
 from skinwave.web.worker import Worker
 
 
@@ -74,7 +76,7 @@ def test_what_is_cancelled_ends_with_all_that_it_has_started(way):
 import multiprocessing, subprocess, sys, time
 from skinwave.web import worker
 def busy(pipe):
-    worker._end_with_parent()
+    worker.end_with_parent()
     child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
     print(child.pid, flush=True)
     child.wait()
@@ -130,6 +132,7 @@ def test_an_address_carries_every_control():
         "duration": 0.7, "shape": "triangle", "size": 31.5, "speed": 4.2, "height": 150.0,
         "drive": "force_corrected", "body": "palm", "foci": 3, "sharing": "time_multiplexed",
         "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
+        "drawn": 42.5, "paths": "circle/20/-15/0, line/10/15/0.5, point/0/0/-20",
     }  # fmt: skip
     assert set(changed) == set(STARTS)
     assert all(changed[key] != STARTS[key] for key in STARTS)
@@ -150,6 +153,12 @@ def test_an_address_carries_every_control():
         ("pulses", "0/10", "lasts longer than 0 ms"),
         ("phases", "0, half", "'half' is no phase"),
         ("phases", "0, 100", "100 % is outside"),
+        ("paths", "circle/20/0", "path 1: 'circle/20/0' is none; give shape/size/x/y in mm"),
+        ("paths", "line/10/0/0, circel/20/0/0", "did you mean 'circle'"),
+        ("paths", "square/61/0/0", "path 1: 61 mm is outside 0 to 60 mm"),
+        ("paths", "point/0/0/nan", "its centre must be finite"),
+        ("paths", "circle/20/45/0", "path 1 reaches to 55 mm, beyond the 50 mm of the area"),
+        ("paths", ", ".join(["point/0/0/0"] * 9), "9 paths exceed 8"),
     ],
 )
 def test_what_is_wrong_is_said(key, given, said):
@@ -180,6 +189,48 @@ def test_a_scene_goes_through_its_file_and_back_to_the_controls():
     assert scenes.values_of(loads(dumps(scenes.scene_of(values)))) == values
     with pytest.raises(ValueError, match="2 phases of 3 foci"):
         scenes.scene_of(values | {"foci": 3})
+
+
+OWN = {"foci": 3, "drawn": 90.0, "paths": "circle/20/-20/0, square/15/20/0.5, line/20/0/20"}
+
+
+def test_paths_of_their_own_go_through_a_file_and_back_to_the_controls():
+    every = "triangle/12.5/0/0, point/0/-20/10, circle/60/10/0, square/15/20/0.5, line/20/0/20"
+    for paths in (OWN["paths"], every, "circle/20/3/4"):
+        values = STARTS | OWN | {"paths": paths, "foci": len(paths.split(",")), "pulses": "30/20"}
+        scene = scenes.scene_of(values)
+        assert scene.tacton.drawing_frequency == pytest.approx(90)
+        assert scenes.values_of(loads(dumps(scene))) == values
+        assert controls.from_query(controls.to_query(values)) == (values, ())
+    with pytest.raises(ValueError, match="3 paths of 2 foci"):
+        scenes.scene_of(STARTS | OWN | {"foci": 2})
+    t = np.linspace(0, 0.1, 500)
+    places = np.column_stack([0.02 * np.sin(80 * t), 0.02 * np.cos(70 * t)])
+    for count in (2, 3, 4, 5, 133, 500):
+        path = Trajectory(shape="recorded", points=tuple(map(tuple, places[:count].tolist())),
+                          times=tuple(t[:count].tolist()))  # fmt: skip
+        other = replace(scene, pressure=replace(
+            scene.pressure, tacton=Tacton(trajectory=path))
+        )  # fmt: skip
+        with pytest.raises(ValueError, match="a path of its own points"):
+            scenes.values_of(other)
+
+
+def test_what_is_shown_of_paths_of_their_own_is_their_pressure():
+    scene = scenes.scene_of(STARTS | OWN)
+    t = np.random.default_rng(1).random(4000)
+    sampled = scene.pressure(model.places(), t).std(axis=0).reshape(model.SIDE, model.SIDE)
+    found = model.kernel(scene)
+    assert np.abs(found.map.rms - sampled).max() < 0.05 * sampled.max()
+    names = {line.name: line.frequency for line in found.lines}
+    assert names["f_d-f_AM"] == pytest.approx(50)
+    assert names["f_d+f_AM"] == pytest.approx(230)
+    assert len(model.drawn_paths(scene.tacton)) == 3
+    # At another frequency nothing is found anew: the places are the same.
+    model.harmonics_of.cache_clear()
+    for drawn in (90.0, 33.0, 71.3):
+        model.kernel(scenes.scene_of(STARTS | OWN | {"drawn": drawn}))
+    assert model.harmonics_of.cache_info().misses == 1
 
 
 def test_a_body_of_ones_own_stays():
@@ -243,9 +294,10 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
 
 
 def test_the_influenced_area_ends_a_main_lobe_from_the_path():
-    path = scenes.scene_of(STARTS).tacton.trajectory
+    tacton = scenes.scene_of(STARTS).tacton
     outer, inner = (
-        sorted(model.influenced(path, 0.2), key=lambda x: -np.linalg.norm(x, axis=1).max())[:1] * 2
+        sorted(model.influenced(tacton, 0.2), key=lambda x: -np.linalg.norm(x, axis=1).max())[:1]
+        * 2
     )
     assert outer is inner  # D0 exceeds the radius: no hole
     assert np.linalg.norm(outer, axis=1) == pytest.approx(0.01 + lobe_width(0.2), rel=0.01)
@@ -292,6 +344,39 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
     shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
     exact = simulate(scene, "flat-body").displacement[:, 0]
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}])
+def test_tabulated_waves_follow_paths_of_their_own(scene, more):
+    values = STARTS | OWN | {"body": "skin-slab", "duration": 0.1} | more
+    scene = scenes.scene_of(values)
+    shown = waves.Waves()(scene, nothing)
+    exact = simulate(scene, "flat-body").displacement[:, 0]
+    error = shown.response.displacement[:, 0] - exact
+    assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(exact)
+
+
+@pytest.mark.slow
+def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
+    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+    paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
+    values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
+    answered, scene = waves.Waves(), scenes.scene_of(values, own)
+    shown = answered(scene, nothing, moving=True)
+    alone = simulate(scene, "fem", h=5e-3).displacement[:, 0]
+    assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
+    said = []
+    again = answered(
+        scenes.scene_of(values | {"drawn": 71.0}, own), lambda *told: said.append(told)
+    )
+    assert not said, "nothing was reduced anew"
+    assert again.lines
+    sent = moving.sent_motion(shown.moving, scene.pressure)
+    sides = np.frombuffer(sent["path"], "<f4").reshape(-1, 2, 3)
+    assert np.linalg.norm(np.diff(sides[..., :2], axis=1), axis=2).max() < 1, "no line joins them"
+    foci = np.frombuffer(sent["foci"], "<f4").reshape(sent["count"], 3, 3)
+    assert np.ptp(foci[:, 0, 0]) == pytest.approx(10, abs=0.5)
 
 
 def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
@@ -410,7 +495,7 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
         return found
 
     monkeypatch.setattr(waves.Waves, "__call__", answer)
-    monkeypatch.setattr(worker, "_end_with_parent", lambda: None)
+    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
     monkeypatch.setattr(worker.os, "nice", lambda _: None)
     worker.answer_forever(Pipe())
     assert sent[0][:2] == ("failed", 1)
@@ -465,7 +550,7 @@ def test_a_move_changes_what_is_shown(session):
     assert session.scene.tacton.am_frequency == 200
     assert session.state.undoable
     with session.state:
-        session.undo()
+        moves.undo(session)
     assert session.state.am == 140
     assert session.state.spectrum_plot == before
 
@@ -473,16 +558,16 @@ def test_a_move_changes_what_is_shown(session):
 def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
     before = session.state.spectrum_plot
     with session.state:
-        session.turn({"size": "70"})
+        moves.turn(session, {"size": "70"})
     assert "outside 0 to 60 mm" in session.state.errors["size"]
     assert session.state.size == STARTS["size"]
     assert session.state.typed == {"size": "70"}
     assert session.state.spectrum_plot == before
     with session.state:
-        session.turn({"size": "30"})
+        moves.turn(session, {"size": "30"})
     assert (session.state.errors, session.state.typed) == ({}, {})
     with session.state:
-        session.turn({"pulses": "5/5", "ramp": 100})
+        moves.turn(session, {"pulses": "5/5", "ramp": 100})
     assert "ramp" in session.state.problem
     assert session.state.stale
 
@@ -494,13 +579,13 @@ def test_waves_are_stale_until_they_are_answered(session):
     assert [d["name"] for d in session.state.waveform_plot["data"]] == ["point kernel, Pa"]
     answer = waves.Waves()(session.scene, nothing)
     with session.state:
-        session.told("answer", session._number - 1, answer)
+        told(session, "answer", session.number - 1, answer)
     assert session.state.waves_stale, "an older answer is not shown"
     with session.state:
-        session.told("progress", session._number, ("reduce", 0.5))
+        told(session, "progress", session.number, ("reduce", 0.5))
     assert (session.state.busy, session.state.done) == ("reduce", 50)
     with session.state:
-        session.told("answer", session._number, answer)
+        told(session, "answer", session.number, answer)
     assert not session.state.waves_stale
     drawn = {d["name"]: d for d in session.state.spectrum_plot["data"]}
     assert drawn["waves (flat-body), µm"]["opacity"] == 1
@@ -510,10 +595,10 @@ def test_waves_are_stale_until_they_are_answered(session):
     drawn = {d["name"]: d for d in session.state.waveform_plot["data"]}
     assert drawn["waves (flat-body), µm — being computed"]["opacity"] == plots.STALE
     with session.state:
-        session.told("failed", session._number, "it cannot be")
+        told(session, "failed", session.number, "it cannot be")
     assert session.state.problem == "it cannot be"
     with session.state:
-        session.cancel()
+        moves.cancel(session)
     assert session.state.body == "none"
     assert not session.state.busy
 
@@ -531,24 +616,83 @@ def test_a_held_frequency_and_a_preset(session):
     with session.state:
         session.state.hold = False
     with session.state:
-        session.preset("am210-stm10")
+        moves.preset(session, "am210-stm10")
     assert (session.state.am, session.state.size, session.state.errors) == (210, 10, {})
 
 
 def test_pinning_keeps_and_exchanges(session):
     with session.state:
-        session.pin()
+        moves.pin(session)
         session.state.am = 90
     assert any(d["name"] == "pinned kernel, Pa" for d in session.state.spectrum_plot["data"])
     with session.state:
-        session.take_pinned()
+        moves.exchange(session)
     assert session.state.am == 140
     with session.state:
-        session.take_pinned()
+        moves.exchange(session)
     assert session.state.am == 90
     with session.state:
-        session.pin()
+        moves.pin(session)
     assert len(session.state.waveform_plot["data"]) == 1
+
+
+def test_foci_follow_paths_of_their_own(session):
+    with session.state:
+        moves.turn(session, {"foci": 2})
+    with session.state:
+        moves.follow(session, "own")
+    assert session.state.paths == "circle/20/-20/0, circle/20/20/0"
+    assert session.state.drawing_frequency == pytest.approx(STARTS["drawn"])
+    assert session.state.path.count("M") == 2
+    assert session.state.own_speeds == "6.28, 6.28 m/s"
+    with session.state:
+        session.state.foci = 3
+    assert session.state.paths.endswith(", circle/20/0/20")
+    with session.state:
+        moves.own_path(session, 2, 0, "square")
+    with session.state:
+        moves.own_path(session, 2, 2, "4,5")
+    assert session.state.paths.endswith(", square/20/4.5/20")
+    assert session.state.foci_at[2] == [14.5, -30]
+    before = session.state.kernel_map
+    with session.state:
+        moves.own_path(session, 0, 1, "far")
+    assert "path 1: 'circle/far/-20/0' is none" in session.state.errors["paths"]
+    assert session.state.typed["paths"].startswith("circle/far")
+    assert session.state.kernel_map == before
+    with session.state:
+        session.state.foci = 4
+    assert (session.state.errors, session.state.typed) == ({}, {}), "as what was typed is gone"
+    with session.state:
+        moves.undo(session)
+    with session.state:
+        moves.own_path(session, 0, 1, "15")
+    assert (session.state.errors, session.state.typed) == ({}, {})
+    assert session.state.kernel_map != before
+    kept, values = dumps(session.scene), session.values
+    with session.state:
+        session.state.foci = 1
+    assert session.state.paths == "circle/15/-20/0"
+    with session.state:
+        moves.undo(session)
+    assert session.values == values
+    with session.state:
+        moves.follow(session, "one")
+    assert (session.state.paths, session.state.foci) == ("", 3)
+    with session.state:
+        moves.open_scene(session, kept)
+    assert session.state.paths == values["paths"]
+    with session.state:
+        moves.preset(session, "am80")
+    assert (session.state.paths, session.state.foci) == ("", 1)
+
+
+def test_foci_run_once_along_their_own_path(session):
+    with session.state:
+        moves.turn(session, {"paths": "line/20/-20/0, line/10/20/0"})
+    with session.state:
+        session.state.phase = 50
+    assert session.state.foci_at == [[-10, 0], [25, 0]]
 
 
 def test_what_is_saved_can_be_opened(session):
@@ -556,44 +700,55 @@ def test_what_is_saved_can_be_opened(session):
     from scipy.io import wavfile
 
     with session.state:
-        session.turn({"pulses": "100/50", "am": 90, "size": 12})
+        moves.turn(session, {"pulses": "100/50", "am": 90, "size": 12})
     files = downloads.offered(session)
     kept, values = files["scene_toml"]().decode(), session.values
     with session.state:
-        session.preset("am80")
-        session.open_scene(kept)
+        moves.preset(session, "am80")
+        moves.open_scene(session, kept)
     assert session.values == values
     rate, samples = wavfile.read(BytesIO(files["waveform_wav"]()))
     assert (rate, len(samples)) == (10_000, 10_000)
     lines = files["waveform_csv"]().decode().splitlines()
     assert lines[0] == '"time, s","pressure at (10, 0) mm, Pa (point-kernel)"'
     assert len(lines) == 10_001
-    assert b"<svg" in files["figure"]("svg")
+    assert b"<svg" in asyncio.run(files["figure"]("svg"))
     report = asyncio.run(files["report"]()).decode()
     assert "How far to trust it" in report
     assert "am_frequency_hz = 90" in report
     assert "http" not in re.sub(r"http://www.w3.org|xmlns", "", report).split("<style>")[0]
-    assert Image.open(BytesIO(files["figure"]("png"))).width > 1000
+    assert Image.open(BytesIO(asyncio.run(files["figure"]("png")))).width > 1000
     with session.state:
-        session.open_scene("[tacton]\nam = 5")
+        moves.open_scene(session, "[tacton]\nam = 5")
     assert "the scene cannot be opened" in session.state.problem
     with session.state:
-        session.on_file({"content": kept.encode()})
+        session.state.opened = {"content": kept.encode()}
     assert session.state.problem == ""
+
+
+def test_a_report_says_how_often_paths_of_their_own_are_drawn():
+    scene = scenes.scene_of(STARTS | OWN | {"duration": 0.1})
+    said = downloads.report_of(scene, [model.kernel(scene)]).decode()
+    assert "3 paths, drawn 90.000 times a second" in said
+
+
+def test_what_is_made_elsewhere_and_fails_is_said():
+    with pytest.raises(RuntimeError, match="has ended without it"):
+        asyncio.run(downloads.elsewhere(downloads.wav_of, None))
 
 
 def test_zooming_in_shows_the_carrier(session):
     assert "envelope" in session.state.commanded_plot["title"]
     with session.state:
-        session.zoom(10.0, 11.0)
+        moves.zoom(session, 10.0, 11.0)
     assert "with its 40 kHz carrier" in session.state.commanded_plot["title"]
     for beyond in ((-500.0, -400.0), (2000.0, 3000.0), (7.0, 7.0)):
         with session.state:
-            session.zoom(*beyond)
+            moves.zoom(session, *beyond)
         low, high = session.state.commanded_plot["x"]["range"]
         assert 0 <= low < high <= 1000
     with session.state:
-        session.zoom()
+        moves.zoom(session)
     assert "envelope" in session.state.commanded_plot["title"]
 
 
@@ -612,25 +767,25 @@ def test_an_address_begins_a_page_and_what_is_wrong_in_it_is_said(request):
 
 def test_undo_after_a_new_beginning_goes_back_to_the_address(session):
     with session.state:
-        session.restart("am=77&size=900")
+        moves.restart(session, "am=77&size=900")
     assert "size: 900 mm is outside" in session.state.problem
     assert not session.state.undoable
     with session.state:
-        session.turn({"speed": 5})
+        moves.turn(session, {"speed": 5})
     with session.state:
-        session.undo()
+        moves.undo(session)
     assert (session.state.am, session.state.speed) == (77, STARTS["speed"])
 
 
 def test_progress_that_comes_after_cancel_is_not_shown(session):
     with session.state:
         session.state.body = "skin-slab"
-    number = session._number
+    number = session.number
     with session.state:
-        session.cancel()
-    for late in (number, session._number):
+        moves.cancel(session)
+    for late in (number, session.number):
         with session.state:
-            session.told("progress", late, ("reduce", 0.5))
+            told(session, "progress", late, ("reduce", 0.5))
     assert not session.state.busy
 
 
@@ -638,7 +793,7 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
     with session.state:
         session.state.hold = True
     with session.state:
-        session.preset("am210-stm10")
+        moves.preset(session, "am210-stm10")
     preset = controls.presets()["am210-stm10"]
     assert {key: session.state[key] for key in preset} == preset
     frequency = session.state.drawing_frequency
@@ -647,7 +802,7 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
     assert session.state.drawing_frequency == pytest.approx(frequency), "held from then"
     values = STARTS | {"size": 33.0, "speed": 4.0}
     with session.state:
-        session.open_scene(dumps(scenes.scene_of(values)))
+        moves.open_scene(session, dumps(scenes.scene_of(values)))
     assert session.values == values
     assert not session.state.errors
 
@@ -655,7 +810,7 @@ def test_a_preset_or_a_scene_keeps_its_size_while_a_frequency_is_held(session):
 def test_a_scene_file_that_is_too_large_is_refused_whole(session):
     text = dumps(scenes.scene_of(STARTS | {"am": 90.0})).encode()
     with session.state:
-        session.on_file({"content": text + b"#" * 2_500_000})
+        session.state.opened = {"content": text + b"#" * 2_500_000}
     assert "2.5 MB exceeds 1 MB" in session.state.problem
     assert session.state.am == STARTS["am"]
 
@@ -755,7 +910,7 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
     assert again.scene.body == Body(depth=0.008)
     assert again.state.problem == ""
     with again.state:
-        again.restart(first.state.query)
+        moves.restart(again, first.state.query)
     assert again.scene.body == Body(depth=0.008)
     lost = session_of(server, "", query)
     assert lost.state.body == "none"

@@ -16,6 +16,7 @@ from skinwave.scene_file import loads
 from skinwave.simulation import simulate
 from skinwave.web import controls, model, scenes
 from skinwave.web.controls import NUMBERS, STARTS
+from skinwave.web.history import TOGETHER
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
 CHROMIUM = "/usr/bin/chromium"
@@ -190,7 +191,7 @@ def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
     photographed(page, "kernel")
 
 
-@pytest.mark.parametrize("key", [key for key in NUMBERS if key != "ramp"])
+@pytest.mark.parametrize("key", [key for key in NUMBERS if key not in ("ramp", "drawn")])
 def test_a_slider_and_a_field_turn_each_number(page, key):
     number, row = NUMBERS[key], page.locator(f".sw-row:has(#{key}-field)")
     way = -1 if number.start == number.high else 1
@@ -237,7 +238,7 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
         query_has(page, f"shape={shape}")
     page.locator("#pulses-field").fill("100/50, 40/110")
     query_has(page, "pulses=100/50")
-    page.wait_for_selector(".sw-timeline")
+    page.wait_for_selector("#rhythm-gap-1")
     page.locator("#ramp-field").fill("10")
     query_has(page, "ramp=10")
     photographed(page, "rhythm")
@@ -249,6 +250,118 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     query_has(page, "speed=8.4")
     assert page.locator("#drawing").inner_text() == held
     page.locator("#hold").uncheck()
+
+
+def drawn_by(page, selector, dx):
+    """Draw what a selector finds by some pixels to the right."""
+    box = page.locator(selector).bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for part in (0.3, 0.7, 1):
+        page.mouse.move(x + part * dx, y)
+        page.wait_for_timeout(80)
+    page.mouse.up()
+
+
+def test_the_rhythm_is_edited_on_its_timeline(page):
+    assert page.locator("#timeline .sw-handle").count() == 0
+    page.locator("#pulse-add").click()
+    query_has(page, "pulses=100/100")
+    page.locator("#pulse-add").click()
+    query_has(page, "pulses=100/100,+100/100")
+    # The axis reaches to 500 ms, so that 56 of 280 pixels are 100 ms.
+    wide = page.locator("#timeline").bounding_box()["width"] / 296
+    drawn_by(page, "#rhythm-on-0", -28 * wide)
+    page.wait_for_function("() => /^(49|50|51).100, 100/.test(window.trame.state.get('pulses'))")
+    drawn_by(page, "#rhythm-gap-1", 28 * wide)
+    page.wait_for_function("() => / 100.(149|150|151)$/.test(window.trame.state.get('pulses'))")
+    assert state(page, "rhythm_span") == 0
+    page.locator("#pulses-field").fill("50/100, 100/150")
+    handle = page.locator("#rhythm-on-1")
+    before = handle.bounding_box()["x"]
+    for key in ("ArrowRight", "Shift+ArrowRight", "ArrowLeft"):
+        handle.press(key)
+    query_has(page, "pulses=50/100,+110/150")
+    assert page.locator("#pulses-field").input_value() == "50/100, 110/150"
+    assert handle.bounding_box()["x"] > before
+    assert handle.get_attribute("role") == "slider"
+    assert handle.get_attribute("aria-label") == "Length of pulse 2, ms"
+    assert handle.get_attribute("aria-valuenow") == "110"
+    assert handle.get_attribute("aria-valuetext") == "110 ms"
+    page.locator("#rhythm-gap-0").press("Home")
+    query_has(page, "pulses=50/0,+110/150")
+    page.locator("#rhythm-on-0").press("PageDown")
+    query_has(page, "pulses=40/0,+110/150")
+    assert page.locator("#timeline text", has_text="time, ms").count() == 1
+    photographed(page, "timeline")
+    page.locator("#ramp-field").fill("20")
+    query_has(page, "ramp=20")
+    corners = page.locator(".sw-block").first.get_attribute("points").split()
+    assert corners[1].split(",")[0] == corners[2].split(",")[0], "ramps meet in the middle"
+    page.locator("#rhythm-on-0").press("ArrowLeft")
+    page.wait_for_selector("#problem")
+    assert "half the shortest pulse" in page.locator("#problem").inner_text()
+    assert state(page, "stale")
+    page.locator("#undo").click()
+    state_becomes(page, "stale", False)
+    page.locator("#rhythm-on-0").press("Delete")
+    query_has(page, "pulses=110/150")
+    page.wait_for_timeout(1000 * TOGETHER + 100)
+    page.locator("#pulse-remove").click()
+    state_becomes(page, "pulses", "")
+    assert page.locator("#pulse-remove").is_disabled()
+    page.locator("#undo").click()
+    state_becomes(page, "pulses", "110/150")
+
+
+def test_foci_follow_paths_of_their_own(page, tmp_path):
+    page.locator("#foci-field").fill("2")
+    query_has(page, "foci=2")
+    page.locator("#follow-own").click()
+    query_has(page, "paths=circle/20/-20/0,+circle/20/20/0")
+    assert page.locator("#size-field").count() == 0
+    page.locator(".sw-row:has(#drawn-field) [role=slider]").press("ArrowRight")
+    query_has(page, "drawn=101")
+    page.locator("#drawn-field").fill("90")
+    query_has(page, "drawn=90")
+    page.locator("#own-0-1").select_option("square")
+    for column, value in ((1, "15"), (2, "22.5"), (3, "-10")):
+        page.locator(f"#own-{column}-1").fill(value)
+        page.locator(f"#own-{column}-1").press("Tab")
+    query_has(page, "square/15/22.5/-10")
+    page.wait_for_function("() => window.trame.state.get('own_speeds') === '5.65, 5.4 m/s'")
+    assert "90.00 times a second" in page.locator("#own-speeds").inner_text()
+    assert page.locator("#kernel-map path[stroke='#56B4E9']").get_attribute("d").count("M") == 2
+    row = page.locator("#lines tr", has_text="fd+fAM").first.locator("td")
+    assert row.nth(1).inner_text() == "230.0"
+    page.locator("#own-1-0").fill("70")
+    page.locator("#own-1-0").press("Tab")
+    page.wait_for_selector("#paths-error")
+    assert "path 1: 70 mm is outside" in page.locator("#paths-error").inner_text()
+    page.locator("#own-1-0").fill("12")
+    page.locator("#own-1-0").press("Tab")
+    page.wait_for_selector("#paths-error", state="detached")
+    page.locator("#pulses-field").fill("100/50")
+    query_has(page, "pulses=100/50")
+    choose(page, "body", "skin-slab")
+    page.wait_for_function("() => window.trame.state.get('wave_map').picture")
+    photographed(page, "own-paths")
+    kept = state(page, "query")
+    page.locator("#save").click()
+    with page.expect_download() as saved:
+        page.locator("#save-scene-toml").click()
+    saved.value.save_as(tmp_path / "own.toml")
+    page.locator("#follow-one").click()
+    page.wait_for_function("() => !window.trame.state.get('paths')")
+    page.locator("#undo").click()
+    state_becomes(page, "query", kept)
+    page.locator("#redo").click()
+    page.wait_for_function("() => !window.trame.state.get('paths')")
+    page.locator("input[type=file]").set_input_files(tmp_path / "own.toml")
+    state_becomes(page, "query", kept)
+    page.locator("#foci-field").fill("3")
+    page.wait_for_selector("#own-0-2")
 
 
 def test_presets_undo_redo_pin_and_looks(page):
@@ -403,9 +516,13 @@ def test_themes_about_and_a_tablet(page):
     assert wide <= 820
 
 
-def test_what_can_be_turned_has_a_name_for_a_screen_reader(page):
+@pytest.mark.parametrize("query", ["", "pulses=10/20&foci=2&paths=point/0/9/9,+line/9/0/0"])
+def test_what_can_be_turned_has_a_name_for_a_screen_reader(page, query):
+    page.evaluate("q => window.trame.trigger('restart', [q])", query)
+    page.wait_for_timeout(300)
     nameless = page.evaluate(
-        """() => [...document.querySelectorAll('button, [role=slider], input:not([type=hidden])')]
+        """() => [...document.querySelectorAll(
+          'button, select, [role=slider], input:not([type=hidden])')]
         .filter(e => e.offsetParent && !(e.getAttribute('aria-label') || e.title || e.innerText
           || (e.labels && e.labels.length) || e.getAttribute('aria-labelledby')))
         .map(e => e.outerHTML.slice(0, 200))"""

@@ -81,7 +81,7 @@ def tones(pressure: MovingPressure) -> tuple[float, ...]:
         tacton.am_frequency * (w1 > 0),
         tacton.second_am_frequency * (w2 > 0),
         tacton.envelope_frequency,
-        tacton.trajectory.drawing_frequency,
+        tacton.drawing_frequency,
     }
     return tuple(sorted(f for f in found if f > 0))
 

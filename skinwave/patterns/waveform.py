@@ -45,7 +45,7 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     if duration > LONGEST:
         raise ValueError(f"the WAV lasts {duration:g} s, longer than {LONGEST:g} s; cut it")
     kept = base.tacton
-    if kept.trajectory.shape == "recorded":
+    if kept.trajectory.levels:
         raise ValueError("a recorded path has levels of its own; give a scene with another path")
     tacton = replace(kept, duration=duration, signal=signal)
     if options.role == "modulation":  # in place of the sinusoids

@@ -91,7 +91,9 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
         scene.tacton, scene.tacton.trajectory, scene.pressure, scene.body,
     )  # fmt: skip
     moved = f"{path.shape} of {1e3 * path.size:g} mm at {path.speed:g} m/s"
-    f_d = path.drawing_frequency
+    if path.shape == "recorded":
+        moved = f"{tacton.n_paths} paths" if tacton.n_paths > 1 else "a recorded path"
+    f_d = tacton.drawing_frequency
     return [
         ["focus", f"{moved}, drawn {f_d:.3f} times a second" if f_d else "at rest"],
         ["amplitude modulation", f"{tacton.am_frequency:g} Hz" if tacton.am_frequency else "none"],

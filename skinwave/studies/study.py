@@ -235,7 +235,8 @@ def caption(name: str, group: list[Run]) -> str:
     path = tacton.trajectory
     parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency else []
     if path.shape == "recorded":
-        parts.append(f"a path recorded for {path.times[-1]:g} s")
+        what = f"{tacton.n_paths} paths" if tacton.n_paths > 1 else "a path"
+        parts.append(f"{what} recorded for {1 / tacton.drawing_frequency:.4g} s")
     elif path.drawing_frequency:
         size = path.size or path.length
         parts.append(

@@ -57,7 +57,7 @@ def commanded(case: Case) -> dict[str, Any]:
         body = case.scene.body
         row |= {
             "name": case.scene.name,
-            "drawing_frequency_hz": case.scene.tacton.trajectory.drawing_frequency,
+            "drawing_frequency_hz": case.scene.tacton.drawing_frequency,
             "probe_x_mm": [1e3 * x for x, _ in case.scene.probes],
             "probe_y_mm": [1e3 * y for _, y in case.scene.probes],
         }

@@ -16,6 +16,7 @@ from simple_model.tacton import SHARINGS, SUPERPOSITIONS
 from simple_model.trajectory import SHAPES
 from skinwave.scene import BODIES
 from skinwave.studies.paper15 import tactons
+from skinwave.web.paths import fitted, paths_of
 
 Values = dict[str, Any]
 
@@ -45,6 +46,7 @@ NUMBERS = {
     ),
     "size": Number(label="Size", unit="mm", low=0, high=60, step=0.5, start=20),
     "speed": Number(label="Drawing speed", unit="m/s", low=0, high=40, step=0.1, start=12),
+    "drawn": Number(label="Drawing frequency", unit="Hz", low=1, high=500, step=1, start=100),
     "height": Number(label="Height of the focus", unit="mm", low=20, high=600, step=5, start=200),
     "foci": Number(label="Focal points", unit="", low=1, high=8, step=1, start=1),
     "ramp": Number(label="Ramp", unit="ms", low=0, high=100, step=1, start=0),
@@ -69,6 +71,7 @@ STARTS = {
     "sharing": "simultaneous",
     "pulses": "",
     "phases": "",
+    "paths": "",
 }
 KEYS = tuple(STARTS)
 MOST_PULSES = 64
@@ -143,7 +146,19 @@ def phases_of(text: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-TEXTS = {"pulses": pulses_of, "phases": phases_of}
+def with_its_paths(values: Values, moved: str) -> Values:
+    """Values with as many paths as foci, if foci have paths of their own; `moved` is "foci" or
+    "paths", whichever is right.
+    """
+    text = values["paths"]
+    if not text:
+        return values
+    if moved == "paths":
+        return values | {"foci": len(paths_of(text))}
+    return values | {"paths": fitted(text, values["foci"])}
+
+
+TEXTS = {"pulses": pulses_of, "phases": phases_of, "paths": paths_of}
 
 
 def to_query(values: Mapping[str, Any]) -> str:
@@ -202,6 +217,7 @@ def presets() -> dict[str, Values]:
             "foci": 1,
             "pulses": "",
             "phases": "",
+            "paths": "",
             "ramp": 0.0,
         }
         for name, tacton in tactons()

@@ -1,9 +1,11 @@
 """What a page gives to keep: the scene, waveforms as tables and sound, a figure, the report."""
 
 import asyncio
+import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO, StringIO
+from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,7 +15,8 @@ from skinwave.exports import sampled, write_table
 from skinwave.pictures.figures import colour
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
-from skinwave.web.model import REACH, Answer, influenced
+from skinwave.web.model import REACH, Answer, drawn_paths, influenced
+from skinwave.web.worker import end_with_parent
 
 
 def offered(session: Any) -> dict[str, Callable[..., Any]]:
@@ -22,19 +25,51 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
     Waves are those of a body if it has answered; a file of several answers has the kernel's, too.
     """
 
-    def current() -> list[Answer]:
-        return [a for a in (session.kernel, session.current_waves) if a]
-
     async def report() -> bytes:
-        return await asyncio.to_thread(report_of, session.scene, current())
+        return await elsewhere(report_of, session.scene, session.answers)
+
+    async def figure(kind: str) -> bytes:
+        return await elsewhere(figure_of, session.scene, session.answers, kind)
 
     return {
         "scene_toml": lambda: dumps(session.scene).encode(),
-        "waveform_csv": lambda: csv_of(current()),
-        "waveform_wav": lambda: wav_of(current()[-1]),
-        "figure": lambda kind: figure_of(session.scene, current(), kind),
+        "waveform_csv": lambda: csv_of(session.answers),
+        "waveform_wav": lambda: wav_of(session.answers[-1]),
+        "figure": figure,
         "report": report,
     }
+
+
+async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:
+    """What a function makes, in a process of its own: the page stays live, and all that drawing
+    takes of memory is gone with it.
+
+    Raises
+    ------
+    RuntimeError
+        If the process ends without it.
+    """
+    return await asyncio.to_thread(_elsewhere, make, given)
+
+
+def _elsewhere(make: Callable[..., bytes], given: tuple[Any, ...]) -> bytes:
+    context = multiprocessing.get_context("spawn")
+    mine, other = context.Pipe(duplex=False)
+    process = context.Process(target=_make, args=(other, make, given), daemon=True)
+    process.start()
+    other.close()
+    try:
+        return bytes(mine.recv())
+    except EOFError:
+        raise RuntimeError(f"the process of {make.__name__} has ended without it") from None
+    finally:
+        process.join()
+        mine.close()
+
+
+def _make(pipe: Connection, make: Callable[..., bytes], given: tuple[Any, ...]) -> None:
+    end_with_parent()
+    pipe.send(make(*given))
 
 
 def csv_of(answers: Sequence[Answer]) -> bytes:
@@ -102,9 +137,9 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
             per * answer.map.rms, extent=(-edge, edge, -edge, edge), origin="lower", cmap="cividis"
         )
         figure.colorbar(image, ax=row[0], label=f"RMS, {unit}")
-        path = scene.tacton.trajectory
-        row[0].plot(*(1e3 * path.outline.T), color="#56B4E9")
-        for line in influenced(path, scene.pressure.height):
+        for line in drawn_paths(scene.tacton):
+            row[0].plot(*(1e3 * line.T), color="#56B4E9")
+        for line in influenced(scene.tacton, scene.pressure.height):
             row[0].plot(*(1e3 * line.T), color="white", ls="dotted")
         for line in answer.map.felt:
             row[0].plot(*(1e3 * line.T), color="#ff2fd0", lw=1)

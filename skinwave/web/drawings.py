@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats
 from simple_model import Tacton
-from simple_model.tacton import level
+from simple_model.joined import parted
 from skinwave.web.model import Answer, Map
 
 
@@ -35,15 +35,12 @@ def drawn(lines: Sequence[Floats]) -> str:
     )
 
 
-def timeline(tacton: Tacton) -> str:
-    """The level of a rhythm over a Tacton as points of a line, 100 wide and 26 high."""
-    if tacton.rhythm is None:
-        return ""
-    t = np.linspace(0, tacton.duration, 800)
-    high = np.broadcast_to(level(tacton, t), t.shape)
-    return " ".join(
-        f"{100 * x / tacton.duration:.2f},{24 - 22 * y:.2f}" for x, y in zip(t, high, strict=True)
-    )
+def speeds(tacton: Tacton) -> str:
+    """How fast the focus runs on each of several paths."""
+    lengths = [np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+               for line in parted(tacton.trajectory, tacton.n_paths)]  # fmt: skip
+    each = [f"{length * tacton.drawing_frequency:.3g}" for length in lengths]
+    return f"{', '.join(each)} m/s"
 
 
 def shown_value(value: float, unit: str) -> str:

@@ -21,6 +21,9 @@ HOSTS = ("127.0.0.1", "localhost", "[::1]")
 PATIENCE = 60.0  # s that a session may take to start
 LATER = 5.0  # s after which the next process is made ready: the page that opens comes first
 LARGEST = 2**26  # bytes of a message
+# For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
+# limit to what was freed once, and a process that answers for hours fills with gaps.
+RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
 
 
 class Front:
@@ -121,7 +124,8 @@ async def _started() -> tuple[Any, int, str]:
     """A process that waits for a page, its port and what it takes as a password."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "skinwave.web.serve", stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE, env=os.environ | {"WSLINK_READY_MSG": ""},
+        stdout=asyncio.subprocess.PIPE,
+        env={**RETURNED, **os.environ, "WSLINK_READY_MSG": ""},
     )  # fmt: skip
     try:
         assert process.stdout is not None

@@ -1,5 +1,6 @@
 """The page: control panel on the left, visualization panel beside it (trame, Vuetify)."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import client, html
 from trame.widgets import vuetify3 as v3
 
-from skinwave.web import controls, panels
+from skinwave.web import controls, moves, panels
 from skinwave.web.plots import SPANS
 from skinwave.web.session import Session
 from skinwave.web.shown import HIGHEST
@@ -15,7 +16,7 @@ from skinwave.web.shown import HIGHEST
 STATIC = Path(__file__).with_name("static")
 MODULE = {
     "serve": {"__skinwave": str(STATIC)},
-    "scripts": [f"__skinwave/{name}.js" for name in ("plots", "body", "skinwave")],
+    "scripts": [f"__skinwave/{name}.js" for name in ("plots", "body", "rhythm", "skinwave")],
     "styles": ["__skinwave/skinwave.css"],
 }
 LOST = """
@@ -72,14 +73,19 @@ def _bar(session: Session) -> None:
             with v3.VList(density="compact", max_height=420):
                 for name in controls.presets():
                     v3.VListItem(title=name, id=f"preset-{name}",
-                                 click=(session.preset, f"['{name}']"))  # fmt: skip
+                                 click=(partial(moves.preset, session), f"['{name}']"))  # fmt: skip
         v3.VSpacer()
         _looks()
-        _button("mdi-undo", "Undo", session.undo, id="undo", disabled=("!undoable",))
-        _button("mdi-redo", "Redo", session.redo, id="redo", disabled=("!redoable",))
-        v3.VBtn("{{ pinned ? 'Unpin' : 'Pin' }}", prepend_icon="mdi-pin", click=session.pin,
+        _button(
+            "mdi-undo", "Undo", partial(moves.undo, session), id="undo", disabled=("!undoable",)
+        )
+        _button(
+            "mdi-redo", "Redo", partial(moves.redo, session), id="redo", disabled=("!redoable",)
+        )
+        v3.VBtn("{{ pinned ? 'Unpin' : 'Pin' }}", prepend_icon="mdi-pin",
+                click=partial(moves.pin, session),
                 id="pin", title="Keep what is shown as dotted curves, to compare with")  # fmt: skip
-        v3.VBtn("A/B", click=session.take_pinned, disabled=("!pinned",), id="swap",
+        v3.VBtn("A/B", click=partial(moves.exchange, session), disabled=("!pinned",), id="swap",
                 title="Exchange what is shown and what is pinned")  # fmt: skip
         _save_menu()
         _button("mdi-theme-light-dark", "Light or dark", "dark = !dark", id="theme")

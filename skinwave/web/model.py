@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from meshes.tetmesh import Floats
 from simple_model import (
@@ -13,6 +14,7 @@ from simple_model import (
     Tacton,
     Trajectory,
     commanded,
+    evenly,
     lines,
     modulation,
     sensation_level,
@@ -20,14 +22,15 @@ from simple_model import (
     tacton_lines,
 )
 from simple_model.focus import lobe_width, moved_spot
+from simple_model.joined import parted
 from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import CARRIER, level
 from simple_model.threshold import PRESSURE
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
 from skinwave.web.moving import Moving
+from skinwave.web.paths import REACH
 
-REACH = 50e-3  # m: half the side of the area that is shown
 SIDE = 41  # places along a side of a map
 FELT_SIDE = 81  # of the borderline of what is felt of a pressure
 FINE_SIDE = 101  # of the borderline's grid
@@ -139,25 +142,53 @@ def kernel_map(pressure: MovingPressure) -> Map:
     tacton = replace(pressure.tacton, rhythm=None)
     path, duration = tacton.trajectory, tacton.duration
     found = load_lines(replace(pressure, tacton=tacton), 1e-3)
-    places_only = path if path.is_static else replace(path, speed=1.0)
-    f, amplitudes = found.gather(harmonics_of(places_only, pressure.height, pressure.focus))
+    # Of paths of their own only every n-th harmonic is left, of which `harmonics_of` knows.
+    n, at_all = tacton.n_paths, at_any_speed(path)
+    found = replace(found, harmonics=found.harmonics // n)
+    f, amplitudes = found.gather(harmonics_of(at_all, n, pressure.height, pressure.focus))
     rms = np.sqrt((np.abs(amplitudes[f > 1e-6]) ** 2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     gain = np.abs(pressure.gain(np.linspace(0, duration, round(duration * GAIN_RATE) + 2))).max()
-    swept = nearest_foci(places_only, tacton.foci, pressure.height, pressure.focus)
+    swept = nearest_foci(at_all, n, tacton.foci, pressure.height, pressure.focus)
     return Map(rms=rms, felt=borderline(np.sqrt(gain * swept), PRESSURE**0.5))
 
 
-@lru_cache(maxsize=4)  # some MB each
-def harmonics_of(path: Trajectory, height: float, focus: str) -> NDArray[np.complex128]:
-    """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places."""
-    pressure = MovingPressure(tacton=Tacton(trajectory=path), height=height, focus=focus)
-    return along_path(pressure.spot(places(), path_knots(pressure)).T).T
+def at_any_speed(path: Trajectory) -> Trajectory:
+    """The same places whatever the speed, a key of what depends on them alone."""
+    if path.shape == "recorded":
+        times = tuple(np.round(np.array(path.times) / path.times[-1], 12).tolist())
+        return replace(path, times=times)
+    return path if path.is_static else replace(path, speed=1.0)
+
+
+def drawn_paths(tacton: Tacton) -> tuple[Floats, ...]:
+    """The paths as lines (k, 2) in metre; none of foci that rest."""
+    path = tacton.trajectory
+    if path.is_static:
+        return ()
+    lines = parted(path, tacton.n_paths) if path.shape == "recorded" else (path.outline,)
+    return tuple(line for line in lines if np.ptp(line, axis=0).any())
+
+
+@lru_cache(maxsize=2)  # up to 13 MB each
+def harmonics_of(
+    path: Trajectory, n_paths: int, height: float, focus: str
+) -> NDArray[np.complex128]:
+    """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places; of several
+    paths that are joined every n_paths-th, which is the mean of all.
+    """
+    tacton = Tacton(trajectory=path, foci=evenly(n_paths))
+    pressure = MovingPressure(tacton=tacton, height=height, focus=focus)
+    spots = pressure.spot(places(), path_knots(pressure))
+    mean = spots.reshape(n_paths, -1, SIDE**2).mean(axis=0)
+    return along_path(mean.T).T
 
 
 @lru_cache(maxsize=32)
-def nearest_foci(path: Trajectory, foci: tuple[float, ...], height: float, focus: str) -> Floats:
+def nearest_foci(
+    path: Trajectory, n_paths: int, foci: tuple[float, ...], height: float, focus: str
+) -> Floats:
     """The largest relative pressure (y, x) of all foci together, wherever on their path."""
-    phases = np.zeros(1) if path.is_static else np.arange(PHASES) / PHASES
+    phases = np.zeros(1) if path.is_static else np.arange(PHASES) / PHASES / n_paths
     at = places(FELT_SIDE)
     spots = sum(moved_spot(at, path.at_phase((phases + a) % 1), height, focus) for a in foci)
     return np.asarray(spots).max(axis=0).reshape(FELT_SIDE, FELT_SIDE)
@@ -172,14 +203,16 @@ def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
     return tuple(np.asarray(x) for x in contour_generator(line, line, masked).lines(at))
 
 
+def influenced(tacton: Tacton, height: float) -> tuple[Floats, ...]:
+    """The borderline of the influenced area: as far from a path as the main lobe reaches."""
+    return _influenced(at_any_speed(tacton.trajectory), tacton.n_paths, height)
+
+
 @lru_cache(maxsize=32)
-def influenced(path: Trajectory, height: float) -> tuple[Floats, ...]:
-    """The borderline of the influenced area: as far from the path as the main lobe reaches."""
-    outline = path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, 181))
-    away = np.full(FINE_SIDE**2, np.inf)
-    for point in outline:
-        np.minimum(away, ((places(FINE_SIDE) - point) ** 2).sum(axis=1), out=away)
-    return borderline(np.sqrt(away).reshape(FINE_SIDE, FINE_SIDE), lobe_width(height))
+def _influenced(path: Trajectory, n_paths: int, height: float) -> tuple[Floats, ...]:
+    outline = path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, 180 * n_paths + 1))
+    away = cKDTree(outline).query(places(FINE_SIDE))[0]
+    return borderline(away.reshape(FINE_SIDE, FINE_SIDE), lobe_width(height))
 
 
 def commanded_curve(tacton: Tacton, start: float, end: float) -> tuple[Floats, Floats, bool]:

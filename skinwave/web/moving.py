@@ -17,6 +17,7 @@ EACH = 8  # frames of the fastest vibration that is seen
 SEEN = 0.02  # of the largest line: weaker ones need no frames of their own
 DRAWN = 0.06  # of the width: how far the largest motion is drawn
 FOCUS_ROOM = 5.0  # mm about a focus in which the surface is looked for
+DRAWN_POINTS = 121  # of each path
 LIFTED = 0.5  # mm, by which marks are above the surface
 
 
@@ -102,8 +103,8 @@ def sent_shape(moving: Moving) -> dict[str, bytes]:
 
 
 def sent_motion(moving: Moving, pressure: MovingPressure) -> dict[str, Any]:
-    """Motion as a page takes it: int8 of the largest, which is `drawn` mm; times in ms; the path
-    (m, 3) and the foci (t, foci, 3) as float32 in mm on the surface at rest.
+    """Motion as a page takes it: int8 of the largest, which is `drawn` mm; times in ms; the sides
+    of paths (m, 2, 3) and the foci (t, foci, 3) as float32 in mm on the surface at rest.
     """
     points, path = moving.shape.points, pressure.tacton.trajectory
     largest = float(np.abs(moving.frames).max()) or 1.0
@@ -111,11 +112,15 @@ def sent_motion(moving: Moving, pressure: MovingPressure) -> dict[str, Any]:
     t = np.arange(len(moving.frames)) * moving.period / len(moving.frames)
     f_d = path.drawing_frequency
     at = [path.at_phase((f_d * t + phase) % 1) for phase in pressure.tacton.foci]
-    line = path.at_phase(np.linspace(0, 1, 121)) if f_d else np.zeros((0, 2))
+    n = pressure.tacton.n_paths
+    # From one path's end to the next one's beginning there is no line.
+    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, DRAWN_POINTS)) / n
+    line = path.at_phase(along) if f_d else np.zeros((n, 0, 2))
+    sides = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2)
     return {
         "frames": np.rint(127 / largest * moving.frames).astype(np.int8).tobytes(),
         "count": len(t), "period": 1e3 * moving.period, "drawn": drawn,
-        "path": _on(points, line).tobytes(),
+        "path": _on(points, sides).tobytes(),
         "foci": _on(points, np.stack(at, axis=1).reshape(-1, 2)).tobytes(),
         "largest": f"{1e6 * largest:.3g} µm", "times": f"{drawn / (1e3 * largest):,.0f}",
         "repeats": moving.repeats,

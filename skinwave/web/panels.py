@@ -1,22 +1,18 @@
 """Parts of the page: controls, an area with its map, notices, what the model leaves out."""
 
-from collections.abc import Sequence
-from typing import Any
+from functools import partial
 
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 from trame_client.widgets.core import HtmlElement
 
-from skinwave.web.controls import CHOICES, NUMBERS
-from skinwave.web.session import Session, setter
+from skinwave.web.controls import CHOICES
+from skinwave.web.fields import choice, heading, number
+from skinwave.web.moves import cancel
+from skinwave.web.session import Session
+from skinwave.web.space import in_space
+from skinwave.web.timeline import rhythm
 
-SHAPES = {
-    "point": "M12 12h.01",
-    "line": "M3 12h18",
-    "circle": "M12 4a8 8 0 1 0 .01 0z",
-    "triangle": "M12 4L3 20H21z",
-    "square": "M4 4h16v16H4z",
-}
 DRIVES = {
     "linear": "linear: the signal itself, as published",
     "pressure_squared": "pressure squared: usual AM",
@@ -36,6 +32,8 @@ LEFT_OUT = (
     "With a body the focus is a Gaussian of the same width as the main lobe that the point kernel "
     "alone has. Side lobes, and what several simultaneous foci do to each other, are left out: "
     "simultaneous and time-multiplexed foci push alike here, devices differ.",
+    "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
+    "polygon, nowhere further from it than 0.01 mm.",
     "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
     "above the threshold for a focal spot; point kernel: 4.4 Pa, just felt with AM at 200 Hz. "
     "Maps of a rhythm are those of its pulses while they are on.",
@@ -47,88 +45,25 @@ LEFT_OUT = (
 def control_panel(session: Session) -> None:
     """All that can be turned."""
     with html.Div(classes="sw-controls", id="controls"):
-        _heading("In time")
+        heading("In time")
         for key in ("amplitude", "am"):
             number(session, key)
         choice("ratio", "Superposition ratio, first to second AM")
         for key in ("am2", "envelope", "duration"):
             number(session, key)
-        _rhythm(session)
-        _heading("In space")
-        _shapes()
-        for key in ("size", "speed"):
-            number(session, key)
-        html.Div("drawing frequency: <b id='drawing'>{{ drawing_frequency.toFixed(2) }} Hz</b>",
-                 classes="sw-note")  # fmt: skip
-        v3.VCheckbox(v_model=("hold", False), density="compact", hide_details=True, id="hold",
-                     label="hold it while size or speed moves")  # fmt: skip
-        _error("hold")
-        number(session, "foci")
-        choice("sharing", "Several foci are made", [
-            {"title": "all at once, at 1/n of the pressure each", "value": "simultaneous"},
-            {"title": "in turn, each for 1/n of the time", "value": "time_multiplexed"},
-        ])  # fmt: skip
-        with html.Div(v_if="foci > 1"):
-            text(session, "phases", "Phases in % of the path, such as 0, 25, 60; empty is even")
-            html.Div(
-                "All {{ foci }} foci follow one path. As this model knows no device, the load is "
-                "the same whether they are made at once or in turn.", classes="sw-note",
-            )  # fmt: skip
-        _heading("On the skin")
+        rhythm(session)
+        heading("In space")
+        in_space(session)
+        heading("On the skin")
         number(session, "height")
         choice("drive", "Drive law", [{"title": DRIVES[d], "value": d} for d in CHOICES["drive"]])
         v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
                    hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
         for key in ("x", "y"):
             number(session, key)
-        _heading("Scene file")
+        heading("Scene file")
         v3.VFileInput(v_model=("opened", None), label="Open a scene (TOML)", accept=".toml",
                       density="compact", hide_details=True, id="open")  # fmt: skip
-
-
-def number(session: Session, key: str) -> None:
-    """A slider and a field for a number."""
-    given = NUMBERS[key]
-    said = f"{given.label}, {given.unit}" if given.unit else given.label
-    # Of a move only its own row is made anew: all of them take longer than the plots.
-    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
-        html.Label(said, raw_attrs=[f'for="{key}-field"'])
-        v3.VSlider(
-            v_model_number=(key,), min=given.low, max=given.high, step=given.step, id=f"{key}",
-            hide_details=True, density="compact", thumb_size=16,
-            raw_attrs=[f'aria-label="{said}"'],
-        )  # fmt: skip
-        v3.VTextField(
-            model_value=(f"typed.{key} ?? {key}",),
-            update_modelValue=(setter(session, key), "[$event]"),
-            error=(f"!!errors.{key}",), density="compact", hide_details=True, id=f"{key}-field",
-            variant="outlined",
-            raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
-        )  # fmt: skip
-        _error(key)
-
-
-def text(session: Session, key: str, said: str) -> None:
-    """A field for several numbers."""
-    with html.Div(classes="sw-row", raw_attrs=[f'v-memo="[{key}, errors.{key}, typed.{key}]"']):
-        html.Label(said, raw_attrs=[f'for="{key}-field"'])
-        v3.VTextField(
-            model_value=(f"typed.{key} ?? {key}",),
-            update_modelValue=(setter(session, key), "[$event]"),
-            error=(f"!!errors.{key}",), density="compact", hide_details=True, variant="outlined",
-            id=f"{key}-field", style="grid-column: 1 / 3",
-            raw_attrs=[f':aria-invalid="!!errors.{key}"', f'aria-describedby="{key}-error"'],
-        )  # fmt: skip
-        _error(key)
-
-
-def choice(key: str, said: str, items: Sequence[Any] = ()) -> None:
-    """A dropdown."""
-    v3.VSelect(
-        v_model=(key,), items=(f"{key}_items", list(items or CHOICES[key])), label=said,
-        density="compact", hide_details=True, id=key, style="margin-top: 8px",
-        raw_attrs=[f'v-memo="[{key}]"'],
-    )  # fmt: skip
 
 
 def area(name: str, marked: str, said: str, shown: str = "true") -> None:
@@ -209,7 +144,7 @@ def notices(session: Session) -> None:
     with v3.VAlert(v_if="busy", type="info", density="compact", id="busy"):
         html.Div("{{ body }}: {{ busy }}")
         v3.VProgressLinear(model_value=("done",), indeterminate=("!done",), height=6)
-        v3.VBtn("Cancel", click=session.cancel, size="small", variant="text", id="cancel")
+        v3.VBtn("Cancel", click=partial(cancel, session), size="small", variant="text", id="cancel")
 
 
 def about() -> None:
@@ -223,38 +158,3 @@ def about() -> None:
         html.H2("About this model", style="font-size: 1.1rem")
         for sentence in LEFT_OUT:
             html.P(sentence, style="margin-top: 10px; font-size: 0.86rem")
-
-
-def _rhythm(session: Session) -> None:
-    text(session, "pulses", "Rhythm: on/off in ms, such as 100/50, 40/110; empty is none")
-    HtmlElement(
-        "svg", v_if="pulses", classes="sw-timeline", children=[
-            '<polyline :points="timeline" fill="none" stroke="currentColor" stroke-width="1.5" '
-            'vector-effect="non-scaling-stroke"/>'
-        ],
-        raw_attrs=['viewBox="0 0 100 26"', 'preserveAspectRatio="none"', 'role="img"',
-                   'aria-label="Level over the Tacton"'],
-    )  # fmt: skip
-    with html.Div(v_if="pulses"):
-        number(session, "ramp")
-
-
-def _shapes() -> None:
-    with v3.VBtnToggle(v_model=("shape",), mandatory=True, density="compact", classes="sw-shapes",
-                       raw_attrs=['aria-label="Shape of the path"'], divided=True,
-                       variant="outlined", id="shape"):  # fmt: skip
-        for name, path in SHAPES.items():
-            v3.VBtn(
-                f'<svg viewBox="0 0 24 24" aria-hidden="true"><path d="{path}" '
-                'stroke-linecap="round"/></svg>',
-                value=name, title=name, id=f"shape-{name}", raw_attrs=[f'aria-label="{name}"'],
-            )  # fmt: skip
-
-
-def _heading(said: str) -> None:
-    html.H2(said, classes="sw-heading")
-
-
-def _error(key: str) -> None:
-    html.Div("{{ errors.%s }}" % key, v_if=f"errors.{key}", classes="sw-error",  # noqa: UP031
-             id=f"{key}-error", raw_attrs=['role="alert"'])  # fmt: skip

@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import MovingPressure, Rhythm, Tacton, Trajectory
+from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, evenly, joined
+from simple_model.trajectory import SHAPES
 from skinwave.scene import BODIES, Body, Scene
 from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, checked, phases_of, pulses_of
+from skinwave.web.paths import paths_in, paths_of, text_of
 
 
 def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
@@ -18,12 +20,8 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     ValueError
         If values are out of range together, such as a path beyond the body.
     """
-    shape = values["shape"]
-    moving = {} if shape == "point" else {"size": values["size"] / 1e3, "speed": values["speed"]}
     pulses = pulses_of(values["pulses"])
-    foci, phases = int(values["foci"]), phases_of(values["phases"])
-    if phases and len(phases) != foci:
-        raise ValueError(f"{len(phases)} phases of {foci} foci; give one for each, or none")
+    trajectory, foci = _own_paths(values) if values["paths"] else _one_path(values)
     tacton = Tacton(
         amplitude=values["amplitude"] / 100,
         am_frequency=values["am"],
@@ -31,8 +29,8 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
         superposition=RATIOS[values["ratio"]],
         envelope_frequency=values["envelope"],
         duration=values["duration"],
-        trajectory=Trajectory(shape=shape, **moving),
-        foci=phases or tuple(k / foci for k in range(foci)),
+        trajectory=trajectory,
+        foci=foci,
         sharing=values["sharing"],
         rhythm=Rhythm(pulses=pulses, ramp=values["ramp"] / 1e3) if pulses else None,
     )
@@ -47,6 +45,24 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
         name="skinwave web", pressure=pressure, body=body,
         probes=((values["x"] / 1e3, values["y"] / 1e3),),
     )  # fmt: skip
+
+
+def _one_path(values: Mapping[str, Any]) -> tuple[Trajectory, tuple[float, ...]]:
+    """The path that all foci follow, and their phases."""
+    shape = values["shape"]
+    moving = {} if shape == "point" else {"size": values["size"] / 1e3, "speed": values["speed"]}
+    n, phases = int(values["foci"]), phases_of(values["phases"])
+    if phases and len(phases) != n:
+        raise ValueError(f"{len(phases)} phases of {n} foci; give one for each, or none")
+    return Trajectory(shape=shape, **moving), phases or evenly(n)
+
+
+def _own_paths(values: Mapping[str, Any]) -> tuple[Trajectory, tuple[float, ...]]:
+    """The paths of all foci, one after the other, and their phases."""
+    paths = paths_of(values["paths"])
+    if len(paths) != values["foci"]:
+        raise ValueError(f"{len(paths)} paths of {values['foci']} foci; give one for each")
+    return joined(paths, values["drawn"]), evenly(len(paths))
 
 
 def _profile(body: Body) -> str:
@@ -66,10 +82,9 @@ def values_of(scene: Scene) -> Values:
     tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
     known = {body: name for name, body in BODIES.items()}
     ratio = {weights: name for name, weights in RATIOS.items()}.get(tacton.superposition)
-    even = tuple(k / len(tacton.foci) for k in range(len(tacton.foci)))
+    even, own = evenly(len(tacton.foci)), paths_in(tacton)
     beyond = {
-        "a path of its own points": path.shape not in ("point", "line", "circle", "triangle",
-                                                       "square"),
+        "a path of its own points": path.shape not in SHAPES and not own,
         "a path that is moved or swept one way": any(path.centre)
         or path.sweep != "there_and_back",
         "a sampled signal": tacton.signal is not None,
@@ -91,9 +106,11 @@ def values_of(scene: Scene) -> Values:
         "ratio": ratio,
         "envelope": tacton.envelope_frequency,
         "duration": tacton.duration,
-        "shape": path.shape,
-        "size": 1e3 * path.size,
-        "speed": path.speed,
+        **(
+            {"paths": text_of(own), "drawn": round(tacton.drawing_frequency, 6)}
+            if own
+            else {"shape": path.shape, "size": 1e3 * path.size, "speed": path.speed}
+        ),
         "height": 1e3 * scene.pressure.height,
         "drive": scene.pressure.drive,
         "body": known.get(scene.body, OWN_BODY),

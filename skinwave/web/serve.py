@@ -25,6 +25,7 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
     from skinwave.scene_file import loads
     from skinwave.web import controls, scenes
     from skinwave.web.layout import lay_out
+    from skinwave.web.moves import connect
     from skinwave.web.session import Session
 
     start, own = None, None
@@ -37,6 +38,7 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
     if given:
         start, refused = controls.from_query(urlencode(given), own is not None)
     session = Session(server, start, own)
+    connect(session)
     lay_out(session)
     if refused:
         session.state.problem = "; ".join(refused)

@@ -23,11 +23,11 @@ def first(own: Body | None) -> dict[str, Any]:
     return {
         "errors": {}, "typed": {}, "problem": "", "stale": False, "waves_stale": False,
         "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
-        "phase": 0,
+        "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
         "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
         "about": False, "drawer": None, "opened": None, "bodies": bodies(own),
-        "path": "", "influenced": "", "timeline": "", "foci_at": [], "rows": [],
+        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [],
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -37,15 +37,15 @@ def answers(
 ) -> None:
     """Plots, maps and table of answers; waves are of other controls while `waves_stale`."""
     stale, tacton = bool(state.waves_stale), scene.tacton
-    path, given = tacton.trajectory, (kernel, waves, pinned)
+    given = (kernel, waves, pinned)
     span = plots.span_of(state.span, tacton.duration)
     state.update({
         "waveform_plot": plots.waveform_plot(*given, span, stale=stale),
         "spectrum_plot": plots.spectrum_plot(*given, stale=stale, highest=state.highest),
-        "path": "" if path.is_static else drawings.drawn([path.outline]),
-        "influenced": drawings.drawn(model.influenced(path, scene.pressure.height)),
+        "path": drawings.drawn(model.drawn_paths(tacton)),
+        "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
-        "timeline": drawings.timeline(tacton),
+        "own_speeds": drawings.speeds(tacton) if tacton.trajectory.shape == "recorded" else "",
         "rows": drawings.rows(kernel, None if stale else waves),
     })  # fmt: skip
     seen = waves.moving if waves else None
@@ -67,7 +67,8 @@ def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> Non
 def foci(state: Any, scene: Scene) -> None:
     """The foci where they are at the chosen part of a drawing period."""
     tacton = scene.tacton
-    at = tacton.trajectory.at_phase([(state.phase / 100 + phase) % 1 for phase in tacton.foci])
+    part = state.phase / 100 / tacton.n_paths
+    at = tacton.trajectory.at_phase([(part + phase) % 1 for phase in tacton.foci])
     state.foci_at = [[round(1e3 * float(x), 2), round(-1e3 * float(y), 2)] for x, y in at]
 
 

@@ -37,17 +37,18 @@ from skinwave.models.bodies import build, compliance, has_exact_waves, operators
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
 from skinwave.scene import Body, Scene
-from skinwave.web.model import SIDE, Answer, Map, answer_of, borderline, places
+from skinwave.web.model import SIDE, Answer, Map, answer_of, at_any_speed, borderline, places
 from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
 TAIL = 0.4  # s that motion may last after the Tacton
-FURTHEST = 0.125  # m: from the far side of the largest path to a corner of the area
+FURTHEST = 0.145  # m: from a path in one corner of the area to the other
 FINER = 4  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
 TOLERANCE = 0.02  # of a reduction
+MANY = 264  # knots, of which every second spans the same pressures
 NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 BAND = 1000.0  # Hz
 # Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
@@ -99,9 +100,9 @@ class Waves:
             flat = (scene.body, scene.pressure.height)
             table = self._keep("table", flat, lambda: tabulate(*flat, progress))
             return flat_answer(table, scene, moving)
-        path = scene.tacton.trajectory
-        still = path if path.is_static else replace(path, speed=1.0)  # the same places
-        key = (scene.body, still, scene.pressure.height)
+        tacton = scene.tacton
+        places_only = at_any_speed(tacton.trajectory), tacton.n_paths
+        key = (scene.body, places_only, scene.pressure.height)
         body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
         return reduced_answer(body, scene, moving)
 
@@ -219,7 +220,8 @@ def reduced(
     """A meshed and assembled body, reduced to a pressure's path."""
     progress("factorise", 0.0)
     P, points = surface_load(made)
-    spots = pressure.spot(points, path_knots(pressure))
+    knots = path_knots(pressure)
+    spots = pressure.spot(points, knots[:: 1 if len(knots) < MANY else 2])
     near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
     P, points, spots = P[:, near], points[near], spots[:, near]
     seeds = fem.load_subspace(P @ spots.T, TOLERANCE / 5)

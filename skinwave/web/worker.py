@@ -21,7 +21,7 @@ def answer_forever(pipe: Connection) -> None:
     """
     from skinwave.web.waves import Waves
 
-    _end_with_parent()
+    end_with_parent()
     with contextlib.suppress(AttributeError, OSError):
         os.nice(5)  # the page comes first
     waves = Waves()
@@ -42,7 +42,7 @@ def _said(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """In a group of its own, which ends as soon as the page's process does: a mesher that this
     process waits for ends, too.
     """

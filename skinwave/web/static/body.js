@@ -118,7 +118,7 @@
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, at.corners);
     gl.drawElements(gl.TRIANGLES, at.triangles, gl.UNSIGNED_INT, 0);
     gl.disable(gl.DEPTH_TEST); // path and foci are seen wherever the surface is
-    marks(at, gl.LINE_STRIP, at.path, [0.05, 0.05, 0.05]);
+    marks(at, gl.LINES, at.path, [0.05, 0.05, 0.05]);
     const each = at.foci.length / frames;
     marks(at, gl.POINTS, at.foci.subarray(k * each, (k + 1) * each), [0.05, 0.05, 0.05]);
     gl.enable(gl.DEPTH_TEST);

@@ -1,0 +1,236 @@
+"""What a page does to its session: controls, presets, undo, pinning, zooming, opening a scene.
+
+`connect` binds each to a key of the state or to a trigger. Doing the same without a browser is
+calling them, or setting a key, within `with session.state:`.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from skinwave.scene_file import loads
+from skinwave.web import controls, scenes, shown
+from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, Values
+from skinwave.web.downloads import offered
+from skinwave.web.history import History
+from skinwave.web.paths import STARTS_AT, fitted
+from skinwave.web.session import Session, draw, put, refresh, solid, take
+
+SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
+LIKE = 20.0  # mm: paths of several foci begin no larger, to have place beside each other
+LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
+
+
+def connect(session: Session) -> None:
+    """Have a page's session follow what is done on it, and answer it for the first time."""
+    watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
+        (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest")), (phase, ("phase",)),
+        (solid, ("solid",)), (opened, ("opened",)),
+    )  # fmt: skip
+    for answered, keys in watched:
+        session.state.change(*keys)(_without_state(answered, session))
+    for move in (select, restart, zoom, own_path):
+        session.server.trigger(move.__name__)(partial(move, session))
+    for name, made in offered(session).items():
+        session.server.trigger(name)(made)
+    refresh(session)
+
+
+def controlled(session: Session) -> None:
+    """A control has moved."""
+    moved = {key for key in KEYS if session.state[key] != session.good[key]}
+    if moved:
+        turn(session, {key: session.state[key] for key in moved})
+
+
+def turn(session: Session, given: Values, whole: bool = False) -> None:
+    """Set controls; what is refused is marked at its field, which keeps what was typed, for it may
+    be half of a number. A `whole` Tacton brings its own drawing frequency, held from then.
+    """
+    state = session.state
+    accepted, errors, typed = _checked(session, given)
+    values = session.good | accepted
+    for key in ("foci", "paths"):
+        if key in accepted:
+            values = controls.with_its_paths(values, key)
+    if values["paths"] != session.good["paths"]:  # what was typed of paths is not there any more
+        errors.pop("paths", None)
+        typed.pop("paths", None)
+    moved = [key for key in ("shape", "size", "speed") if key in accepted]
+    if state.hold and moved and not whole and not values["paths"]:
+        try:
+            values |= scenes.held(values, moved[-1], state.held_frequency)
+            errors.pop("hold", None)
+        except ValueError as error:
+            errors["hold"] = f"the drawing frequency cannot be held: {error}"
+    state.update({"errors": errors, "typed": typed})
+    put(session, values)
+    session.history.push(values)
+    if accepted:
+        refresh(session)
+    if whole:
+        hold(session)
+
+
+def _checked(session: Session, given: Values) -> tuple[Values, dict[str, str], dict[str, str]]:
+    """What is accepted; what is wrong and was typed of each field, with what was so before."""
+    accepted: Values = {}
+    errors, typed = dict(session.state.errors), dict(session.state.typed)
+    for key, value in given.items():
+        try:
+            accepted[key] = controls.checked(key, value)
+            errors.pop(key, None)
+            typed.pop(key, None)
+        except ValueError as error:
+            errors[key], typed[key] = str(error), str(value)
+    return accepted, errors, typed
+
+
+def setter(session: Session, key: str) -> Callable[[Any], None]:
+    """What a field of a control calls with what was typed."""
+    return lambda given: turn(session, {key: given})
+
+
+def follow(session: Session, own: str) -> None:
+    """The foci follow paths of their "own", which begin like the one that they followed, or one."""
+    values, text = session.good, ""
+    if own == "own":
+        size = 0.0 if values["shape"] == "point" else min(values["size"], LIKE)
+        x, y = STARTS_AT[0]
+        text = fitted(f"{values['shape']}/{size:g}/{x}/{y}", values["foci"])
+    turn(session, {"paths": text})
+
+
+def own_path(session: Session, which: int, part: int, given: str) -> None:
+    """Set the shape, size, x or y (`part` 0 to 3) of one of the paths."""
+    text = session.state.typed.get("paths", session.good["paths"])
+    parts = [path.strip().split("/") for path in text.split(",")]
+    parts[which][part] = str(given).strip().replace(",", ".").replace("/", "")
+    turn(session, {"paths": ", ".join("/".join(path) for path in parts)})
+
+
+def select(session: Session, x: float, y: float) -> None:
+    """Select the point of the area at x and y in mm."""
+    limit = NUMBERS["x"].high
+    at = {"x": round(float(x), 2), "y": round(float(y), 2)}
+    turn(session, {key: min(max(value, -limit), limit) for key, value in at.items()})
+
+
+def preset(session: Session, name: str) -> None:
+    """Take one of the paper's Tactons."""
+    turn(session, controls.presets()[name], whole=True)
+
+
+def restart(session: Session, query: str = "") -> None:
+    """Begin anew with what an address says."""
+    values, refused = controls.from_query(query, session.own is not None)
+    session.pinned, session.history = (), History(values)
+    session.state.update({"hold": False, "pinned": False, "problem": ""})
+    take(session, values)
+    if refused and not session.state.problem:
+        session.state.problem = "; ".join(refused)
+
+
+def undo(session: Session) -> None:
+    """Back to the values before the last move."""
+    take(session, session.history.undo())
+
+
+def redo(session: Session) -> None:
+    """Forward again."""
+    take(session, session.history.redo())
+
+
+def pin(session: Session) -> None:
+    """Keep what is shown, to compare with; or let go of what was kept."""
+    session.pinned = () if session.pinned else session.answers
+    if session.pinned:
+        session.state.pinned_query = controls.to_query(session.values)
+    session.state.pinned = bool(session.pinned)
+    draw(session)
+
+
+def exchange(session: Session) -> None:
+    """Go to what is pinned, and pin what was shown instead."""
+    back, kept = session.state.pinned_query, controls.to_query(session.values)
+    session.pinned = session.answers
+    session.state.pinned_query = kept
+    take(session, controls.from_query(back, session.own is not None)[0])
+
+
+def cancel(session: Session) -> None:
+    """Stop computing waves, and show none."""
+    session.worker.cancel()
+    session.number += 1
+    session.state.update({"busy": "", "body": "none"})
+    turn(session, {"body": "none"})
+
+
+def zoom(session: Session, start: float | None = None, end: float | None = None) -> None:
+    """The commanded Tacton between two times in ms; without any, as it was."""
+    if start is None or end is None:
+        session.zoomed = None
+    else:
+        last = session.scene.tacton.duration
+        start = min(max(0.0, start / 1e3), last - SHORTEST)
+        session.zoomed = (start, min(max(end / 1e3, start + SHORTEST), last))
+    shown.commanded(session.state, session.scene, session.zoomed)
+
+
+def hold(session: Session) -> None:
+    """From now on the drawing frequency stays as it is, or does not."""
+    state = session.state
+    if state.hold and session.scene:
+        state.held_frequency = session.scene.tacton.drawing_frequency
+    elif not state.hold:
+        state.errors = {key: said for key, said in state.errors.items() if key != "hold"}
+
+
+def phase(session: Session) -> None:
+    """The foci are to be seen elsewhere on their path."""
+    shown.foci(session.state, session.scene)
+
+
+def look(session: Session) -> None:
+    """Something else is to be seen of the same answer."""
+    session.zoomed = None
+    draw(session)
+
+
+def opened(session: Session) -> None:
+    """A scene file was chosen on the page."""
+    given = session.state.opened
+    if not given:
+        return
+    session.state.opened = None
+    one = given[0] if isinstance(given, list) else given
+    content = one.get("content", b"")
+    content = content if isinstance(content, bytes) else b"".join(content)
+    if len(content) > LARGEST_FILE:
+        session.state.problem = (
+            f"the scene cannot be opened: a file of {len(content) / 1e6:.3g} MB exceeds "
+            f"{LARGEST_FILE / 1e6:g} MB, far more than a scene needs"
+        )
+        return
+    open_scene(session, content.decode("utf-8", "replace"))
+
+
+def open_scene(session: Session, text: str) -> None:
+    """Take the scene of a TOML text; say why if it cannot be."""
+    try:
+        scene = loads(text)
+        values = scenes.values_of(scene)
+        if scene.body.file:
+            raise ValueError("a body from a file cannot be opened in a page; name the scene "
+                             "on the command line")  # fmt: skip
+    except ValueError as error:
+        session.state.problem = f"the scene cannot be opened: {error}"
+        return
+    session.own = scene.body if values["body"] == OWN_BODY else session.own
+    session.state.bodies = shown.bodies(session.own)
+    turn(session, values, whole=True)
+
+
+def _without_state(follow: Callable[[Session], None], session: Session) -> Callable[..., None]:
+    """A follower of keys, which is handed the whole state and takes it from its session."""
+    return lambda **_: follow(session)
