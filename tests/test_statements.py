@@ -1,13 +1,19 @@
 """What pages state of a run follows from its scene."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from simple_model import MovingPressure, Response, Tacton, Trajectory
+from skinwave.files import line_rows
+from skinwave.pictures.levels import felt_lines
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Layer, Scene
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import modelled
+from skinwave.studies.description import modelled, untold
+from skinwave.studies.study import write_single
+from skinwave.sweeps.measures import measured
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
 CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -59,3 +65,56 @@ def test_a_drive_law_that_was_not_used_is_not_named():
 def test_statements_on_one_tone_are_not_judged_by_others(tones):
     assert evaluate([run(BODIES["skin-slab"], **tones)]) == []
     assert evaluate([run(BODIES["skin-slab"], am_frequency=140)])
+
+
+def at_the_focus(seconds, **tacton):
+    """A made-up motion of 2 um at f_AM, 1 um at twice it and 3 um in the mean."""
+    one = run(BODIES["skin-slab"], **tacton)
+    times = np.arange(round(seconds * 1e4)) / 1e4
+    angle = 2 * np.pi * tacton["am_frequency"] * times
+    motion = 1e-6 * (3 + 2 * np.sin(angle) + np.cos(2 * angle))[:, None] * np.ones(5)
+    response = replace(one.response, times=times, displacement=motion)
+    pressure = replace(one.scene.pressure, tacton=Tacton(duration=seconds, **tacton))
+    return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
+
+
+def test_lines_that_cannot_be_told_apart_are_not_reported():
+    short, long = at_the_focus(0.5, am_frequency=2), at_the_focus(2.0, am_frequency=2)
+    assert short.frequencies == short.lines == felt_lines(short, 0) == {}
+    assert short.untold == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
+    assert list(line_rows(short)) == []
+    assert (
+        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be told apart in 0.5 s"
+        in untold([short])[0]
+    )
+    assert evaluate([short]) == []
+    assert long.untold == ()
+    assert untold([long]) == []
+    assert long.lines["f_AM"][0] == pytest.approx(2e-6, rel=1e-3)
+    assert long.lines["2f_AM"][0] == pytest.approx(1e-6, rel=1e-3)
+    row = measured(short.scene, short.response)
+    assert not [name for name in row if name.startswith(("f_AM", "2f_AM"))]
+
+
+def test_lines_beside_those_that_cannot_be_told_are_kept_and_judged():
+    """The path of 141 Hz is too near to 140 Hz, and 282 Hz to 280 Hz; pairs lie near 0 Hz."""
+    near = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 141)
+    one = at_the_focus(0.5, am_frequency=140, trajectory=near)
+    assert {"f_AM", "f_d", "2f_d-f_AM", "f_d-f_AM"} <= set(one.untold)
+    assert "5f_AM" in one.frequencies
+    assert evaluate([one]) == []
+    row = measured(one.scene, one.response)
+    assert row["5f_AM_um"][0] == pytest.approx(0, abs=1e-3)
+    assert not {"level_db", "felt_line"} & row.keys()
+
+
+def test_two_names_of_one_frequency_are_told():
+    half = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 70)
+    one = at_the_focus(0.5, am_frequency=140, trajectory=half)
+    assert one.untold == ()
+    assert one.lines["2f_d"][0] == pytest.approx(2e-6, rel=1e-3)
+
+
+def test_a_page_says_how_many_lines_are_left_out(tmp_path):
+    write_single(tmp_path, at_the_focus(0.5, am_frequency=2))
+    assert "5 lines, f_AM, 2f_AM" in (tmp_path / "index.html").read_text()

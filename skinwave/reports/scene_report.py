@@ -19,7 +19,7 @@ from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import extent, modelled
+from skinwave.studies.description import extent, modelled, untold
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
@@ -122,9 +122,11 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    if not runs[0].lines:
-        return document.paragraph("A constant pressure on a focus at rest has no line.")
-    share = {name: max(_share(run, name, probe) for run in runs) for name in runs[0].lines}
+    said = "".join(map(document.paragraph, untold(runs)))
+    known = [name for name in runs[0].lines if all(name in run.lines for run in runs)]
+    if not known:
+        return said or document.paragraph("A constant pressure on a focus at rest has no line.")
+    share = {name: max(_share(run, name, probe) for run in runs) for name in known}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
     felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
     rows = [
@@ -139,7 +141,7 @@ def _lines(runs: Sequence[Run]) -> str:
         header += [f"{answered(run)}, {'Pa' if pascal else 'µm'} peak"]
         header += [] if pascal else ["dB re threshold"]
     x, y = 1e3 * runs[0].response.probes[probe]
-    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows)
+    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows) + said
 
 
 def _share(run: Run, name: str, probe: int) -> float:

@@ -23,6 +23,7 @@ ANSWERS = {
     "fem-nonlinear-transient": "a sheet that stretches as it bends, on 10-node "
     "tetrahedra, step by step",
 }
+NAMED = 4  # lines that a sentence names
 SPOTS = {
     "gaussian": "a Gaussian focus",
     "main_lobe": "a focus S = sinc^2(D/D0)",
@@ -48,6 +49,17 @@ def modelled(runs: Iterable[Run]) -> list[str]:
     if any(run.is_am and run.scene.pressure.drive == "pressure_squared" for run in on_bodies):
         paragraphs.append(SQUARED)
     return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
+
+
+def untold(runs: Iterable[Run]) -> list[str]:
+    """What is not reported of Tactons that are too short, a sentence for each duration."""
+    missing = {run.scene.tacton.duration: run.untold for run in runs if run.untold}
+    return [
+        f"{len(names)} line{'s' * (len(names) > 1)}, {', '.join(names[:NAMED])}"
+        f"{', ...' * (len(names) > NAMED)}, cannot be told apart in {seconds:g} s and "
+        f"{'are' if len(names) > 1 else 'is'} not reported; make the Tacton longer."
+        for seconds, names in missing.items()
+    ]
 
 
 def _answered(runs: list[Run]) -> str:

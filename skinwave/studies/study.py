@@ -20,7 +20,7 @@ from skinwave.scene_file import dumps
 from skinwave.simulation import check_knobs, simulate
 from skinwave.studies import paper15, tables
 from skinwave.studies.claims import Verdict, evaluate
-from skinwave.studies.description import modelled
+from skinwave.studies.description import modelled, untold
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 
@@ -107,6 +107,7 @@ def write_single(folder: Path, run: Run) -> None:
     figure = tacton_figure(run.tacton, [run])
     parts = [
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
+        *map(document.paragraph, untold([run])),
         *(document.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
         document.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
@@ -170,6 +171,7 @@ def _write_page(
     }
     parts = [
         *_introduction(outcome, groups),
+        *map(document.paragraph, untold(runs)),
         shown_first,
         document.section(
             "Which of the paper's statements hold where",
