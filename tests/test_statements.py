@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simple_model import MovingPressure, Response, Tacton, Trajectory
+from simple_model import MovingPressure, Response, Rhythm, Signal, Tacton, Trajectory
 from skinwave.files import line_rows
 from skinwave.pictures.levels import felt_lines
+from skinwave.reports.scene_report import _asked_rows
 from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Layer, Scene
+from skinwave.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import modelled, untold
-from skinwave.studies.study import write_single
+from skinwave.studies.study import caption, write_single
 from skinwave.sweeps.measures import measured
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
@@ -118,3 +119,53 @@ def test_two_names_of_one_frequency_are_told():
 def test_a_page_says_how_many_lines_are_left_out(tmp_path):
     write_single(tmp_path, at_the_focus(0.5, am_frequency=2))
     assert "5 lines, f_AM, 2f_AM" in (tmp_path / "index.html").read_text()
+
+
+CORNERS = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.01))
+RECORDED = Trajectory(
+    shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0.0, 1.0, 0.5)
+)
+POLYLINE = Trajectory(shape="polyline", points=CORNERS, speed=3.0)
+ONE_WAY = Trajectory(shape="line", size=0.02, speed=4.0, sweep="one_way", centre=(0.0, 0.005))
+SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
+
+
+@pytest.mark.parametrize(
+    ("tacton", "row", "said"),
+    [
+        ({}, "focus", "at rest"),
+        ({}, "amplitude modulation", "none"),
+        ({}, "amplitude", "100 % of full drive"),
+        ({"am_frequency": 80, **SECOND}, "amplitude modulation",
+         "f_AM = 80 Hz, f_AM2 = 200 Hz, weights 0.25 and 0.75"),
+        ({"second_am_frequency": 200, "superposition": (0.0, 1.0)}, "amplitude modulation",
+         "f_AM2 = 200 Hz"),
+        ({"envelope_frequency": 5}, "amplitude modulation", "f_e = 5 Hz"),
+        ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with levels of its own"),
+        ({"trajectory": POLYLINE}, "focus", "polyline of 60 mm a period at 3 m/s, f_d = 50.000 Hz"),
+        ({"trajectory": ONE_WAY}, "focus",
+         "line of 20 mm at 4 m/s, one way, f_d = 200.000 Hz about (0, 5) mm"),
+        ({"trajectory": CIRCLE, "foci": (0.0, 0.5)}, "focus",
+         "circle of 20 mm at 12 m/s, f_d = 190.986 Hz, 2 foci simultaneous"),
+        ({"amplitude": 0.5, "rhythm": Rhythm(pulses=((0.03, 0.02),), ramp=0.005)}, "amplitude",
+         "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
+        ({"signal": Signal(rate=100, samples=(0.0, 1.0))}, "amplitude", "a sampled modulation"),
+    ],
+)  # fmt: skip
+def test_a_page_says_all_that_was_commanded(tacton, row, said):
+    one = run(BODIES["skin-slab"], **tacton)
+    assert dict(_asked_rows(one.scene))[row] == said
+    if tacton:
+        assert said in caption("one", [one])
+
+
+def test_a_page_says_how_a_body_lies_and_what_lies_above():
+    place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
+    body = Body(layers=LAYERS, placement=place)
+    said = (
+        "; above it 1 mm of dermis; tilted by 10 degrees about x and 0 degrees about y"
+        "; moved by (0, 5, 2) mm"
+    )
+    one = run(body)
+    assert dict(_asked_rows(one.scene))["body"].endswith(said)
+    assert said in modelled([one])[0]

@@ -19,7 +19,15 @@ from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import extent, modelled, untold
+from skinwave.studies.description import (
+    above,
+    extent,
+    levels_of,
+    modelled,
+    path_of,
+    tones_of,
+    untold,
+)
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
@@ -87,17 +95,16 @@ def _asked(album: Album) -> str:
 
 
 def _asked_rows(scene: Scene) -> list[list[str]]:
-    tacton, path, pressure, body = (
-        scene.tacton, scene.tacton.trajectory, scene.pressure, scene.body,
-    )  # fmt: skip
-    moved = f"{path.shape} of {1e3 * path.size:g} mm at {path.speed:g} m/s"
-    f_d = path.drawing_frequency
+    tacton, pressure, body = scene.tacton, scene.pressure, scene.body
+    depth = pressure.depth_of_modulation
+    of_depth = f", depth of modulation {depth:g}" if pressure.drive != "linear" else ""
     return [
-        ["focus", f"{moved}, drawn {f_d:.3f} times a second" if f_d else "at rest"],
-        ["amplitude modulation", f"{tacton.am_frequency:g} Hz" if tacton.am_frequency else "none"],
-        ["drive", f"{pressure.drive}, {pressure.peak_pressure:g} Pa at full drive, "
+        ["focus", path_of(tacton)],
+        ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
+        ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
+        ["drive", f"{pressure.drive}{of_depth}, {pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
-        ["body", extent(body)],
+        ["body", extent(body) + above(body)],
         ["duration", f"{tacton.duration:g} s"],
         ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
     ]  # fmt: skip
