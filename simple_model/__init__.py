@@ -5,7 +5,7 @@ from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.joined import evenly, joined
 from simple_model.point_kernel import point_kernel
 from simple_model.pressure import MovingPressure
-from simple_model.response import Effort, Response, lines, spectrum, tacton_lines
+from simple_model.response import Effort, Response, lines, spectrum, tacton_lines, told_apart
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
 from simple_model.threshold import sensation_level, threshold
@@ -36,4 +36,5 @@ __all__ = [
     "steady_state",
     "tacton_lines",
     "threshold",
+    "told_apart",
 ]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.signal import get_window
 
 from simple_model.tacton import Tacton
@@ -12,6 +12,8 @@ from simple_model.trajectory import Floats
 
 # Side lobes of the Kaiser window below -140 dB: lines as weak as that stay apart from strong ones.
 LINE_WINDOW = ("kaiser", 19.0)
+SETTLE = 0.25  # of a response, before which no line is fitted
+ALIKE = 1e-3  # of what can be told apart: lines as close as that are one, and its amplitude is
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,13 +82,13 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
     return np.asarray(np.fft.rfftfreq(n, step(response.times))), amplitude
 
 
-def lines(response: Response, frequencies: ArrayLike, *, settle: float = 0.25) -> Floats:
+def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
     """Amplitudes (f, p) at exactly these frequencies (f,) in Hz, by weighted least squares.
 
     All lines and the mean are fitted together after the first part `settle` of the response,
     under a Kaiser window, so that neither the position of a line between two bins nor a line
     left out nor a dying transient leaks into another. Lines closer than one over the fitted
-    time cannot be told apart and share one amplitude. 0 Hz gives the mean.
+    time cannot be told apart and share one amplitude: see `told_apart`. 0 Hz gives the mean.
 
     Raises
     ------
@@ -106,6 +108,20 @@ def lines(response: Response, frequencies: ArrayLike, *, settle: float = 0.25) -
     fitted = np.linalg.lstsq(weighted.T @ basis, weighted.T @ x, rcond=1e-13)[0]
     cosine, sine = np.split(fitted[1:], 2)
     return np.vstack([np.abs(fitted[:1]), np.hypot(cosine, sine)])[which]
+
+
+def told_apart(
+    response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
+) -> NDArray[np.bool_]:
+    """Whether `lines` tells each of these frequencies (f,) in Hz from 0 Hz and from the others.
+
+    Frequencies that are the same, or as good as, are one line and need not be told apart.
+    """
+    frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
+    resolution = 1 / ((1 - settle) * np.ptp(response.times))
+    away = np.abs(frequencies[:, None] - frequencies)
+    mixed = ((away < resolution) & (away > ALIKE * resolution)).any(axis=1)
+    return ~mixed & ((frequencies < 1e-9) | (frequencies >= resolution))
 
 
 def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:

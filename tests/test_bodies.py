@@ -17,6 +17,7 @@ from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare, simulate
 from skinwave.cli import main
+from skinwave.models import hands
 from skinwave.models.bodies import build, has_layer, operators, surface_load
 from skinwave.planning.plan import plan
 from skinwave.scene import Body, Layer, Placement, Relief
@@ -231,6 +232,49 @@ def test_a_mesh_in_a_file_is_a_body_of_a_scene(slab_file, tmp_path):
     required = plan(read, 0.1)
     assert required.model == "fem"
     assert any("not known" in warning for warning in required.warnings)
+
+
+@pytest.fixture
+def dome(tmp_path):
+    """A block of 40 x 40 x 10 mm whose underside slopes."""
+    block = meshes.block((0.04, 0.04, 0.01), 0.005, order=1)
+    points = block.points.copy()
+    points[:, 2] += np.where(points[:, 2] < -0.009, 0.4 * np.abs(points[:, 0]), 0.0)
+    return replace(block, points=points, facets={})
+
+
+def built(folder, mesh):
+    meshes.write(folder / "body.vtu", mesh)
+    return build(hand_in(folder / "body.vtu"), 0.005).mesh
+
+
+def test_a_mesh_in_a_file_keeps_its_own_bottom(dome, tmp_path):
+    """Half of what looks downwards, and a side; also below a top of its own."""
+    own = meshes.named(
+        dome, bottom=lambda at, normals: (at[:, 0] < -0.0101) & (normals[:, 2] < 0.5)
+    )
+    count = len(own.facets["bottom"])
+    top = meshes.named(own, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
+    for mesh in (own, top):
+        assert len(built(tmp_path, mesh).facets["bottom"]) == count
+
+
+def test_of_a_mesh_without_a_bottom_what_looks_downwards_is_taken(dome, tmp_path):
+    down = len(meshes.named(dome, down=lambda _, n: n[:, 2] < hands.DOWNWARDS).facets["down"])
+    top = meshes.named(dome, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
+    # What is read and written again has the bottom that reading gave it.
+    meshes.write(tmp_path / "first.vtu", dome)
+    again = meshes.body_from_file(tmp_path / "first.vtu", 0.005)
+    assert len(again.facets["bottom"]) > down
+    for mesh in (dome, top, again):
+        assert len(built(tmp_path, mesh).facets["bottom"]) == down
+
+
+def test_regions_of_a_file_are_refused_as_they_would_not_be_used(dome, tmp_path):
+    region = (dome.points[dome.tets].mean(axis=1)[:, 2] < -0.005).astype(int)
+    with pytest.raises(ValueError, match="has 2 regions, but a body from a file is of one"):
+        built(tmp_path, replace(dome, region=region))
+    built(tmp_path, replace(dome, region=np.full(len(dome.tets), 3)))
 
 
 def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():

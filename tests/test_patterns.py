@@ -1,13 +1,14 @@
 """Pattern files come in, go out and come back; what is malformed is refused in one line."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, lines, point_kernel
+from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, lines, point_kernel
 from skinwave import Body, Scene, dumps, loads, read, simulate
 from skinwave.cli import main
 from skinwave.patterns import Options, read_pattern, write_pattern
@@ -314,13 +315,44 @@ def test_wav_is_an_envelope_of_the_scene_it_is_put_on(tmp_path):
     np.testing.assert_allclose(scene.pressure.gain(t), gain, rtol=1e-6)
 
 
-def test_wav_out_is_the_commanded_amplitude(tmp_path):
-    tacton = Tacton(amplitude=0.8, am_frequency=80, duration=0.05)
-    back, _ = imported(tmp_path, exported(flat(tacton), ".wav", rate=16_000), ".wav")
+PULSES = Rhythm(pulses=((0.02, 0.01),), ramp=0.005)
+LEVELS = Trajectory(
+    shape="recorded", times=(0, 0.025, 0.05), points=((0, 0),) * 3, levels=(0.2, 1, 0.2)
+)
+ENVELOPE = Signal(rate=1000, samples=(0.0, 0.5, 1.0, 0.5), role="envelope")
+TONES = Signal(rate=1000, samples=(0.0, 1.0, 0.0, -1.0))
+
+
+@pytest.mark.parametrize("drive", ["linear", "pressure_squared", "force_corrected"])
+@pytest.mark.parametrize(
+    ("kept", "more", "role"),
+    [
+        ({}, {"am_frequency": 80}, "modulation"),
+        ({}, {"am_frequency": 80, "envelope_frequency": 20}, "modulation"),
+        ({}, {"signal": TONES}, "modulation"),
+        ({}, {"rhythm": PULSES}, "envelope"),
+        ({"rhythm": PULSES}, {"am_frequency": 80}, "modulation"),
+        ({"am_frequency": 80}, {"signal": ENVELOPE, "rhythm": PULSES}, "envelope"),
+        ({}, {"trajectory": LEVELS}, "envelope"),
+        ({}, {"trajectory": LEVELS, "am_frequency": 80}, None),
+    ],
+)
+def test_wav_and_back_is_the_same_load_over_time(tmp_path, kept, more, role, drive):
+    """At half the amplitude, on a scene with what is said to stay with it, and on its own."""
+    role = role or ("modulation" if drive == "linear" else "envelope")
+    tacton, bare = (Tacton(amplitude=0.5, duration=0.05, **x) for x in ({**kept, **more}, kept))
+    scene = flat(tacton, drive=drive, depth_of_modulation=0.8)
+    content, notes = write_pattern(scene, ".wav", Options(rate=16_000))
+    assert any("amplitude" in note and "with the scene" in note for note in notes)
+    assert (role == "envelope") == any("--role envelope" in note for note in notes)
+    (tmp_path / "a.wav").write_bytes(content)
     t = np.arange(800) / 16_000
-    np.testing.assert_allclose(
-        back.tacton.signal.at(t), 0.8 * np.sin(2 * np.pi * 80 * t), atol=1e-6
-    )
+    before = scene.pressure([[0.0, 0.0]], t)
+    own = [] if tacton.trajectory.levels else [scene]
+    for base in (replace(scene, pressure=replace(scene.pressure, tacton=bare)), *own):
+        back, _ = read_pattern(tmp_path / "a.wav", Options(role=role), base)
+        after = back.pressure([[0.0, 0.0]], t)
+        np.testing.assert_allclose(after, before, atol=1e-5 * before.max())
 
 
 @pytest.mark.parametrize("asked", [0.5, 4.0, 80.0, 190.98593171027443, 700.0])

@@ -1,13 +1,20 @@
 """What pages state of a run follows from its scene."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from simple_model import MovingPressure, Response, Tacton, Trajectory
+from simple_model import MovingPressure, Response, Rhythm, Signal, Tacton, Trajectory
+from skinwave.files import line_rows
+from skinwave.pictures.levels import felt_lines
+from skinwave.reports.scene_report import _asked_rows
 from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Layer, Scene
+from skinwave.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import modelled
+from skinwave.studies.description import modelled, untold
+from skinwave.studies.study import caption, write_single
+from skinwave.sweeps.measures import measured
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
 CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -59,3 +66,106 @@ def test_a_drive_law_that_was_not_used_is_not_named():
 def test_statements_on_one_tone_are_not_judged_by_others(tones):
     assert evaluate([run(BODIES["skin-slab"], **tones)]) == []
     assert evaluate([run(BODIES["skin-slab"], am_frequency=140)])
+
+
+def at_the_focus(seconds, **tacton):
+    """A made-up motion of 2 um at f_AM, 1 um at twice it and 3 um in the mean."""
+    one = run(BODIES["skin-slab"], **tacton)
+    times = np.arange(round(seconds * 1e4)) / 1e4
+    angle = 2 * np.pi * tacton["am_frequency"] * times
+    motion = 1e-6 * (3 + 2 * np.sin(angle) + np.cos(2 * angle))[:, None] * np.ones(5)
+    response = replace(one.response, times=times, displacement=motion)
+    pressure = replace(one.scene.pressure, tacton=Tacton(duration=seconds, **tacton))
+    return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
+
+
+def test_lines_that_cannot_be_told_apart_are_not_reported():
+    short, long = at_the_focus(0.5, am_frequency=2), at_the_focus(2.0, am_frequency=2)
+    assert short.frequencies == short.lines == felt_lines(short, 0) == {}
+    assert short.untold == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
+    assert list(line_rows(short)) == []
+    assert (
+        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be told apart in 0.5 s"
+        in untold([short])[0]
+    )
+    assert evaluate([short]) == []
+    assert long.untold == ()
+    assert untold([long]) == []
+    assert long.lines["f_AM"][0] == pytest.approx(2e-6, rel=1e-3)
+    assert long.lines["2f_AM"][0] == pytest.approx(1e-6, rel=1e-3)
+    row = measured(short.scene, short.response)
+    assert not [name for name in row if name.startswith(("f_AM", "2f_AM"))]
+
+
+def test_lines_beside_those_that_cannot_be_told_are_kept_and_judged():
+    """The path of 141 Hz is too near to 140 Hz, and 282 Hz to 280 Hz; pairs lie near 0 Hz."""
+    near = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 141)
+    one = at_the_focus(0.5, am_frequency=140, trajectory=near)
+    assert {"f_AM", "f_d", "2f_d-f_AM", "f_d-f_AM"} <= set(one.untold)
+    assert "5f_AM" in one.frequencies
+    assert evaluate([one]) == []
+    row = measured(one.scene, one.response)
+    assert row["5f_AM_um"][0] == pytest.approx(0, abs=1e-3)
+    assert not {"level_db", "felt_line"} & row.keys()
+
+
+def test_two_names_of_one_frequency_are_told():
+    half = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 70)
+    one = at_the_focus(0.5, am_frequency=140, trajectory=half)
+    assert one.untold == ()
+    assert one.lines["2f_d"][0] == pytest.approx(2e-6, rel=1e-3)
+
+
+def test_a_page_says_how_many_lines_are_left_out(tmp_path):
+    write_single(tmp_path, at_the_focus(0.5, am_frequency=2))
+    assert "5 lines, f_AM, 2f_AM" in (tmp_path / "index.html").read_text()
+
+
+CORNERS = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.01))
+RECORDED = Trajectory(
+    shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0.0, 1.0, 0.5)
+)
+POLYLINE = Trajectory(shape="polyline", points=CORNERS, speed=3.0)
+ONE_WAY = Trajectory(shape="line", size=0.02, speed=4.0, sweep="one_way", centre=(0.0, 0.005))
+SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
+
+
+@pytest.mark.parametrize(
+    ("tacton", "row", "said"),
+    [
+        ({}, "focus", "at rest"),
+        ({}, "amplitude modulation", "none"),
+        ({}, "amplitude", "100 % of full drive"),
+        ({"am_frequency": 80, **SECOND}, "amplitude modulation",
+         "f_AM = 80 Hz, f_AM2 = 200 Hz, weights 0.25 and 0.75"),
+        ({"second_am_frequency": 200, "superposition": (0.0, 1.0)}, "amplitude modulation",
+         "f_AM2 = 200 Hz"),
+        ({"envelope_frequency": 5}, "amplitude modulation", "f_e = 5 Hz"),
+        ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with levels of its own"),
+        ({"trajectory": POLYLINE}, "focus", "polyline of 60 mm a period at 3 m/s, f_d = 50.000 Hz"),
+        ({"trajectory": ONE_WAY}, "focus",
+         "line of 20 mm at 4 m/s, one way, f_d = 200.000 Hz about (0, 5) mm"),
+        ({"trajectory": CIRCLE, "foci": (0.0, 0.5)}, "focus",
+         "circle of 20 mm at 12 m/s, f_d = 190.986 Hz, 2 foci simultaneous"),
+        ({"amplitude": 0.5, "rhythm": Rhythm(pulses=((0.03, 0.02),), ramp=0.005)}, "amplitude",
+         "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
+        ({"signal": Signal(rate=100, samples=(0.0, 1.0))}, "amplitude", "a sampled modulation"),
+    ],
+)  # fmt: skip
+def test_a_page_says_all_that_was_commanded(tacton, row, said):
+    one = run(BODIES["skin-slab"], **tacton)
+    assert dict(_asked_rows(one.scene))[row] == said
+    if tacton:
+        assert said in caption("one", [one])
+
+
+def test_a_page_says_how_a_body_lies_and_what_lies_above():
+    place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
+    body = Body(layers=LAYERS, placement=place)
+    said = (
+        "; above it 1 mm of dermis; tilted by 10 degrees about x and 0 degrees about y"
+        "; moved by (0, 5, 2) mm"
+    )
+    one = run(body)
+    assert dict(_asked_rows(one.scene))["body"].endswith(said)
+    assert said in modelled([one])[0]

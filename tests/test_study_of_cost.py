@@ -14,6 +14,7 @@ from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import waves_returned
 from skinwave.planning.plan import plan
 from skinwave.planning.sensitivity import sensitivity
+from skinwave.scene import Body
 from skinwave.studies.paper15 import scenes, tactons
 from skinwave.studies.tradeoff import Candidate, sentences, study, write
 
@@ -214,6 +215,20 @@ def test_a_sheet_near_a_resonance_is_more_sensitive():
     off, on = (sensitivity(loads(text.format(f))) for f in (80, 140))
     assert on.value > 2 * off.value > 2
     assert 60 < off.frequency < 200
+
+
+@pytest.mark.parametrize("body", ["kind = 'palm'", "kind = 'mesh'\nfile = 'hand.vtu'"])
+def test_how_sensitive_a_hand_is_can_be_told(body, monkeypatch):
+    """What stands for the hand is a small slab, which is prepared in a second."""
+    small = Body(width=0.03, height=0.03)
+    monkeypatch.setattr(
+        "skinwave.planning.sensitivity.prepare",
+        lambda body, probes, h: prepare(small, probes, h=h),
+    )
+    text = f"[tacton]\nam_frequency_hz = 140\n[body]\n{body}\n[probes]\npoints_mm = [[0, 0]]"
+    found = sensitivity(loads(text))
+    assert np.isfinite(found.value)
+    assert found.value > 0
 
 
 @pytest.mark.slow

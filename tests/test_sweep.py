@@ -84,7 +84,8 @@ def test_any_key_of_a_scene_can_be_varied(scene):
 
 
 def test_rows_say_what_was_commanded_and_what_came_out(scene):
-    rows = swept("--vary", "tacton.speed_m_per_s=4,6", "body=skin-slab,none", "--csv")
+    asked = ("tacton.speed_m_per_s=4,6", "body=skin-slab,none", "tacton.duration_s=0.3")
+    rows = swept("--vary", *asked, "--csv")
     assert len(rows) == 4
     assert {(row["model"], row["body.kind"]) for row in rows} == {
         ("flat-body", "slab"), ("point-kernel", "none"),

@@ -39,6 +39,7 @@ from skinwave.web import (
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
 from skinwave.web.session import told
+from skinwave.web.shown import untold
 from skinwave.web.worker import Worker
 
 
@@ -279,6 +280,16 @@ def test_what_is_shown_is_what_simulate_answers():
     assert [line.amplitude for line in shown.lines] == sorted(
         (line.amplitude for line in shown.lines), reverse=True
     )
+
+
+def test_lines_too_near_to_each_other_are_left_out_and_counted():
+    scene = scenes.scene_of(STARTS | {"am": 3, "duration": 0.5, "shape": "point"})
+    answer = model.kernel(scene)
+    assert answer.lines == ()
+    count = len(model.untold_lines(scene, answer.response))
+    assert count == 5
+    assert untold(count, 0.5) == ("5 lines cannot be told apart in 0.5 s; make the Tacton longer.")
+    assert untold(0, 0.5) == ""
 
 
 def test_the_map_is_the_rms_of_the_pressure_about_its_mean():

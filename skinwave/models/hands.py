@@ -4,15 +4,18 @@ import numpy as np
 
 from meshes import (
     Grading,
+    MeshError,
     TetMesh,
     body_from_file,
+    boundary_facets,
     graded,
     named,
     palm_mesh,
     quadratic,
 )
+from meshes.facets import seen_from_above
 from meshes.intake import FINE_RADIUS, GROWTH
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints
 from skinwave.scene import Body
 
 KINDS = ("palm", "mesh")
@@ -25,12 +28,13 @@ def hand(body: Body, h: float) -> TetMesh:
 
     The facet sets are those of a slab: `top`, seen from above; `bottom`, which looks downwards and
     rests on bone; `sides`, where a palm ends at the wrist and the fingers and a body from a file
-    was cut.
+    was cut. A mesh in a file keeps its own, but for a `bottom` of all that is not seen from above,
+    which is what `meshes.body_from_file` calls so: of that the part that looks downwards is taken.
 
     Raises
     ------
     MeshError
-        If the body cannot be meshed.
+        If the body cannot be meshed, or its file tells regions apart.
     """
     if body.kind == "palm":
         # Cells wider than the rim is round would cut it off, and waves come back from the rim.
@@ -40,11 +44,33 @@ def hand(body: Body, h: float) -> TetMesh:
         cut = [mesh.facets["wrist"], mesh.facets["fingers"]]
     else:
         mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
+        _check_regions(body.file, mesh)
         cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
     facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
-    within = named(mesh, bottom=lambda centroids, normals: normals[:, 2] < DOWNWARDS)
-    bottom = within.facets["bottom"]
-    return TetMesh(points=mesh.points, tets=mesh.tets, facets={**facets, "bottom": bottom})
+    if body.kind == "palm" or _is_rest(mesh):
+        mesh = named(mesh, bottom=lambda centroids, normals: normals[:, 2] < DOWNWARDS)
+    facets["bottom"] = mesh.facets["bottom"]
+    return TetMesh(points=mesh.points, tets=mesh.tets, facets=facets)
+
+
+def _check_regions(file: str, mesh: TetMesh) -> None:
+    if (count := len(np.unique(mesh.region))) > 1:
+        raise MeshError(
+            f"{file} has {count} regions, but a body from a file is of one material or of layers "
+            "below its top; save it as one region and describe its layers in the scene"
+        )
+
+
+def _is_rest(mesh: TetMesh) -> bool:
+    """Whether `bottom` is all that is not seen from above, but for what was cut."""
+    unseen = boundary_facets(mesh.tets)[~seen_from_above(mesh)]
+    cut = _corners(mesh.facets["cut"]) if "cut" in mesh.facets else set()
+    return _corners(mesh.facets["bottom"]) | cut == _corners(unseen) | cut
+
+
+def _corners(facets: Ints) -> set[tuple[int, ...]]:
+    """The corners of each facet, in rising order."""
+    return set(map(tuple, np.sort(facets[:, :3], axis=1).tolist()))
 
 
 def depths(mesh: TetMesh) -> Floats:

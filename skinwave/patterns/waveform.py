@@ -1,4 +1,4 @@
-"""WAV as what a Tacton's amplitude follows, at any rate; full scale is full drive."""
+"""WAV as what a Tacton's amplitude follows, at any rate; full scale is the scene's amplitude."""
 
 import io
 import warnings
@@ -11,7 +11,7 @@ from meshes.tetmesh import Floats
 from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.rhythm import ROLES
-from simple_model.tacton import LONGEST, level, modulation
+from simple_model.tacton import LONGEST, level, modulation, tones
 from skinwave.patterns.pattern import Options, Pattern
 from skinwave.scene import Scene
 
@@ -22,8 +22,8 @@ STEP = 2.0**-15  # of full scale, the least that 16 bits tell: rounding below 0 
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
-    """The base scene's Tacton for as long as the WAV lasts, with it as its envelope, or as its
-    modulation in place of the sinusoids.
+    """The base scene's Tacton for as long as the WAV lasts, with it as its envelope in place of the
+    rhythm, or as its modulation in place of the sinusoids.
 
     Raises
     ------
@@ -48,29 +48,73 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     if kept.trajectory.levels:
         raise ValueError("a recorded path has levels of its own; give a scene with another path")
     tacton = replace(kept, duration=duration, signal=signal)
-    if options.role == "modulation":  # in place of the sinusoids
+    if options.role == "modulation":
         tacton = replace(tacton, am_frequency=0.0, second_am_frequency=0.0, envelope_frequency=0.0)
+    else:
+        tacton = replace(tacton, rhythm=None)
     notes = (f"{len(samples):,} samples at {rate:g} Hz as {options.role}, {said}",)
     return Pattern(tacton=tacton, notes=notes)
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """The commanded amplitude without its carrier, 32-bit float, and notes."""
+    """What modulates the amplitude, or its level in time, 32-bit float, and notes on how it is read
+    back to the same load.
+    """
     rate = options.rate or WRITTEN_RATE
     if not (1 <= rate <= 192_000 and rate == int(rate)):
         raise ValueError(f"rate = {rate:g} Hz is outside the whole numbers 1..192000; choose one")
-    tacton, path = scene.tacton, scene.tacton.trajectory
-    t = np.arange(max(2, round(tacton.duration * rate))) / rate
-    samples = tacton.amplitude * level(tacton, t) * modulation(tacton, t)
-    notes = [f"{len(t):,} samples at {rate:g} Hz; full scale is full drive"]
-    if path.levels:
-        samples = samples * path.level_at_phase(np.mod(path.phase(t) + tacton.foci[0], 1.0))
-        notes += ["levels of the first focus"] if len(tacton.foci) > 1 else []
+    t = np.arange(max(2, round(scene.tacton.duration * rate))) / rate
+    path = scene.tacton.trajectory
+    samples, said = (_with_levels if path.levels else _one_role)(scene, t)
+    notes = [f"{len(t):,} samples at {rate:g} Hz; full scale is the scene's amplitude", *said]
     if not path.is_static:
         notes.append("a WAV has no positions: the path is left out")
     file = io.BytesIO()
     wavfile.write(file, int(rate), samples.astype(np.float32))
     return file.getvalue(), tuple(notes)
+
+
+def _one_role(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
+    """Samples (t,) that stand for all modulation, or for the level, and notes.
+
+    The other stays with the scene, as a product of the two would pass the drive law in another
+    way than they do.
+    """
+    tacton, modulated = scene.tacton, _is_modulated(scene)
+    enveloped = tacton.signal is not None and tacton.signal.role == "envelope"
+    if enveloped or (tacton.rhythm and not modulated):
+        kept = "amplitude and modulation stay" if modulated else "amplitude stays"
+        notes = [f"{kept} with the scene", "to be read back with --role envelope"]
+        return np.broadcast_to(level(tacton, t), t.shape), notes
+    kept = "amplitude and rhythm stay" if tacton.rhythm else "amplitude stays"
+    return modulation(tacton, t), [f"{kept} with the scene"]
+
+
+def _with_levels(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
+    """Samples (t,) of levels of a recorded path and of the modulation, and notes.
+
+    They are read onto another path, so that both must be in them: as the modulation of a linear
+    drive, which is a product, or as the level that gives the same pressure without modulation.
+    """
+    tacton, pressure = scene.tacton, scene.pressure
+    path = tacton.trajectory
+    levels = path.level_at_phase(np.mod(path.phase(t) + tacton.foci[0], 1.0))
+    notes = ["levels of the first focus"] if len(tacton.foci) > 1 else []
+    notes.append("amplitude stays with the scene, but a recorded path has levels of its own: "
+                 "to be read onto another path")  # fmt: skip
+    if _is_modulated(scene) and pressure.drive == "linear":
+        return levels * modulation(tacton, t), notes
+    if _is_modulated(scene):
+        depth = pressure.depth_of_modulation
+        levels = levels * (1 + depth * modulation(tacton, t)) / (1 + depth)
+        notes.append("the modulation is in these levels, and must not be in that scene")
+    return levels, [*notes, "to be read back with --role envelope"]
+
+
+def _is_modulated(scene: Scene) -> bool:
+    tacton = scene.tacton
+    sampled = tacton.signal is not None and tacton.signal.role == "modulation"
+    return sampled or any(f > 0 for f in tones(tacton))
 
 
 def _decoded(content: bytes) -> tuple[int, Floats]:

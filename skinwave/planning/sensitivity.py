@@ -16,9 +16,8 @@ from skinwave.models.prepared import SAMPLE_RATE as RATE
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.scene import Scene
 
-COARSENING = {"sheet": 2.0, "slab": 2.0}  # of the default element size
-# Natural frequencies of the coarse mesh are too high by this much, and are put right first.
-DETUNING = {"sheet": 0.010, "slab": 0.010}
+COARSENING = 2.0  # of the default element size
+DETUNING = 0.010  # natural frequencies of the coarse mesh are too high by this: put right first
 MOVED = 1e-3
 LONGEST = 1.0  # s of the answers that are compared
 
@@ -37,9 +36,8 @@ class Sensitivity:
 
 def sensitivity(scene: Scene) -> Sensitivity:
     """Found from two answers of a coarse reduced model, which takes seconds once per body."""
-    kind = scene.body.kind
-    coarse = prepare(scene.body, scene.probe_points, h=COARSENING[kind] * default_size(scene.body))
-    values = coarse.poles.values * (1 - DETUNING[kind])
+    coarse = prepare(scene.body, scene.probe_points, h=COARSENING * default_size(scene.body))
+    values = coarse.poles.values * (1 - DETUNING)
     frequencies, forces = reduced_lines(scene.pressure, coarse.points, coarse.load)
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE
 

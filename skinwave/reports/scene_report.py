@@ -19,7 +19,15 @@ from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import extent, modelled
+from skinwave.studies.description import (
+    above,
+    extent,
+    levels_of,
+    modelled,
+    path_of,
+    tones_of,
+    untold,
+)
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
@@ -87,19 +95,16 @@ def _asked(album: Album) -> str:
 
 
 def _asked_rows(scene: Scene) -> list[list[str]]:
-    tacton, path, pressure, body = (
-        scene.tacton, scene.tacton.trajectory, scene.pressure, scene.body,
-    )  # fmt: skip
-    moved = f"{path.shape} of {1e3 * path.size:g} mm at {path.speed:g} m/s"
-    if path.shape == "recorded":
-        moved = f"{tacton.n_paths} paths" if tacton.n_paths > 1 else "a recorded path"
-    f_d = tacton.drawing_frequency
+    tacton, pressure, body = scene.tacton, scene.pressure, scene.body
+    depth = pressure.depth_of_modulation
+    of_depth = f", depth of modulation {depth:g}" if pressure.drive != "linear" else ""
     return [
-        ["focus", f"{moved}, drawn {f_d:.3f} times a second" if f_d else "at rest"],
-        ["amplitude modulation", f"{tacton.am_frequency:g} Hz" if tacton.am_frequency else "none"],
-        ["drive", f"{pressure.drive}, {pressure.peak_pressure:g} Pa at full drive, "
+        ["focus", path_of(tacton)],
+        ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
+        ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
+        ["drive", f"{pressure.drive}{of_depth}, {pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
-        ["body", extent(body)],
+        ["body", extent(body) + above(body)],
         ["duration", f"{tacton.duration:g} s"],
         ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
     ]  # fmt: skip
@@ -124,9 +129,11 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    if not runs[0].lines:
-        return document.paragraph("A constant pressure on a focus at rest has no line.")
-    share = {name: max(_share(run, name, probe) for run in runs) for name in runs[0].lines}
+    said = "".join(map(document.paragraph, untold(runs)))
+    known = [name for name in runs[0].lines if all(name in run.lines for run in runs)]
+    if not known:
+        return said or document.paragraph("A constant pressure on a focus at rest has no line.")
+    share = {name: max(_share(run, name, probe) for run in runs) for name in known}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
     felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
     rows = [
@@ -141,7 +148,7 @@ def _lines(runs: Sequence[Run]) -> str:
         header += [f"{answered(run)}, {'Pa' if pascal else 'µm'} peak"]
         header += [] if pascal else ["dB re threshold"]
     x, y = 1e3 * runs[0].response.probes[probe]
-    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows)
+    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows) + said
 
 
 def _share(run: Run, name: str, probe: int) -> float:

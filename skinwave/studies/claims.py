@@ -33,14 +33,16 @@ class Verdict:
 
 
 def evaluate(runs: Iterable[Run]) -> list[Verdict]:
-    """Every statement on every body and model for which there are runs to judge it by."""
+    """Every statement on every body and model for which there are runs to judge it by, long enough
+    to tell the lines apart that it is about.
+    """
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in filter(_is_single, runs):
         groups.setdefault((run.body, run.model), []).append(run)
     verdicts = []
     for (body, model), group in groups.items():
         for claim, (applies, judge) in STATEMENTS.items():
-            if chosen := [run for run in group if applies(run)]:
+            if chosen := [run for run in group if applies(run) and _is_told(run, claim)]:
                 holds, value, bar, sentence = judge(chosen)
                 verdicts.append(
                     Verdict(
@@ -64,6 +66,13 @@ def _is_single(run: Run) -> bool:
     w1, w2 = tacton.superposition
     one = (w1 > 0 or not tacton.am_frequency) and not (w2 > 0 and tacton.second_am_frequency)
     return bool(plain and one and tacton.trajectory.shape != "recorded")
+
+
+def _is_told(run: Run, claim: str) -> bool:
+    """Whether the lines that a statement is about are known; some are about all lines."""
+    if claim in NEEDED:
+        return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
+    return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.untold
 
 
 def _single_line(runs: list[Run]) -> Judgement:
@@ -111,9 +120,8 @@ def _same_places(runs: list[Run]) -> Judgement:
 
 
 def _pairs_only(runs: list[Run]) -> Judgement:
-    pairs = ["f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM"]
     drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
-    weakest = min(min(_strongest(run, [name], "f_AM") for name in pairs) for run in runs)
+    weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
     return (
         drawn < ABSENT and weakest > PRESENT,
         drawn,
@@ -208,6 +216,17 @@ STATEMENTS: dict[str, tuple[Callable[[Run], bool], Callable[[list[Run]], Judgeme
     "M3": (_both, _both_multiples),
     "M4": (_both, _am_highest_measured),
     "M5": (_both, _much_lower),
+}
+# Lines, one of these sets of which a statement is about; those not here are about all lines.
+DRAWN = (("f_d", "2f_d", "3f_d"),)
+PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
+NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "S2": DRAWN,
+    "S3": (("f_AM", *DRAWN[0], *PAIRS),),
+    "S5": (("f_AM",), ("f_d",)),
+    "M1": (("f_AM", "2f_AM", "3f_AM"),),
+    "M2": DRAWN,
+    "M3": (("f_AM", "2f_AM", "f_d"),),
 }
 TEXTS = {
     "S1": "Simulated, AM alone: a single line at f_AM.",

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from fem.materials import Material
+from simple_model import Tacton
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
-from skinwave.scene import FLAT, Body
+from skinwave.scene import Body
 
 ANSWERS = {
     "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
@@ -23,6 +24,7 @@ ANSWERS = {
     "fem-nonlinear-transient": "a sheet that stretches as it bends, on 10-node "
     "tetrahedra, step by step",
 }
+NAMED = 4  # lines that a sentence names
 SPOTS = {
     "gaussian": "a Gaussian focus",
     "main_lobe": "a focus S = sinc^2(D/D0)",
@@ -50,6 +52,17 @@ def modelled(runs: Iterable[Run]) -> list[str]:
     return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
 
 
+def untold(runs: Iterable[Run]) -> list[str]:
+    """What is not reported of Tactons that are too short, a sentence for each duration."""
+    missing = {run.scene.tacton.duration: run.untold for run in runs if run.untold}
+    return [
+        f"{len(names)} line{'s' * (len(names) > 1)}, {', '.join(names[:NAMED])}"
+        f"{', ...' * (len(names) > NAMED)}, cannot be told apart in {seconds:g} s and "
+        f"{'are' if len(names) > 1 else 'is'} not reported; make the Tacton longer."
+        for seconds, names in missing.items()
+    ]
+
+
 def _answered(runs: list[Run]) -> str:
     """One body by one model."""
     pressure, model = runs[0].scene.pressure, runs[0].model
@@ -60,6 +73,50 @@ def _answered(runs: list[Run]) -> str:
 
 def _sentence(text: str) -> str:
     return text[0].upper() + text[1:]
+
+
+def path_of(tacton: Tacton) -> str:
+    """Where the foci go."""
+    path = tacton.trajectory
+    if path.shape == "recorded":
+        what = f"{tacton.n_paths} paths" if tacton.n_paths > 1 else "a path"
+        text = f"{what} recorded for {1 / tacton.drawing_frequency:.4g} s"
+        text += " with levels of its own" * bool(path.levels)
+    elif path.is_static:
+        text = "at rest"
+    else:
+        size = 1e3 * (path.size or path.length)
+        text = f"{path.shape} of {size:g} mm{' a period' * (not path.size)} at {path.speed:g} m/s"
+        text += f", {path.sweep.replace('_', ' ')}" * (path.sweep != "there_and_back")
+        text += f", f_d = {path.drawing_frequency:.3f} Hz"
+    if any(path.centre):
+        text += " about ({:g}, {:g}) mm".format(*(1e3 * x for x in path.centre))
+    if len(tacton.foci) > 1:
+        text += f", {len(tacton.foci)} foci {tacton.sharing.replace('_', ' ')}"
+    return text
+
+
+def tones_of(tacton: Tacton) -> list[str]:
+    """The sinusoids that modulate."""
+    w1, w2 = tacton.superposition
+    parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency * w1 else []
+    parts += [f"f_AM2 = {tacton.second_am_frequency:g} Hz"] * bool(tacton.second_am_frequency * w2)
+    if parts and w1 and w2:
+        parts.append(f"weights {w1:g} and {w2:g}")
+    parts += [f"f_e = {tacton.envelope_frequency:g} Hz"] * bool(tacton.envelope_frequency)
+    return parts
+
+
+def levels_of(tacton: Tacton) -> list[str]:
+    """What else turns the amplitude up and down."""
+    parts = [f"{100 * tacton.amplitude:g} % of full drive"] * (tacton.amplitude != 1)
+    if tacton.rhythm:
+        rhythm, count = tacton.rhythm, len(tacton.rhythm.pulses)
+        text = f"{count} pulse{'s' * (count > 1)} in {1e3 * rhythm.period:g} ms"
+        parts.append(text + f" with ramps of {1e3 * rhythm.ramp:g} ms" * (rhythm.ramp > 0))
+    if tacton.signal:
+        parts.append(f"a sampled {tacton.signal.role}")
+    return parts
 
 
 def extent(body: Body) -> str:
@@ -81,15 +138,27 @@ def _body(runs: list[Run]) -> str:
         "flat-body"
     )
     text = f"{extent(body)},{endless} of {_material(body.solid)}"
-    for thickness, material in ((layer.thickness, layer.material) for layer in body.layers):
-        of = material if isinstance(material, str) else _material(material)
-        text += f"; above it {1e3 * thickness:g} mm of {of}"
-    if body.placement != FLAT:
-        text += "; tilted or moved under the device"
+    text += above(body)
     if body.kind == "sheet":
         return f"{text}. {_sheet(runs)}"
     left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * (body.kind == "slab")
     return f"{text}. Left out: {' and '.join(left_out)}." if left_out else f"{text}."
+
+
+def above(body: Body) -> str:
+    """The layers of a body, and how it lies under the device."""
+    text = ""
+    for thickness, material in ((layer.thickness, layer.material) for layer in body.layers):
+        of = material if isinstance(material, str) else _material(material)
+        text += f"; above it {1e3 * thickness:g} mm of {of}"
+    place = body.placement
+    if place.is_tilted:
+        x, y = np.degrees([place.tilt_x, place.tilt_y])
+        text += f"; tilted by {x:g} degrees about x and {y:g} degrees about y"
+    if any(place.offset) or place.lift:
+        moved = ", ".join(f"{1e3 * x:g}" for x in (*place.offset, place.lift))
+        text += f"; moved by ({moved}) mm"
+    return text
 
 
 def _material(solid: Material) -> str:

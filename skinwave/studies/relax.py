@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from simple_model import Response, lines, tacton_lines
+from simple_model import Response, lines, tacton_lines, told_apart
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
@@ -199,7 +199,10 @@ def line_changes(
     old = abs(scale) * old
     least = FAINTEST * max(old.max(), new.max())
     changes = {}
+    told = told_apart(after, list(names.values()))
     for k, name in enumerate(names):
+        if not told[k]:
+            continue
         probe = int(np.argmax(np.maximum(old[k], new[k])))
         if max(old[k, probe], new[k, probe]) > least:
             floor = 1e-3 * least

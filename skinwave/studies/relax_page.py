@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model import tacton_lines
+from simple_model import tacton_lines, told_apart
 from skinwave import document
 from skinwave.comparison import compare
 from skinwave.pictures.figures import png
@@ -135,4 +135,6 @@ def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:
     assert other.response
     found = compare(other.response, rung.response, tuple(names.values()))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return 20 * np.log10(found.line_ratios)
+        decibel = 20 * np.log10(found.line_ratios)
+    decibel[~told_apart(rung.response, list(names.values()))] = np.nan
+    return decibel

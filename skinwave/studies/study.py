@@ -20,7 +20,7 @@ from skinwave.scene_file import dumps
 from skinwave.simulation import check_knobs, simulate
 from skinwave.studies import paper15, tables
 from skinwave.studies.claims import Verdict, evaluate
-from skinwave.studies.description import modelled
+from skinwave.studies.description import levels_of, modelled, path_of, tones_of, untold
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 
@@ -107,6 +107,7 @@ def write_single(folder: Path, run: Run) -> None:
     figure = tacton_figure(run.tacton, [run])
     parts = [
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
+        *map(document.paragraph, untold([run])),
         *(document.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
         document.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
@@ -170,6 +171,7 @@ def _write_page(
     }
     parts = [
         *_introduction(outcome, groups),
+        *map(document.paragraph, untold(runs)),
         shown_first,
         document.section(
             "Which of the paper's statements hold where",
@@ -232,21 +234,6 @@ OVERVIEW_CAPTION = (
 def caption(name: str, group: list[Run]) -> str:
     """What a Tacton's figure shows."""
     tacton = group[0].scene.tacton
-    path = tacton.trajectory
-    parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency else []
-    if path.shape == "recorded":
-        what = f"{tacton.n_paths} paths" if tacton.n_paths > 1 else "a path"
-        parts.append(f"{what} recorded for {1 / tacton.drawing_frequency:.4g} s")
-    elif path.drawing_frequency:
-        size = path.size or path.length
-        parts.append(
-            f"{path.shape} of {1e3 * size:g} mm at {path.speed:g} m/s, "
-            f"f_d = {path.drawing_frequency:.3f} Hz"
-        )
-    if len(tacton.foci) > 1:
-        parts.append(f"{len(tacton.foci)} foci")
-    if tacton.rhythm:
-        parts.append(f"{len(tacton.rhythm.pulses)} pulses in {1e3 * tacton.rhythm.period:g} ms")
-    if tacton.signal:
-        parts.append(f"a sampled {tacton.signal.role}")
+    moved = [] if tacton.trajectory.is_static else [path_of(tacton)]
+    parts = [*tones_of(tacton), *moved, *levels_of(tacton)]
     return f"{name}: {', '.join(parts) or 'constant pressure'}. Rows are probes."

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model import Response, lines, tacton_lines
+from simple_model import Response, lines, tacton_lines, told_apart
 from skinwave import document
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
@@ -274,6 +274,7 @@ def _measure(
     given = abs(found.scale) * lines(response, list(names.values())) if names else truth
     strongest = truth.argmax(axis=1)
     matters = truth.max(axis=1) > 0.01 * truth.max(initial=0.0)
+    matters &= told_apart(reference, list(names.values()))
     decibel = {
         name: float(20 * np.log10(max(given[k, p], 1e-300) / truth[k, p]))
         for k, (name, p) in enumerate(zip(names, strongest, strict=True))

@@ -71,14 +71,15 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     kernel = response
     if response.unit == "m":
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
-    frequencies = Run(
-        tacton=scene.name, body=scene.body.kind, scene=scene, response=response
-    ).frequencies
+    run = Run(tacton=scene.name, body=scene.body.kind, scene=scene, response=response)
+    frequencies = run.frequencies
     agreement = compare(kernel, response)
     row: dict[str, Any] = {"status": "done", "model": response.model}
     # Both at once: the fit of the lines costs more than what it is applied to.
     both = replace(response, displacement=np.hstack([kernel.displacement, response.displacement]))
-    published, found = np.split(lines(both, list(frequencies.values())), 2, axis=1)
+    published, found = np.split(lines(both, list(run.possible.values())), 2, axis=1)
+    told = [name in frequencies for name in run.possible]
+    published, found = published[told], found[told]
     for k, (name, frequency) in enumerate(frequencies.items()):
         row[f"{name}_hz"] = frequency
         row[f"{name}_kernel_pa"] = published[k]
@@ -86,7 +87,7 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
             row[f"{name}_ratio"] = abs(agreement.scale) * found[k] / published[k]
     row |= _kernel(kernel, agreement) | _effort(response)
     if response.unit == "m":
-        row |= _motion(response, agreement) | _felt(frequencies, found)
+        row |= _motion(response, agreement) | _felt(frequencies, found, every=not run.untold)
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 
@@ -111,14 +112,14 @@ def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _felt(frequencies: Mapping[str, float], amplitudes: Floats) -> dict[str, Any]:
-    """Lines in micrometre and above threshold, and the one that is felt most."""
+def _felt(frequencies: Mapping[str, float], amplitudes: Floats, *, every: bool) -> dict[str, Any]:
+    """Lines in micrometre and above threshold and, if these are all, the one that is felt most."""
     row: dict[str, Any] = {}
     levels = {n: sensation_level(a, f) for (n, f), a in zip(frequencies.items(), amplitudes,
                                                             strict=True)}  # fmt: skip
     for (name, level), amplitude in zip(levels.items(), amplitudes, strict=True):
         row[f"{name}_um"], row[f"{name}_db"] = 1e6 * amplitude, level
-    if levels:
+    if levels and every:
         row["level_db"] = np.max(list(levels.values()), axis=0)
         row["felt_line"] = max(levels, key=lambda name: levels[name].max())
     return row

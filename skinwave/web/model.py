@@ -20,6 +20,7 @@ from simple_model import (
     sensation_level,
     spectrum,
     tacton_lines,
+    told_apart,
 )
 from simple_model.focus import lobe_width, moved_spot
 from simple_model.joined import parted
@@ -40,6 +41,7 @@ MOST_SHOWN = 1500  # points of a curve
 MOST_ENVELOPE = 600  # of the commanded Tacton without its carrier
 HIGHEST = 1000.0  # Hz of spectra
 FAINTEST = 1e-3  # of the strongest line: weaker ones are not named
+UNTRUSTED = 0.5  # of a response: lines that what is left cannot tell apart are not named
 RESOLVED = 10  # samples of a period of the carrier
 
 
@@ -97,12 +99,11 @@ def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | Non
 
 def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
     """The lines of a Tacton in its answer, the strongest first; one name for each frequency."""
-    nyquist = 0.5 / (response.times[1] - response.times[0])
-    resolved = 2 / np.ptp(response.times)
+    possible, untold = possible_lines(scene, response), untold_lines(scene, response)
     known: dict[str, float] = {}
-    for name, f in sorted(tacton_lines(scene.tacton).items(), key=lambda item: len(item[0])):
-        apart = all(abs(f - other) > resolved for other in known.values())
-        if resolved < f <= min(HIGHEST, 0.99 * nyquist) and apart:
+    for name, f in possible.items():
+        told = f > 0 and name not in untold
+        if told and all(abs(f - other) > 1 / response.times[-1] for other in known.values()):
             known[name] = f
     if not known:
         return ()
@@ -124,6 +125,20 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
     ]  # fmt: skip
     found.sort(key=lambda line: -line.amplitude)
     return tuple(x for x in found if x.amplitude > FAINTEST * max(found[0].amplitude, 1e-300))
+
+
+def possible_lines(scene: Scene, response: Response) -> dict[str, float]:
+    """Names and frequencies in Hz of what is looked for, the shortest names first."""
+    highest = min(HIGHEST, 0.99 * 0.5 / (response.times[1] - response.times[0]))
+    found = {n: f for n, f in tacton_lines(scene.tacton).items() if f <= highest}
+    return dict(sorted(found.items(), key=lambda item: len(item[0])))
+
+
+def untold_lines(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Names of lines that the response is too short to tell from 0 Hz or from each other."""
+    possible = possible_lines(scene, response)
+    told = told_apart(response, list(possible.values()), settle=UNTRUSTED)
+    return tuple(name for name, is_told in zip(possible, told, strict=True) if not is_told)
 
 
 def places(side: int = SIDE) -> Floats:

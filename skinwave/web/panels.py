@@ -136,6 +136,7 @@ def line_table() -> None:
             "<td>{{ row.displacement }}</td><td>{{ row.level }}</td>",
             v_for="row in rows", key="row.name",
         )  # fmt: skip
+    html.P("{{ untold }}", v_if="untold", id="untold", style="font-size: 0.86rem")
 
 
 def notices(session: Session) -> None:

@@ -27,7 +27,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
         "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
         "about": False, "drawer": None, "opened": None, "bodies": bodies(own),
-        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [],
+        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "untold": "",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -47,6 +47,7 @@ def answers(
         "kernel_map": _map(kernel), "wave_map": _map(waves),
         "own_speeds": drawings.speeds(tacton) if tacton.trajectory.shape == "recorded" else "",
         "rows": drawings.rows(kernel, None if stale else waves),
+        "untold": untold(len(model.untold_lines(scene, kernel.response)), tacton.duration),
     })  # fmt: skip
     seen = waves.moving if waves else None
     if seen is not None and not stale:
@@ -56,6 +57,14 @@ def answers(
         })  # fmt: skip
     elif seen is None and state.body_motion:
         state.update({"body_shape": {}, "body_motion": {}})
+
+
+def untold(count: int, duration: float) -> str:
+    """What the table of lines leaves out of a Tacton of this duration in s."""
+    if not count:
+        return ""
+    lines = f"{count} line{'s' * (count > 1)}"
+    return f"{lines} cannot be told apart in {duration:g} s; make the Tacton longer."
 
 
 def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> None:
