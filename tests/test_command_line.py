@@ -44,6 +44,7 @@ def test_run_with_each_model(scene, model):
 
 
 def test_compare_a_scene_of_ones_own(scene, capsys):
+    scene.write_text(SMALL.replace("duration_s = 0.05", "duration_s = 0.3"))  # to tell lines apart
     assert main(["compare", str(scene), "--h", "6", "--out", "both"]) == 0
     assert "2 of 2 runs" in capsys.readouterr().out
     folder = scene.parent / "both"
