@@ -16,6 +16,7 @@ from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volume
 Sizing = Callable[[Floats], Floats]
 
 STEPS, SHARE = 12, 0.7  # of the way that a node goes in each
+SHARP = 0.85  # of the mean normal at a node: an edge of 63 degrees
 # Where else a node of a sharp element is tried: how far, of the edges around, and which way.
 TRIED = np.array([0.2, 0.1, 0.05, 0.025] * 2)
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
@@ -32,22 +33,23 @@ def smoothed(
     ----------
     sizing : function of points (n, 3) in metre to edge lengths (n,) asked for; None if equal.
     onto : function that moves points (n, 3) near the surface onto it, along which its nodes then
-        slide, each to the mean of its facets; without it they stay.
+        slide, each to the mean of its facets; without it, and on sharp edges, they stay.
     """
     points, tets = np.array(mesh.points), mesh.tets
     facets = boundary_facets(tets)
-    outer = np.unique(facets)
+    outer = np.isin(np.arange(len(points)), facets)
+    sliding = outer & (_evenness(points, facets) > SHARP) if onto else np.zeros_like(outer)
     for _ in range(STEPS):
         moved = _means(points, tets, corner_volumes(points, tets), sizing)
         moved[outer] = points[outer]
         if onto:
-            moved[outer] = onto(_means(points, facets, _areas(points, facets), sizing)[outer])
+            means = _means(points, facets, _areas(points, facets)[1], sizing)
+            moved[sliding] = onto(means[sliding])
         points = _no_worse(tets, points, points + SHARE * (moved - points))
-    on_surface = np.isin(np.arange(len(points)), outer)
     for node in np.unique(tets[_least_angles(points, tets) < GOOD]):
-        if onto or not on_surface[node]:
-            kept = onto if on_surface[node] else None
-            _widen(points, tets[(tets == node).any(axis=1)], node, kept)
+        if sliding[node] or not outer[node]:
+            patch = tets[(tets == node).any(axis=1)]
+            _widen(points, patch, node, onto if outer[node] else None)
     return replace(mesh, points=points)
 
 
@@ -71,9 +73,19 @@ def _least_angles(points: Floats, tets: Ints) -> Floats:
     return np.asarray(angles_between_faces(points, tets).min(axis=1))
 
 
-def _areas(points: Floats, facets: Ints) -> Floats:
+def _evenness(points: Floats, facets: Ints) -> Floats:
+    """Length (n,) of the mean normal at each node: 1 where its facets lie in a plane."""
+    normals, areas = _areas(points, facets)
+    nodes, n = facets.ravel(), len(points)
+    sums = [np.bincount(nodes, np.repeat(part, 3), n) for part in (*normals.T, areas)]
+    return np.asarray(np.linalg.norm(sums[:3], axis=0) / np.maximum(sums[3], 1e-300))
+
+
+def _areas(points: Floats, facets: Ints) -> tuple[Floats, Floats]:
+    """Normals (k, 3) as long as the areas (k,) of facets, and these."""
     a, b, c = np.moveaxis(points[facets], 1, 0)
-    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+    normals = np.cross(b - a, c - a) / 2
+    return normals, np.asarray(np.linalg.norm(normals, axis=1))
 
 
 def _means(points: Floats, simplices: Ints, measures: Floats, sizing: Sizing | None) -> Floats:

@@ -90,9 +90,9 @@ def test_sides_that_send_nothing_back_need_no_elements():
         "material = {density_kg_m3=1000, shear_modulus_pa=10e3, poisson=0.499, viscosity_pa_s=9}"
     )
     text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
-    required = plan(loads(text), 0.06)
+    required = plan(loads(text), 0.08)
     assert required.model == "flat-body"
-    assert 0 < required.error < 0.06
+    assert 0 < required.error < 0.08
 
 
 @pytest.mark.parametrize(

@@ -79,8 +79,9 @@ def path_of(tacton: Tacton) -> str:
     """Where the foci go."""
     path = tacton.trajectory
     if path.shape == "recorded":
-        what = f"{tacton.n_paths} paths" if tacton.n_paths > 1 else "a path"
-        text = f"{what} recorded for {1 / tacton.drawing_frequency:.4g} s"
+        f_d, n = tacton.drawing_frequency, tacton.n_paths
+        several = f"{n} paths, drawn {f_d:.3f} times a second"
+        text = several if n > 1 else f"a path recorded for {1 / f_d:.4g} s"
         text += " with levels of its own" * bool(path.levels)
     elif path.is_static:
         text = "at rest"
