@@ -219,7 +219,7 @@ def figure(found: Study) -> Figure:
                 ax.scatter(
                     [getattr(m, when) for m in mine], [100 * m.error for m in mine],
                     s=[20 + m.memory / 2**22 for m in mine], color=colour, alpha=0.75, label=model,
-                    edgecolors=["black" if m in front else "none" for m in mine],
+                    edgecolors="black", linewidths=[1.5 * (m in front) for m in mine],
                 )  # fmt: skip
         ax.axhline(100 * found.self_convergence, color="0.5", ls=":", lw=1)
         ax.set(xscale="log", yscale="log")
@@ -234,7 +234,7 @@ def figure(found: Study) -> Figure:
     for handle in legend.legend_handles:
         if handle is not None:
             handle.set_sizes([50])
-            handle.set_edgecolor("none")
+            handle.set_linewidth(0)
     return drawing
 
 
