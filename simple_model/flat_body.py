@@ -35,6 +35,7 @@ from simple_model.steady import (
     harmonics,
     load_lines,
     path_knots,
+    played,
     summed,
 )
 from simple_model.trajectory import Floats
@@ -128,15 +129,9 @@ def steady_state(
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
     f, a = steady_lines(compliance, pressure, probes)
-    displacement = (np.exp(2j * np.pi * np.asarray(times)[:, None] * f) @ a).real
-    effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(f), dofs=len(f))
-    return Response(
-        model="flat-body-harmonic",
-        times=np.array(times),
-        probes=probes,
-        displacement=displacement,
-        effort=effort,
-    )
+    times = np.array(times)
+    effort = {"steps": len(f), "dofs": len(f)}
+    return _timed("flat-body-harmonic", started, times, probes, played(f, a, times), **effort)
 
 
 def flat_body(
@@ -166,13 +161,21 @@ def flat_body(
     answered = _recorded if pressure.tacton.trajectory.shape == "recorded" else _circling
     u = answered(compliance, pressure, probes, w, gain, t)
     displacement = np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None])
-    effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=n, dofs=len(w))
+    effort = {"steps": n, "dofs": len(w)}
+    return _timed("flat-body", started, np.array(times), probes, displacement, **effort)
+
+
+def _timed(
+    model: str, started: float, times: Floats, probes: Floats, displacement: Floats, **effort: int
+) -> Response:
+    """The response, with the seconds since it was started on."""
+    seconds = {"evaluate": time.perf_counter() - started}
     return Response(
-        model="flat-body",
-        times=np.array(times),
+        model=model,
+        times=times,
         probes=probes,
         displacement=displacement,
-        effort=effort,
+        effort=Effort(seconds=seconds, **effort),  # type: ignore[arg-type]
     )
 
 

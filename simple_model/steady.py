@@ -116,6 +116,12 @@ def along_path(values: Floats | Complex) -> Complex:
     return np.asarray(np.fft.fft(values, axis=-1) / k * shift)
 
 
+def played(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
+    """Re sum a exp(2 pi i f t) (t, p) of lines (f,) in Hz with amplitudes (f, p), at times in s."""
+    turn = np.exp(2j * np.pi * np.outer(times, frequencies))
+    return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
+
+
 def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
     """Distinct frequencies (g,) in Hz and the sum (g, ...) of what falls on each."""
     distinct, which = np.unique(np.round(frequencies, 9), return_inverse=True)

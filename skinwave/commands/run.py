@@ -35,18 +35,14 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.run import Run
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
-    from skinwave.simulation import simulate
+    from skinwave.simulation import EXACT, simulate
     from skinwave.studies.study import write_single
 
     scene = read(options.scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
-        if options.h or options.model in (
-            "point-kernel",
-            "flat-body",
-            "flat-body-harmonic",
-        ):  # runs without a plan
+        if options.h or options.model in ("point-kernel", *EXACT):  # runs without a plan
             required_plan(options, scene)
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             response = simulate(

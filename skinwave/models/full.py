@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import Build, operators, surface_load
 from skinwave.models.bodies import build as build_body
@@ -182,8 +182,7 @@ def harmonic_answer(
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
     energy = energy_balance(total)
-    waves = np.exp(2j * np.pi * times[:, None] * frequencies)
-    displacement = (waves @ amplitudes).real
+    displacement = played(frequencies, amplitudes, times)
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
     return _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)

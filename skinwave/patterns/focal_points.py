@@ -14,7 +14,7 @@ from math import isfinite
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Tacton, Trajectory
+from simple_model import Tacton, Trajectory, evenly
 from simple_model.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
 from skinwave.scene import Scene
@@ -99,7 +99,7 @@ def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fals
         levels=tuple(held[1].ravel().tolist()),
         hold=hold,
     )
-    return Tacton(duration=min(last, LONGEST), trajectory=path, foci=tuple(j / n for j in range(n)))
+    return Tacton(duration=min(last, LONGEST), trajectory=path, foci=evenly(n))
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:

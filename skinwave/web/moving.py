@@ -9,6 +9,7 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import MovingPressure
+from simple_model.steady import played
 from skinwave.models.speeds import period, shown_period
 from skinwave.scene import Body
 
@@ -86,10 +87,9 @@ def moving_of(
     seen = frequencies[strength > SEEN * strength.max(initial=0.0)]
     count = int(np.clip(ceil(EACH * span * seen.max(initial=0.0)), FEWEST, MOST))
     t = np.arange(count) * span / count
-    turn = np.exp(2j * np.pi * np.outer(t, frequencies))
-    frames = turn.real @ upwards.real - turn.imag @ upwards.imag
     return Moving(
-        shape=shape, frames=frames, period=span, repeats=period(pressure) is not None,
+        shape=shape, frames=played(frequencies, upwards, t), period=span,
+        repeats=period(pressure) is not None,
     )  # fmt: skip
 
 
