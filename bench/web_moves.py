@@ -77,9 +77,11 @@ def own(page: Page, rng: random.Random) -> None:
 
 
 def shape(page: Page, rng: random.Random) -> None:
-    button = page.locator(f"#shape-{rng.choice(CHOICES['shape'][:5])}")
-    if button.is_visible():  # not while foci have paths of their own
-        button.click()
+    # Not while foci have paths of their own; looked up and clicked at once, as these may come.
+    page.evaluate(
+        "id => { const it = document.getElementById(id); if (it?.offsetParent) it.click(); }",
+        f"shape-{rng.choice(CHOICES['shape'][:5])}",
+    )
 
 
 def choose(page: Page, rng: random.Random) -> None:

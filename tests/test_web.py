@@ -696,6 +696,9 @@ def test_foci_follow_paths_of_their_own(session):
     with session.state:
         moves.preset(session, "am80")
     assert (session.state.paths, session.state.foci) == ("", 1)
+    with session.state:
+        moves.own_path(session, 2, 2, "5")  # typed before the page learned that the path is gone
+    assert (session.state.paths, session.state.errors) == ("", {})
 
 
 def test_foci_run_once_along_their_own_path(session):

@@ -104,7 +104,9 @@ def follow(session: Session, own: str) -> None:
 def own_path(session: Session, which: int, part: int, given: str) -> None:
     """Set the shape, size, x or y (`part` 0 to 3) of one of the paths."""
     text = session.state.typed.get("paths", session.good["paths"])
-    parts = [path.strip().split("/") for path in text.split(",")]
+    parts = [path.strip().split("/") for path in text.split(",") if path.strip()]
+    if which >= len(parts):  # left out while the change was on its way
+        return
     parts[which][part] = str(given).strip().replace(",", ".").replace("/", "")
     turn(session, {"paths": ", ".join("/".join(path) for path in parts)})
 
