@@ -9,28 +9,30 @@
               + int drag rho N_a N_b dV in a layer before them
     K_j     = (relaxing modulus/mu) K of the elements that relax in the same time, see `relaxation`
 
-Near incompressibility the part of lam beyond nu = 0.45 acts on the element mean of the
-dilatation (Nagtegaal, Parks and Rice 1974; Hughes 1980), without which displacements some
-wavelengths away come out several per cent too small.
+Where nu > 0.45 most of lam acts on a projection of the dilatation, see `dilatation`; without that
+displacements some wavelengths away come out several per cent too small.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.boundary import dashpots, fixed_dofs
-from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
+from fem.dilatation import projected_dilatation
+from fem.elements import shape_functions, tetrahedron_rule
+from fem.geometry import gradients, is_straight, jacobians
 from fem.materials import Material, rayleigh_damping
 from fem.pattern import UPPER, Pattern, from_blocks, from_masses
 from fem.relaxation import Branch, on_free
-from meshes import MeshError, TetMesh, facet_set
-from meshes.tetmesh import EDGES, Floats, Ints
+from meshes import TetMesh, facet_set
+from meshes.tetmesh import Floats, Ints
 
 SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
-LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, below which 10-node tetrahedra need no remedy
+LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, up to which 10-node tetrahedra need no remedy
+DIRECT = 2.0  # lam / mu that acts directly beyond it: best between 1 and 3, measured by `verify`
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
 
@@ -85,30 +87,17 @@ def assemble(
         If a facet set is unknown or an element is inverted.
     """
     materials, region = by_region(mesh, material)
-    rho, mu, lam, lag = (
-        np.array([value(m) for m in materials])[region]
-        for value in (
-            lambda m: m.density,
-            lambda m: m.shear_modulus,
-            lambda m: m.first_lame,
-            lambda m: m.viscosity / m.shear_modulus,
-        )
-    )
-    a, b = np.array([rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]).T
     pattern = Pattern.of(mesh.tets, len(mesh.points))
     free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
-    shares = {time: share[region] for time, share in _relaxing_shares(materials).items()}
-    K, C, M, branches = _volume_operators(
-        mesh, pattern, rho, mu, lam, a[region], b[region] + lag, shares
-    )
+    K, C, M, branches = _volume_operators(mesh, pattern, materials, region)
     R = sparse.csr_array(K.shape)
     if absorbing is not None:
         R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
     if drag is not None:
-        R = R + _drag(mesh, pattern, rho * drag)
+        R = R + _drag(mesh, pattern, _of(materials, "density")[region] * drag)
     C = C + R
     if len(free) < mesh.n_dofs:
         K, C, M, R = (operator[free][:, free] for operator in (K, C, M, R))
@@ -116,54 +105,49 @@ def assemble(
     return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
 
 
-def _relaxing_shares(materials: list[Material]) -> dict[float, Floats]:
-    """By relaxation time in s: relaxing over lasting modulus (r,) of the materials that have it."""
-    times = sorted({m.relaxation_time for m in materials if m.relaxing_modulus > 0})
-    return {
-        time: np.array(
-            [(m.relaxation_time == time) * m.relaxing_modulus / m.shear_modulus for m in materials]
-        )
-        for time in times
-    }
+def _of(materials: list[Material], name: str) -> Floats:
+    """A property (r,) of the materials."""
+    return np.array([getattr(m, name) for m in materials], np.float64)
 
 
 def _volume_operators(
-    mesh: TetMesh,
-    pattern: Pattern,
-    rho: Floats,
-    mu: Floats,
-    lam: Floats,
-    mass_rate: Floats,
-    stiffness_lag: Floats,
-    relaxing_shares: Mapping[float, Floats],
+    mesh: TetMesh, pattern: Pattern, materials: list[Material], region: Ints
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
-    """K, C, M and what relaxes in each time, on all degrees of freedom.
+    """K, C, M and what relaxes in each time, on all degrees of freedom."""
+    rho, mu, lam = (_of(materials, name) for name in ("density", "shear_modulus", "first_lame"))
+    mass_rate, hysteretic_lag = np.array(
+        [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
+    ).T
+    direct = np.where(lam > LOCKING_FREE * mu, DIRECT * mu, lam) if mesh.order == 2 else lam
+    blocks, masses = element_matrices(mesh, rho[region], mu[region], direct[region])
+    D = {m: projected_dilatation(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
+    projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
+    K = sum(projected.values(), start=from_blocks(pattern, blocks)).tocsr()
 
-    By element C is mass_rate M + stiffness_lag K, and what relaxes its share of K.
-    """
-    blocks, masses = element_matrices(mesh, rho, mu, lam)
-    K, M = from_blocks(pattern, blocks), from_masses(pattern, masses)
+    def stiffness(share: Floats) -> sparse.csr_array:
+        """K of a share (r,) of each material's."""
+        if np.ptp(share) == 0:
+            return share[0] * K if share[0] else sparse.csr_array(K.shape)
+        summed = from_blocks(pattern, blocks * share[region, None, None])
+        summed = sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
+        summed.eliminate_zeros()
+        return summed
+
+    M = from_masses(pattern, masses)
+    relaxing, times = (_of(materials, name) for name in ("relaxing_modulus", "relaxation_time"))
     branches = tuple(
-        Branch(K=_scaled(pattern, K, blocks, share), time=time)
-        for time, share in relaxing_shares.items()
+        Branch(K=stiffness((times == time) * relaxing / mu), time=time)
+        for time in np.unique(times[relaxing > 0])
     )
-    if np.ptp(mass_rate) == 0 and np.ptp(stiffness_lag) == 0:
-        C = stiffness_lag[0] * K if stiffness_lag[0] else sparse.csr_array(K.shape)
-        return K, C + mass_rate[0] * M if mass_rate[0] else C, M, branches
-    blocks *= stiffness_lag[:, None, None]
-    masses *= mass_rate[:, None, None]
-    return K, from_blocks(pattern, blocks) + from_masses(pattern, masses), M, branches
+    C = stiffness(hysteretic_lag + _of(materials, "viscosity") / mu)
+    if mass_rate.any():
+        C = C + from_masses(pattern, masses * mass_rate[region, None, None])
+    return K, C, M, branches
 
 
-def _scaled(
-    pattern: Pattern, K: sparse.csr_array, blocks: Floats, share: Floats
-) -> sparse.csr_array:
-    """K, which the blocks sum to, of a share (e,) of each element's stiffness."""
-    if np.ptp(share) == 0:
-        return share[0] * K
-    part = from_blocks(pattern, blocks * share[:, None, None])
-    part.eliminate_zeros()
-    return part
+def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
+    """Some of the elements (m,) of a mesh, among all its nodes."""
+    return replace(mesh, tets=mesh.tets[chosen], region=mesh.region[chosen], facets={})
 
 
 def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
@@ -172,8 +156,6 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
     """
     m, n_nodes = mesh.tets.shape
     blocks, masses = np.empty((6, m, n_nodes, n_nodes)), np.empty((m, n_nodes, n_nodes))
-    projected = np.maximum(lam - LOCKING_FREE * mu, 0.0) if mesh.order == 2 else np.zeros(m)
-    direct = lam - projected
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
     NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
     shape_of = mesh.tets[:, :4] if is_straight(mesh) else mesh.tets
@@ -184,19 +166,15 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
         e, q = volumes.shape
         G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
         H = np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
-        l2, m2 = direct[slab, None, None], mu[slab, None, None]
+        l2, m2 = lam[slab, None, None], mu[slab, None, None]
         shear = m2 * np.einsum("eiaib->eab", H)
-        mean = np.einsum("eq,eqia->eia", volumes, slopes)
-        mean *= np.sqrt(projected[slab] / volumes.sum(axis=1))[:, None, None]
         for k, (i, j) in enumerate(UPPER):
             block = blocks[k, slab]
             np.multiply(l2, H[:, i, :, j], out=block)
             block += m2 * H[:, j, :, i]
             if i == j:
                 block += shear
-            if projected[slab].any():
-                block += mean[:, i, :, None] * mean[:, j, None, :]
-        weights = rho[slab, None] * _jacobians(corners, 5, start)[2]
+        weights = rho[slab, None] * jacobians(corners, 5, start)[2]
         masses[slab] = (weights @ NN).reshape(e, n_nodes, n_nodes)
     return blocks, masses
 
@@ -206,55 +184,10 @@ def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
     masses = np.zeros((len(mesh.tets), *2 * mesh.tets.shape[1:]))
     layer = np.flatnonzero(rate)
     none = np.zeros(len(layer))
-    part = replace(mesh, tets=mesh.tets[layer], region=mesh.region[layer], facets={})
-    masses[layer] = element_matrices(part, rate[layer], none, none)[1]
+    masses[layer] = element_matrices(_part(mesh, layer), rate[layer], none, none)[1]
     R = from_masses(pattern, masses)
     R.eliminate_zeros()
     return R
-
-
-def is_straight(mesh: TetMesh) -> bool:
-    """Whether every mid-side node lies in the middle of its edge."""
-    if mesh.order == 1:
-        return True
-    ends = mesh.points[mesh.tets[:, EDGES]]
-    middles = mesh.points[mesh.tets[:, 4:]]
-    bow = np.abs(2 * middles - ends[:, :, 0] - ends[:, :, 1]).max()
-    return bool(bow < 1e-10 * np.abs(ends[:, :, 0] - ends[:, :, 1]).max())
-
-
-def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
-    """Shape gradients (e, q, i, a) and quadrature volumes (e, q); `nodes` (e, a, i) give shape."""
-    derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
-    cofactors, determinants, volumes = _jacobians(nodes, degree, first)
-    inverse = cofactors / determinants[..., None, None]
-    return np.matmul(inverse.swapaxes(2, 3), derivatives.transpose(0, 2, 1)), volumes
-
-
-def _jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
-    """Cofactors (e, q, l, i) and determinants (e, q) of the map from the reference element, and
-    quadrature volumes (e, q). Four nodes span a straight element, where q is 1 for the first two.
-    """
-    barycentric, weights = tetrahedron_rule(degree)
-    at = barycentric[:1] if nodes.shape[1] == 4 else barycentric
-    jacobian = np.einsum(
-        "qal,eai->eqli", shape_derivatives(at, nodes.shape[1]), nodes, optimize=True
-    )
-    x, y, z = (jacobian[..., i] for i in range(3))
-    cofactors = np.empty_like(jacobian)
-    for l in range(3):  # noqa: E741 - the letter of the derivatives
-        m, n = (l + 1) % 3, (l + 2) % 3
-        cofactors[..., l, 0] = y[..., m] * z[..., n] - z[..., m] * y[..., n]
-        cofactors[..., l, 1] = z[..., m] * x[..., n] - x[..., m] * z[..., n]
-        cofactors[..., l, 2] = x[..., m] * y[..., n] - y[..., m] * x[..., n]
-    determinants = (jacobian[..., 0, :] * cofactors[..., 0, :]).sum(axis=-1)
-    inverted = np.flatnonzero((determinants <= 0).any(axis=1))
-    if len(inverted):
-        raise MeshError(
-            f"element {first + inverted[0]} is inverted (and {len(inverted) - 1} more near it); "
-            "straighten its mid-side nodes or remesh"
-        )
-    return cofactors, determinants, determinants * weights / 6
 
 
 def by_region(

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.assembly import LOSS_BAND, SLAB, Operators, assemble, by_region, gradients, is_straight
+from fem.assembly import LOSS_BAND, SLAB, Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
+from fem.geometry import gradients, is_straight
 from fem.materials import Material, rayleigh_damping
 from fem.pattern import UPPER, Pattern, from_blocks
 from meshes import MeshError, TetMesh
@@ -250,7 +251,7 @@ def tangent(part: Part, u: Floats) -> sparse.csr_array:
     for start in range(0, e, SLAB):
         slab = slice(start, start + SLAB)
         _tangent_blocks(part, slab, F[slab], S[slab], blocks[:, slab])
-    return from_blocks(part.pattern, blocks)
+    return from_blocks(part.pattern, blocks).tocsr()
 
 
 def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats, blocks: Floats) -> None:

@@ -49,7 +49,7 @@ class Pattern:
         return summed.astype(np.float64, copy=False)
 
 
-def from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
+def from_blocks(pattern: Pattern, blocks: Floats) -> sparse.bsr_array:
     """Symmetric matrix (3 n, 3 n) of element blocks (k, e, a, b), components UPPER[k]."""
     data = np.empty((len(pattern.indices), 3, 3))
     mirrored = pattern.mirrored()
@@ -58,7 +58,7 @@ def from_blocks(pattern: Pattern, blocks: Floats) -> sparse.csr_array:
         if i != j:
             data[:, j, i] = component[mirrored]
     n = 3 * (len(pattern.indptr) - 1)
-    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n)).tocsr()
+    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
 
 
 def from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:

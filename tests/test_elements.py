@@ -8,7 +8,10 @@ import pytest
 
 import fem
 import meshes
+from fem.assembly import element_matrices
+from fem.dilatation import clusters, projected_dilatation
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
+from fem.pattern import Pattern, from_blocks
 from meshes import TetMesh
 
 
@@ -44,6 +47,39 @@ def test_rigid_motion_has_no_energy(distorted_cube):
     for motion in (np.eye(3)[0] + 0 * x, np.cross([0.3, -0.2, 0.9], x)):
         u = motion.ravel()
         assert abs(u @ K @ u) < 1e-12 * abs(K).sum() / len(u)
+
+
+def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
+    mesh = distorted_cube
+    cluster, sloping = clusters(mesh)
+    assert set(cluster) == set(range(len(sloping)))
+    assert sloping.all()
+    x, y, z = mesh.points.T
+    for u, squared in (
+        (np.stack([x, y, z], axis=1), 9.0),
+        (np.stack([x**2 / 2, 0 * y, y * z], axis=1), 2 / 3 + 1 / 2),  # (x + y)^2
+    ):
+        found = projected_dilatation(mesh) @ u.ravel()
+        assert found @ found == pytest.approx(squared, rel=1e-12)
+    rough = np.random.default_rng(0).standard_normal(mesh.n_dofs)
+    lam = np.ones(len(mesh.tets))
+    direct = from_blocks(
+        Pattern.of(mesh.tets, len(x)), element_matrices(mesh, lam, 0 * lam, lam)[0]
+    )
+    found = projected_dilatation(mesh) @ rough
+    assert found @ found < 0.6 * (rough @ direct @ rough)
+
+
+def test_clusters_are_the_boxes_of_a_mesh_of_boxes():
+    mesh = meshes.block((3.0, 2.0, 1.0), 0.5)
+    cluster, sloping = clusters(mesh)
+    assert (np.bincount(cluster), sloping.all()) == (pytest.approx(6), True)
+    centres = mesh.points[mesh.tets[:, :4]].mean(axis=1)
+    lowest, highest = (
+        np.array([side(centres[cluster == c], axis=0) for c in range(len(sloping))])
+        for side in (np.min, np.max)
+    )
+    assert (highest - lowest).max() < 0.5
 
 
 def test_mass_and_weight_are_those_of_the_body(distorted_cube):
