@@ -118,7 +118,7 @@ def _volume_operators(
     mass_rate, hysteretic_lag = np.array(
         [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
     ).T
-    direct = np.where(lam > LOCKING_FREE * mu, DIRECT * mu, lam) if mesh.order == 2 else lam
+    direct = direct_part(lam, mu) if mesh.order == 2 else lam
     blocks, masses = element_matrices(mesh, rho[region], mu[region], direct[region])
     D = {m: projected_dilatation(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
     projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
@@ -143,6 +143,11 @@ def _volume_operators(
     if mass_rate.any():
         C = C + from_masses(pattern, masses * mass_rate[region, None, None])
     return K, C, M, branches
+
+
+def direct_part(lam: Floats, mu: Floats) -> Floats:
+    """What of lam (r,) acts on the dilatation itself, in Pa; the rest does on its projection."""
+    return np.where(lam > LOCKING_FREE * mu, DIRECT * mu, lam)
 
 
 def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:

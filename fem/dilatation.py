@@ -20,29 +20,40 @@ from meshes.tetmesh import EDGES, FACES, Floats, Ints
 
 def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
     """D (4 c, 3 n) of a mesh of ten-node tetrahedra in c clusters: |D u|^2 is the integral of the
-    squared projection of div u.
+    squared projection of div u, and D u its coefficients by the `linear_functions`.
     """
     cluster, sloping = clusters(mesh)
-    barycentric, _ = tetrahedron_rule(2)
-    nodes = mesh.points[mesh.tets[:, :4] if is_straight(mesh) else mesh.tets]
-    slopes, volumes = gradients(nodes, 10, 2, 0)
-    x = np.einsum("qa,eai->eqi", shape_functions(barycentric, nodes.shape[1]), nodes)
-    q = _centred(x, volumes, cluster)
-    q[..., 1:] *= sloping[cluster, None, None]  # elsewhere the mean alone
-
-    products = np.einsum("eq,eqv,eqw->evw", volumes, q, q).reshape(-1, 16)
-    moments = np.stack([np.bincount(cluster, p) for p in products.T], axis=1).reshape(-1, 4, 4)
-    moments[~sloping, 1:, 1:] = np.eye(3)
-    orthonormal = np.linalg.inv(np.linalg.cholesky(moments))
-
+    slopes, volumes = gradients(_shape(mesh), 10, 2, 0)
+    q = linear_functions(mesh, cluster, sloping)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
     starts = 10 * np.arange(len(cluster) + 1)
     by_element = sparse.bsr_array(
         (values, mesh.tets.ravel(), starts), shape=(4 * len(cluster), mesh.n_dofs)
     )
     order = np.argsort(cluster, kind="stable")
-    starts = np.searchsorted(cluster[order], np.arange(len(moments) + 1))
-    return sparse.bsr_array((orthonormal[cluster[order]], order, starts)) @ by_element
+    ones = np.broadcast_to(np.eye(4), (len(cluster), 4, 4))
+    starts = np.searchsorted(cluster[order], np.arange(len(sloping) + 1))
+    return sparse.bsr_array((ones, order, starts)) @ by_element
+
+
+def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -> Floats:
+    """1, x, y and z made orthonormal over each of the `clusters`, in m^-3/2, at the points of each
+    element for degree 2 (e, q, 4); 1 alone, and else 0, where nothing slopes.
+    """
+    nodes = _shape(mesh)
+    barycentric, _ = tetrahedron_rule(2)
+    _, volumes = gradients(nodes, 10, 2, 0)
+    x = np.einsum("qa,eai->eqi", shape_functions(barycentric, nodes.shape[1]), nodes)
+    size = np.bincount(cluster, volumes.sum(axis=1))
+    moments = np.einsum("eq,eqi->ie", volumes, x)
+    middle = np.stack([np.bincount(cluster, m) for m in moments], axis=1) / size[:, None]
+    q = np.ones((*volumes.shape, 4))
+    q[..., 1:] = (x - middle[cluster, None]) / np.cbrt(size)[cluster, None, None]
+    q[..., 1:] *= sloping[cluster, None, None]
+    products = np.einsum("eq,eqv,eqw->vwe", volumes, q, q).reshape(16, -1)
+    products = np.stack([np.bincount(cluster, p) for p in products], axis=1).reshape(-1, 4, 4)
+    products[~sloping, 1:, 1:] = np.eye(3)
+    return q @ np.linalg.inv(np.linalg.cholesky(products)).swapaxes(1, 2)[cluster]
 
 
 def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
@@ -81,14 +92,9 @@ def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
     return cluster, names < len(around)
 
 
-def _centred(x: Floats, volumes: Floats, cluster: Ints) -> Floats:
-    """1 and the coordinates from the middle of each cluster over its size (e, q, 4), at x."""
-    size = np.bincount(cluster, volumes.sum(axis=1))
-    moments = np.einsum("eq,eqi->ie", volumes, x)
-    middle = np.stack([np.bincount(cluster, m) for m in moments], axis=1) / size[:, None]
-    q = np.ones((*volumes.shape, 4))
-    q[..., 1:] = (x - middle[cluster, None]) / np.cbrt(size)[cluster, None, None]
-    return q
+def _shape(mesh: TetMesh) -> Floats:
+    """The nodes (e, a, 3) that give each element its shape."""
+    return mesh.points[mesh.tets[:, :4] if is_straight(mesh) else mesh.tets]
 
 
 def _neighbours(tets: Ints) -> Ints:

@@ -218,18 +218,19 @@ def _layers(plane: Floats, triangles: Ints, z: Floats) -> tuple[Floats, Ints]:
 def _rectangle_triangles(x: Floats, y: Floats) -> Ints:
     """Two triangles a cell with alternating diagonals, nodes ordered by parity."""
     nx, ny = len(x) - 1, len(y) - 1
+    # By parity about the origin, under the focus, whose elements then look the same in every mesh,
+    # whole or part. The corners of a cell all differ in rank, and its diagonal joins the first to
+    # the last, so that the six tetrahedra above a cell have their longest edge in common.
+    at_x, at_y = np.argmin(np.abs(x)), np.argmin(np.abs(y))
     j, i = np.divmod(np.arange(nx * ny), nx)
     a, b = j * (nx + 1) + i, j * (nx + 1) + i + 1
     d, c = a + nx + 1, b + nx + 1
-    even = ((i + j) % 2 == 0)[:, None]
+    even = ((i - at_x + j - at_y) % 2 == 0)[:, None]
     first = np.where(even, np.column_stack([a, b, c]), np.column_stack([a, b, d]))
     second = np.where(even, np.column_stack([a, c, d]), np.column_stack([b, c, d]))
     triangles = np.vstack([first, second])
     row, column = np.divmod(triangles, nx + 1)
-    # By parity about the origin, under the focus, whose elements then look the same in every mesh,
-    # whole or part, and in the better of two ways; the corners of a cell all differ.
-    column, row = column - np.argmin(np.abs(x)), row - np.argmin(np.abs(y))
-    rank = np.argsort(2 * (column % 2) + row % 2, axis=1)
+    rank = np.argsort(2 * ((column - at_x) % 2) + (row - at_y) % 2, axis=1)
     return np.take_along_axis(triangles, rank, axis=1)
 
 

@@ -7,6 +7,8 @@ from scipy import sparse
 
 import fem
 import meshes
+from fem.assembly import direct_part
+from fem.dilatation import clusters, linear_functions, projected_dilatation
 from fem.elements import shape_derivatives
 from meshes import TetMesh
 from meshes.tetmesh import Ints
@@ -220,15 +222,21 @@ def _pressure_errors(mesh: TetMesh, u: Floats, material: fem.Material) -> tuple[
 def _element_pressures(
     mesh: TetMesh, u: Floats, material: fem.Material, chosen: Ints
 ) -> tuple[Floats, Floats]:
-    """Minus the bulk modulus times the mean dilatation of elements, and their volumes."""
-    corners = mesh.points[mesh.tets[chosen, :4]]
+    """Mean pressures of elements, most of it from the projected dilatation, and their volumes."""
+    corners = mesh.points[mesh.tets[:, :4]]
     edges = corners[:, 1:] - corners[:, :1]
     # The gradient of a quadratic field is linear: its mean is its value in the middle.
     D = shape_derivatives(np.full((1, 4), 0.25), 10)[0]
-    moved = u.reshape(-1, 3)[mesh.tets[chosen]]
+    moved = u.reshape(-1, 3)[mesh.tets]
     dilatation = np.einsum("eai,al,eil->e", moved, D, np.linalg.inv(edges), optimize=True)
-    bulk = material.first_lame + 2 / 3 * material.shear_modulus
-    return -bulk * dilatation, np.linalg.det(edges) / 6
+    cluster, sloping = clusters(mesh)
+    at_points = linear_functions(mesh, cluster, sloping)
+    coefficients = (projected_dilatation(mesh) @ u).reshape(-1, 4)[cluster]
+    projected = np.einsum("eqv,ev->eq", at_points, coefficients).mean(axis=1)
+    lam, mu = np.array([material.first_lame]), np.array([material.shear_modulus])
+    direct = direct_part(lam, mu)
+    pressure = -(direct + 2 / 3 * mu) * dilatation - (lam - direct) * projected
+    return pressure[chosen], np.linalg.det(edges)[chosen] / 6
 
 
 def _cells(mesh: TetMesh, chosen: Ints) -> Ints:
