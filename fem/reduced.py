@@ -96,19 +96,18 @@ def reduce(
     K, C, M = operators.K, operators.C, operators.M
     shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift)
     factor = factorise(shifted, backend=solver)
-    space = _Space(M, moving.shape[1] * (MOST_MOMENTS + 1))
-    large = [K, C, *(branch.K for branch in branches)]
-    small = [np.empty((0, 0)) for _ in large]
+    others = [C, *(branch.K for branch in branches)]
+    space = _Space([M, *others], moving.shape[1] * (MOST_MOMENTS + 1))
+    small = [np.empty((0, 0)) for _ in [K, *others]]
     errors: list[float] = []
     before = None
     grown = _moments(space, operators, shift, factor, moving)
     for moment in range(1, MOST_MOMENTS + 1):
         next(grown)
-        new = space.basis[:, len(small[0]) :]
-        small = [
-            _bordered(part, space.basis.T @ (whole @ new))
-            for part, whole in zip(small, large, strict=True)
-        ]
+        basis, images = space.basis, space.images
+        new = slice(len(small[0]), None)
+        moved = [K @ basis[:, new], *(image[:, new] for image in images[1:])]
+        small = [_bordered(part, basis.T @ f) for part, f in zip(small, moved, strict=True)]
         if moment % (RELAXING_BATCH if branches else BATCH):
             continue
         weights = None if loads is None else space.basis.T @ loads[free]
@@ -142,7 +141,7 @@ def _moments(
     space: "_Space", operators: Operators, shift: float, factor: Factor, seeds: Floats
 ) -> Iterator[None]:
     """Adds the next moment of seeds (n, p) to the space at each turn."""
-    C, M, branches = operators.C, operators.M, operators.branches
+    branches = operators.branches
     lags = [branch.time / (1 + shift * branch.time) for branch in branches]
     # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift, what has relaxed):
     # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
@@ -153,10 +152,11 @@ def _moments(
     while True:
         yield
         taken, newest = _append(taken, newest)
-        y, y_before, *y_relaxed = (space.basis @ part for part in newest)
-        rest = C @ y + 2 * shift * (M @ y) + shift * (M @ y_before)
-        for branch, lag, part in zip(branches, lags, y_relaxed, strict=True):
-            rest += lag * (branch.K @ part)
+        y, y_before, *y_relaxed = newest
+        M, C, *K_relaxing = space.images  # times the basis, whose coordinates these are
+        rest = C @ y + M @ (shift * (2 * y + y_before))
+        for K, lag, part in zip(K_relaxing, lags, y_relaxed, strict=True):
+            rest += K @ (lag * part)
         upper = space.extend(-factor.solve(rest))
         lower, _, *before = (_padded(part, len(upper)) for part in newest)
         relaxed = [
@@ -184,40 +184,55 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 
 
 class _Space:
-    """A growing mass-orthonormal basis (n, size); memory is touched only as far as it is used."""
+    """A growing mass-orthonormal basis (n, size), and its `images` under M and other matrices,
+    which all later products with them come from; memory is touched only as far as it is used.
+    """
 
-    def __init__(self, M: sparse.csr_array, most: int) -> None:
-        self._M = M
-        self._columns = np.empty((M.shape[0], most), order="F")
+    def __init__(self, matrices: list[sparse.csr_array], most: int) -> None:
+        self._matrices = matrices
+        shape = (matrices[0].shape[0], most)
+        self._columns = [np.empty(shape, order="F") for _ in [None, *matrices]]
         self.size = 0
 
     @property
     def basis(self) -> Floats:
-        return self._columns[:, : self.size]
+        return self._columns[0][:, : self.size]
+
+    @property
+    def images(self) -> list[Floats]:
+        return [columns[:, : self.size] for columns in self._columns[1:]]
 
     def extend(self, block: Floats) -> Floats:
         """Add the directions of a block (n, k) that are new; its coordinates (size, k)."""
-        M, Q = self._M, self.basis
-        scale = _mass_norms(M, block)
-        block, overlap = block / scale, 0.0
+        M, *others = self._matrices
+        Q, MQ = self.basis, self.images[0]
+        scale = _norms(block, M @ block)
+        block, overlap = block / scale, np.zeros((self.size, len(scale)))
         for _ in range(2):  # twice is enough
-            coordinates = Q.T @ (M @ block)
+            coordinates = MQ.T @ block
             block = block - Q @ coordinates
             overlap = overlap + coordinates
-        left = _mass_norms(M, block)
-        block = block / left
-        squares, directions = np.linalg.eigh(block.T @ (M @ block))
+        image = M @ block
+        left = _norms(block, image)
+        block, image = block / left, image / left
+        squares, directions = np.linalg.eigh(block.T @ image)
         new = block @ (directions[:, squares > DEPENDENT * squares.max()])
         for _ in range(2):
-            new = new - Q @ (Q.T @ (M @ new))
-            new = np.linalg.solve(np.linalg.cholesky(new.T @ (M @ new)), new.T).T
-        self._columns[:, self.size : self.size + new.shape[1]] = new
-        self.size += new.shape[1]
-        return np.vstack([overlap, (new.T @ (M @ block)) * left]) * scale
+            new = new - Q @ (MQ.T @ new)
+            image = M @ new
+            upright = np.linalg.inv(np.linalg.cholesky(new.T @ image)).T
+            new, image = new @ upright, image @ upright
+        grown = slice(self.size, self.size + new.shape[1])
+        parts = [new, image, *(other @ new for other in others)]
+        for columns, part in zip(self._columns, parts, strict=True):
+            columns[:, grown] = part
+        self.size = grown.stop
+        return np.vstack([overlap, (image.T @ block) * left]) * scale
 
 
-def _mass_norms(M: sparse.csr_array, block: Floats) -> Floats:
-    return np.sqrt(np.einsum("nk,nk->k", block, M @ block))
+def _norms(block: Floats, image: Floats) -> Floats:
+    """Mass norms (k,) of columns with their image under M."""
+    return np.sqrt(np.einsum("nk,nk->k", block, image))
 
 
 def _padded(coordinates: Floats, size: int) -> Floats:
