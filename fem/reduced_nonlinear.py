@@ -18,7 +18,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
+from scipy.sparse.linalg import LinearOperator
 
 from fem.assembly import Operators
 from fem.finite_strain import (
@@ -62,6 +63,7 @@ def stretching_modes(
     membrane: Membrane,
     n: int,
     *,
+    added: LinearOperator | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
@@ -71,8 +73,12 @@ def stretching_modes(
     ----------
     operators : the sheet's linear operators, from `assemble`
     membrane : all that resists stretching, among the nodes of the mesh
+    added : (n_free, n_free), kg, mass of what moves with the sheet, as `added_mass` gives it; the
+        modes with it are made of the n lowest without
     """
     hz, shapes = modes(operators, n, solver=solver)
+    if added is not None:
+        hz, shapes = _with_added(operators, added, hz, shapes)
     part = membrane_part(mesh, membrane)
     w = shapes.reshape(-1, 3, n)[:, 2]
     slopes = (part.D @ w).reshape(*part.G.shape[:3], n)  # (e, q, k, m)
@@ -94,6 +100,16 @@ def stretching_modes(
         basis=shapes, hz=hz, H=H, left_out=left_out,
         elastic=modal_elastic(modal, H, stress_lag(membrane.material)),
     )  # fmt: skip
+
+
+def _with_added(
+    operators: Operators, added: LinearOperator, hz: Floats, shapes: Floats
+) -> tuple[Floats, Floats]:
+    """Modes with a further mass, by Rayleigh and Ritz from those without."""
+    free = shapes[operators.free]
+    mass = np.eye(len(hz)) + free.T @ (added @ free)
+    squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), (mass + mass.T) / 2)
+    return np.sqrt(squares) / (2 * np.pi), shapes @ turn
 
 
 def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
