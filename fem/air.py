@@ -17,10 +17,12 @@ beside the sheet would take as much energy as a loss factor of
 
     (rho w / pi c) (int u dA)^2 / int m u^2 dA
 
-of a mode u in which the sheet pushes more to one side than to the other.
+of a mode u in which the sheet pushes more to one side than to the other: 0.006 to 0.007 for such
+modes of a clamped sheet of office paper, 100 mm wide, below 300 Hz, where paper's own is 0.03.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import fft, sparse
@@ -34,6 +36,18 @@ FLAT = np.eye(3)[:2]
 UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Added:
+    """What moves with a body: `M` (n_free, n_free) in kg, and `rate` in 1/s of the force rate M u'.
+
+    Rayleigh damping stands for a loss factor at the frequencies of a body of a certain mass; with
+    more of it, what goes with mass must grow as well, or the loss factor would sink.
+    """
+
+    M: LinearOperator
+    rate: float = 0.0
+
+
 def added_mass(
     mesh: TetMesh,
     operators: Operators,
@@ -42,8 +56,9 @@ def added_mass(
     axes: Floats = FLAT,
     mirrored: str = "",
     facets: str | Ints = "top",
-) -> LinearOperator:
-    """M (n_free, n_free) in kg of the fluid on both sides of a sheet in a baffle.
+    rate: float = 0.0,
+) -> Added:
+    """The fluid on both sides of a sheet in a baffle, without loss of its own.
 
     Parameters
     ----------
@@ -53,6 +68,7 @@ def added_mass(
     axes : (2, 3) unit vectors along the sides of the rectangle
     mirrored : those of "xy" in whose positive half the mesh lies, the motion being the same in the
         other half; M is then of the part that is meshed
+    rate : float, 1/s, of the sheet's own Rayleigh damping by mass
 
     Raises
     ------
@@ -73,20 +89,23 @@ def added_mass(
     read = sparse.csr_array(
         (normal.ravel(), (places.ravel(), dofs.ravel())), shape=(len(nodes), mesh.n_dofs)
     )[:, operators.free]
-    field = near_field(shape, (dy, dx), tuple(axis in mirrored for axis in "yx"))
+    field = near_field(shape, (dy, dx), [axis in mirrored for axis in "yx"])
 
     def apply(u: Floats) -> Floats:
         w = (read @ u).T.reshape(-1, *shape)
         return density / np.pi * dy * dx * (read.T @ field(w).reshape(-1, len(nodes)).T)
 
     n = len(operators.free)
-    return LinearOperator(
+    M = LinearOperator(
         (n, n), dtype=np.float64, matmat=apply, matvec=lambda u: apply(u.reshape(n, 1))
     )
+    return Added(M=M, rate=rate)
 
 
 def near_field(
-    shape: tuple[int, int], spacing: tuple[float, float], mirrored: tuple[bool, bool] = (False, False)
+    shape: tuple[int, int],
+    spacing: tuple[float, float],
+    mirrored: Sequence[bool] = (False, False),
 ) -> Callable[[Floats], Floats]:
     """int w(y) / |x - y| dA (k, ny, nx) in metre of fields w (k, ny, nx) at nodes of a grid.
 
@@ -121,7 +140,9 @@ def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
     def corner(x: Floats, y: Floats) -> Floats:
         return x * np.arcsinh(y / np.abs(x)) + y * np.arcsinh(x / np.abs(y))
 
-    (west, east), (south, north) = ((at - a / 2, at + a / 2) for at, a in zip((x, y), size, strict=True))
+    (west, east), (south, north) = (
+        (at - a / 2, at + a / 2) for at, a in zip((x, y), size, strict=True)
+    )
     return corner(east, north) - corner(west, north) - corner(east, south) + corner(west, south)
 
 

@@ -9,8 +9,8 @@ with proportional damping the plain recurrence loses all accuracy after a few do
 What has relaxed of y, y / (1 + s tau_j), is a further part of the linearised vectors: its moments
 lie in the same space, so that these are the moments of the exact law.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
-An added mass that is dense, as that of air, takes no part in making the space; it is projected onto
-it, and counts in the error estimate.
+Mass that moves along with a body, as air does, is dense: it is applied, never factorised, and the
+systems at the shift are solved by conjugate gradients, preconditioned by the factors without it.
 
 The error estimate needs no solution of the full system: it is the residual of the smaller model
 answered in the space of the next moments, where Galerkin's method makes the two answers' difference
@@ -22,9 +22,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, sparse
-from scipy.sparse.linalg import LinearOperator
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
+from fem.air import Added
 from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
 from fem.relaxation import Branch, relaxing_stiffness
@@ -40,6 +41,7 @@ BATCH = 5  # moments between two looks at the error estimate
 RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which relaxes
 MOST_MOMENTS = 200
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
+SOLVED, MOST_TURNS = 1e-10, 100  # residual of conjugate gradients over the load; usually some ten
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,7 +71,7 @@ def reduce(
     tolerance: float = 1e-3,
     *,
     loads: Floats | None = None,
-    added: LinearOperator | None = None,
+    added: Added | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -84,7 +86,7 @@ def reduce(
     tolerance : float, relative error of the probes' displacement at any frequency of the band
     loads : (3 n, k), typical nodal forces by which the error is judged; without any it is judged
         by the probes' adjoint fields in the whole body, which asks for far more moments
-    added : (n_free, n_free), kg, mass of what moves with the body, as `added_mass` gives it
+    added : what moves with the body, as `added_mass` gives it
     progress : called with the fraction done, as the error estimate approaches the tolerance
 
     Raises
@@ -101,9 +103,13 @@ def reduce(
     K, C, M = operators.K, operators.C, operators.M
     shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift)
     factor = factorise(shifted, backend=solver)
+    if added is not None:
+        along = (shift * added.rate + shift**2) * added.M
+        factor = replace(factor, solve=_with_added(factor.solve, shifted, along))
+        C, M = aslinearoperator(C) + added.rate * added.M, aslinearoperator(M) + added.M
+        operators = replace(operators, C=C, M=M)
     space = _Space(M, moving.shape[1] * (MOST_MOMENTS + 1))
-    along = sparse.csr_array(M.shape) if added is None else added
-    large = [K, C, along, *(branch.K for branch in branches)]
+    large = [K, C, *(branch.K for branch in branches)]
     small = [np.empty((0, 0)) for _ in large]
     errors: list[float] = []
     before = None
@@ -118,7 +124,8 @@ def reduce(
         if moment % (RELAXING_BATCH if branches else BATCH):
             continue
         weights = None if loads is None else space.basis.T @ loads[free]
-        now = _probe_response(*_model(small, branches), space.basis.T @ seeds, weights, band)
+        model = (small[0], small[1], _branches(small[2:], branches))
+        now = _probe_response(*model, space.basis.T @ seeds, weights, band)
         errors += [] if before is None else [_change(before, now)]
         before = now
         if progress and errors:
@@ -130,34 +137,41 @@ def reduce(
             f"{MOST_MOMENTS} moments leave an error of {_tail(errors):.2g}, above the tolerance "
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )
-    small_K, small_C, mass, small_branches = _model(small, branches)
-    model = ReducedModel(
+    return ReducedModel(
         basis=operators.expand(space.basis),
-        K=small_K,
-        C=small_C,
+        K=small[0],
+        C=small[1],
         R=space.basis.T @ (operators.R @ space.basis),
         outputs=seeds.T @ space.basis,
         moments=moment,
         estimate=_tail(errors),
         solver=factor.backend,
-        branches=small_branches,
+        branches=_branches(small[2:], branches),
     )
-    return model if added is None else _of_unit_mass(model, mass)
 
 
-def _of_unit_mass(model: ReducedModel, mass: Floats) -> ReducedModel:
-    """A model of another mass (r, r), in coordinates in which it is the identity."""
-    turn = linalg.solve_triangular(np.linalg.cholesky(mass), np.eye(len(mass)), lower=True).T
+def _with_added(
+    solve: Callable[[Floats], Floats], A: sparse.csr_array, along: LinearOperator
+) -> Callable[[Floats], Floats]:
+    """Solves (A + along) x = b (n, k) by conjugate gradients, preconditioned by what solves A."""
 
-    def turned(A: Floats) -> Floats:
-        return np.asarray(turn.T @ A @ turn)
+    def solved(b: Floats) -> Floats:
+        x, r = np.zeros_like(b), b
+        z = p = solve(r)
+        for _ in range(MOST_TURNS):
+            if (np.linalg.norm(r, axis=0) <= SOLVED * np.linalg.norm(b, axis=0)).all():
+                return x
+            q, rz = A @ p + along @ p, (r * z).sum(axis=0)
+            step = rz / (p * q).sum(axis=0)
+            x, r = x + step * p, r - step * q
+            z = solve(r)
+            p = z + (r * z).sum(axis=0) / rz * p
+        raise ArithmeticError(
+            f"{MOST_TURNS} turns of conjugate gradients leave more than {SOLVED:g} of a load; the "
+            "mass added must not be many times the body's own"
+        )
 
-    return replace(
-        model,
-        basis=model.basis @ turn, K=turned(model.K), C=turned(model.C), R=turned(model.R),
-        outputs=model.outputs @ turn,
-        branches=tuple(replace(branch, K=turned(branch.K)) for branch in model.branches),
-    )  # fmt: skip
+    return solved
 
 
 def _moments(
@@ -201,7 +215,7 @@ def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
 def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Complex:
     """Probe displacement (f, p, k) in metre per unit of the reduced forces (r, k) at each Hz."""
     w = 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))
-    Z = _impedance(model.K, model.C, np.eye(len(model.K)), model.branches, w)
+    Z = _impedance(model.K, model.C, model.branches, w)
     return model.outputs @ np.linalg.solve(Z, np.broadcast_to(forces, (len(w), *forces.shape)))
 
 
@@ -269,28 +283,19 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
     return grown
 
 
-def _model(
-    small: list[Floats], large: tuple[Branch, ...]
-) -> tuple[Floats, Floats, Floats, tuple[Branch, ...]]:
-    """K, C, M and the branches of the small model, from projections of K, C, the added mass and
-    the large model's branches.
-    """
-    K, C, along, *relaxing = small
-    branches = (Branch(K=K, time=b.time) for K, b in zip(relaxing, large, strict=True))
-    return K, C, np.eye(len(along)) + along, tuple(branches)
+def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[Branch, ...]:
+    """The large model's branches with the small model's stiffness."""
+    return tuple(Branch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
 
 
-def _impedance(
-    K: Floats, C: Floats, M: Floats, branches: tuple[Branch, ...], w: Floats
-) -> Complex:
+def _impedance(K: Floats, C: Floats, branches: tuple[Branch, ...], w: Floats) -> Complex:
     s = 1j * w[:, None, None]
-    return np.asarray(K + s * C + s**2 * M + relaxing_stiffness(branches, s))
+    return np.asarray(K + s * C + s**2 * np.eye(len(K)) + relaxing_stiffness(branches, s))
 
 
 def _probe_response(
     K: Floats,
     C: Floats,
-    M: Floats,
     branches: tuple[Branch, ...],
     seeds: Floats,
     loads: Floats | None,
@@ -299,7 +304,7 @@ def _probe_response(
     """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
     w = 2 * np.pi * np.linspace(0, band, 41)
     # One by one: all at once would be as large as the body's own factors.
-    fields = (np.linalg.solve(_impedance(K, C, M, branches, at)[0], seeds) for at in w[:, None])
+    fields = (np.linalg.solve(_impedance(K, C, branches, at)[0], seeds) for at in w[:, None])
     return np.array([x if loads is None else loads.T @ x for x in fields])
 
 

@@ -6,11 +6,10 @@ from math import isfinite
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator
 
-from fem.air import added_mass
-from fem.assembly import Operators, assemble
-from fem.materials import Material
+from fem.air import Added, added_mass
+from fem.assembly import LOSS_BAND, Operators, assemble
+from fem.materials import Material, rayleigh_damping
 from fem.surface import facet_normals, facet_points, load_operator
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
 from meshes.intake import FINE_RADIUS
@@ -108,13 +107,14 @@ def operators(build: Build) -> Operators:
     )
 
 
-def air(body: Body, build: Build, operators: Operators) -> LinearOperator | None:
-    """Mass of the air that moves with a meshed sheet, for `fem.reduce`; None in vacuum."""
+def air(body: Body, build: Build, operators: Operators) -> Added | None:
+    """The air that moves with a meshed sheet, for `fem.reduce`; None in vacuum."""
     if not body.air:
         return None
+    by_mass, _ = rayleigh_damping(body.solid.loss_factor, LOSS_BAND)
     sides = body.placement.rotation.T[:2]
     return added_mass(
-        build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry
+        build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry, rate=by_mass
     )
 
 
