@@ -92,8 +92,8 @@ def added_mass(
     field = near_field(shape, (dy, dx), [axis in mirrored for axis in "yx"])
 
     def apply(u: Floats) -> Floats:
-        w = (read @ u).T.reshape(-1, *shape)
-        return density / np.pi * dy * dx * (read.T @ field(w).reshape(-1, len(nodes)).T)
+        w = (read @ u).T.reshape(u.shape[1], *shape)
+        return density / np.pi * dy * dx * (read.T @ field(w).reshape(u.shape[1], len(nodes)).T)
 
     n = len(operators.free)
     M = LinearOperator(

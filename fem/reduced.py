@@ -9,8 +9,8 @@ with proportional damping the plain recurrence loses all accuracy after a few do
 What has relaxed of y, y / (1 + s tau_j), is a further part of the linearised vectors: its moments
 lie in the same space, so that these are the moments of the exact law.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
-Mass that moves along with a body, as air does, is dense: it is applied, never factorised, and the
-systems at the shift are solved by conjugate gradients, preconditioned by the factors without it.
+Mass that moves along with a body, as air does, is dense and can only be applied: with it the shift
+is 0, where no mass is factorised.
 
 The error estimate needs no solution of the full system: it is the residual of the smaller model
 answered in the space of the next moments, where Galerkin's method makes the two answers' difference
@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, aslinearoperator
+from scipy.sparse.linalg import aslinearoperator
 
 from fem.air import Added
 from fem.assembly import Operators
@@ -40,8 +40,8 @@ RELAXING_SHIFT = 1.0
 BATCH = 5  # moments between two looks at the error estimate
 RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which relaxes
 MOST_MOMENTS = 200
+SMALLEST = np.finfo(np.float64).tiny
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
-SOLVED, MOST_TURNS = 1e-10, 100  # residual of conjugate gradients over the load; usually some ten
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +86,7 @@ def reduce(
     tolerance : float, relative error of the probes' displacement at any frequency of the band
     loads : (3 n, k), typical nodal forces by which the error is judged; without any it is judged
         by the probes' adjoint fields in the whole body, which asks for far more moments
-    added : what moves with the body, as `added_mass` gives it
+    added : what moves with the body, as `added_mass` gives it; something must hold the body then
     progress : called with the fraction done, as the error estimate approaches the tolerance
 
     Raises
@@ -100,14 +100,11 @@ def reduce(
     if not moving.size:
         raise ValueError("no probe can move, all lie where the body is held; move one inwards")
     shift = 2 * np.pi * RELAXING_SHIFT * band if branches else SHIFT
-    K, C, M = operators.K, operators.C, operators.M
-    shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift)
-    factor = factorise(shifted, backend=solver)
     if added is not None:
-        along = (shift * added.rate + shift**2) * added.M
-        factor = replace(factor, solve=_with_added(factor.solve, shifted, along))
-        C, M = aslinearoperator(C) + added.rate * added.M, aslinearoperator(M) + added.M
-        operators = replace(operators, C=C, M=M)
+        shift, operators = 0.0, _with_added(operators, added)
+    K, C, M = operators.K, operators.C, operators.M
+    shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift) if shift else K
+    factor = factorise(shifted, backend=solver)
     space = _Space(M, moving.shape[1] * (MOST_MOMENTS + 1))
     large = [K, C, *(branch.K for branch in branches)]
     small = [np.empty((0, 0)) for _ in large]
@@ -150,28 +147,10 @@ def reduce(
     )
 
 
-def _with_added(
-    solve: Callable[[Floats], Floats], A: sparse.csr_array, along: LinearOperator
-) -> Callable[[Floats], Floats]:
-    """Solves (A + along) x = b (n, k) by conjugate gradients, preconditioned by what solves A."""
-
-    def solved(b: Floats) -> Floats:
-        x, r = np.zeros_like(b), b
-        z = p = solve(r)
-        for _ in range(MOST_TURNS):
-            if (np.linalg.norm(r, axis=0) <= SOLVED * np.linalg.norm(b, axis=0)).all():
-                return x
-            q, rz = A @ p + along @ p, (r * z).sum(axis=0)
-            step = rz / (p * q).sum(axis=0)
-            x, r = x + step * p, r - step * q
-            z = solve(r)
-            p = z + (r * z).sum(axis=0) / rz * p
-        raise ArithmeticError(
-            f"{MOST_TURNS} turns of conjugate gradients leave more than {SOLVED:g} of a load; the "
-            "mass added must not be many times the body's own"
-        )
-
-    return solved
+def _with_added(operators: Operators, added: Added) -> Operators:
+    """The operators of a body with what moves along, of which C and M can only be applied."""
+    C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
+    return replace(operators, C=C + added.rate * added.M, M=M + added.M)
 
 
 def _moments(
@@ -180,7 +159,8 @@ def _moments(
     """Adds the next moment of seeds (n, p) to the space at each turn."""
     C, M, branches = operators.C, operators.M, operators.branches
     lags = [branch.time / (1 + shift * branch.time) for branch in branches]
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift, what has relaxed):
+    scale = shift or SHIFT
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, what has relaxed):
     # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
     taken = np.zeros((2 + len(lags), 0, 0))
     upper = space.extend(factor.solve(seeds))
@@ -190,7 +170,7 @@ def _moments(
         yield
         taken, newest = _append(taken, newest)
         y, y_before, *y_relaxed = (space.basis @ part for part in newest)
-        rest = C @ y + 2 * shift * (M @ y) + shift * (M @ y_before)
+        rest = C @ y + 2 * shift * (M @ y) + scale * (M @ y_before)
         for branch, lag, part in zip(branches, lags, y_relaxed, strict=True):
             rest += lag * (branch.K @ part)
         upper = space.extend(-factor.solve(rest))
@@ -198,7 +178,7 @@ def _moments(
         relaxed = [
             (1 - shift * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
         ]
-        newest = np.stack([upper, lower / shift, *relaxed])
+        newest = np.stack([upper, lower / scale, *relaxed])
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
@@ -243,7 +223,7 @@ class _Space:
         left = _mass_norms(M, block)
         block = block / left
         squares, directions = np.linalg.eigh(block.T @ (M @ block))
-        new = block @ (directions[:, squares > DEPENDENT * squares.max()])
+        new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
         for _ in range(2):
             new = new - Q @ (Q.T @ (M @ new))
             new = np.linalg.solve(np.linalg.cholesky(new.T @ (M @ new)), new.T).T
@@ -253,7 +233,8 @@ class _Space:
 
 
 def _mass_norms(M: sparse.csr_array, block: Floats) -> Floats:
-    return np.sqrt(np.einsum("nk,nk->k", block, M @ block))
+    # At rest every second moment of a body without loss is 0, which is no direction.
+    return np.maximum(np.sqrt(np.einsum("nk,nk->k", block, M @ block)), SMALLEST)
 
 
 def _padded(coordinates: Floats, size: int) -> Floats:

@@ -61,6 +61,12 @@ def test_models_without_modes_refuse_it(model, h):
         simulate(SCENE, model, h=h)
 
 
+def test_a_sheet_without_a_frame_is_refused_by_elements():
+    body = replace(SHEET, sides="absorbing", base="clamped")
+    with pytest.raises(ValueError, match="in a frame, not with absorbing sides; clamp them"):
+        prepare(body, SCENE.probe_points, h=H)
+
+
 def test_the_operator_is_symmetric_positive_and_that_of_any_position():
     made = build(SHEET, H)
     ops = operators(made)
@@ -92,8 +98,8 @@ def test_a_sheet_of_other_cells_is_refused():
         added_mass(disc, fem.assemble(disc, fem.PRESETS["paper"]), 1.2, facets=part)
 
 
-def test_a_basis_made_without_air_is_good_enough_with_it(monkeypatch):
-    """Looked at after every second moment, the error estimate stops near its tolerance."""
+def test_moments_at_rest_are_enough_and_their_error_estimate_holds(monkeypatch):
+    """Looked at after every second moment, they stop near the tolerance."""
     monkeypatch.setattr("fem.reduced.BATCH", 2)
     made = build(SHEET, H)
     ops = operators(made)
@@ -110,6 +116,14 @@ def test_a_basis_made_without_air_is_good_enough_with_it(monkeypatch):
     basis = few.basis[ops.free]
     mass = basis.T @ (ops.M @ basis + air(SHEET, made, ops).M @ basis)
     np.testing.assert_allclose(mass, np.eye(len(mass)), atol=1e-9)
+
+
+def test_a_sheet_without_loss_is_reduced_too():
+    solid = replace(SHEET.solid, loss_factor=0.0)
+    prepared = prepare(replace(SHEET, material=solid), SCENE.probe_points, h=H)
+    lossy = prepare(SHEET, SCENE.probe_points, h=H)
+    lowest = [np.abs(p.poles.values).min() for p in (prepared, lossy)]
+    assert lowest[0] == pytest.approx(lowest[1], rel=1e-6)
 
 
 def test_a_quarter_in_air_answers_as_the_whole():
@@ -134,16 +148,17 @@ def test_air_and_vacuum_are_two_entries_of_the_cache(tmp_path, monkeypatch):
     assert np.linalg.norm(difference) > 0.1 * np.linalg.norm(first[1].displacement)
 
 
+@pytest.mark.slow
 def test_a_sheet_that_hardly_stretches_answers_as_the_linear_one():
     """About its mean and after its start, in modes and in moments; no line meets a resonance."""
     tacton = replace(LOAD.tacton, duration=0.6, am_frequency=60.0)
     scene = replace(SCENE, pressure=replace(LOAD, peak_pressure=1e-3, tacton=tacton))
     times = np.arange(6000) / 1e4
-    linear = answer(prepare(SHEET, scene.probe_points, h=1.5e-3), scene).displacement
-    modes = reduced_answer(scene, times, lambda phase, done: None, h=1.5e-3).displacement
+    linear = answer(prepare(SHEET, scene.probe_points, h=2e-3), scene).displacement
+    modes = reduced_answer(scene, times, lambda phase, done: None, h=2e-3).displacement
     settled = slice(5000, None)
     a, b = (u[settled] - u[settled].mean(axis=0) for u in (linear, modes))
-    assert np.linalg.norm(a - b) < 0.05 * np.linalg.norm(a)
+    assert np.linalg.norm(a - b) < 0.08 * np.linalg.norm(a)
 
 
 def test_the_loss_factor_is_the_material_s_in_air_too():

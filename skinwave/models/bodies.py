@@ -108,9 +108,20 @@ def operators(build: Build) -> Operators:
 
 
 def air(body: Body, build: Build, operators: Operators) -> Added | None:
-    """The air that moves with a meshed sheet, for `fem.reduce`; None in vacuum."""
+    """The air that moves with a meshed sheet, for `fem.reduce`; None in vacuum.
+
+    Raises
+    ------
+    ValueError
+        If no frame holds the sheet: around an edge without one the air would flow.
+    """
     if not body.air:
         return None
+    if body.sides != "clamped":
+        raise ValueError(
+            f"elements have air around a sheet in a frame, not with {body.sides} sides; clamp "
+            "them, leave air out, or use --model flat-body"
+        )
     by_mass, _ = rayleigh_damping(body.solid.loss_factor, LOSS_BAND)
     sides = body.placement.rotation.T[:2]
     return added_mass(

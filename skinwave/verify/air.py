@@ -82,7 +82,7 @@ def focus_on_a_sheet_in_air() -> Case:
         viscosity=LAG * young / 2.6,
     )  # fmt: skip
     mesh = _quarter(half, thickness, 4e-3)
-    ops = fem.assemble(mesh, solid, fixed={"mirror_x": "x", "mirror_y": "y"})
+    ops = fem.assemble(mesh, solid, fixed={"clamped": "xyz", "mirror_x": "x", "mirror_y": "y"})
     radii, hz = np.array([0.0, 5, 10, 15, 20, 30]) * 1e-3, np.array([80.0, 140, 210, 300])
     read = fem.probe_operator(mesh, np.column_stack([radii, np.zeros(6)]))
     squared = (fem.facet_points(mesh)[:, :2] ** 2).sum(axis=1)
@@ -103,8 +103,8 @@ def focus_on_a_sheet_in_air() -> Case:
         title="Focus on a large and lossy sheet in air: finite elements beside the endless sheet",
         source=f"2 rho / k of each wavenumber: {JUNGER}; integrated by the exact waves that the "
         "case on flat-body verifies",
-        mesh=described(mesh, "a quarter; free edges at 200 mm; loss factor 0.6 at 80 Hz, so that "
-                       "little returns from them"),
+        mesh=described(mesh, "a quarter; edges held at 200 mm; loss factor 0.6 at 80 Hz, so "
+                       "that little returns from them"),
         checks=tuple(checks),
         plot=Plot(
             x="frequency, Hz", y="amplitude at the focus, um at 1 Pa",
