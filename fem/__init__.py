@@ -10,6 +10,7 @@ n node, p probe, t time, f frequency, l derivative along an element edge.
 """
 
 from fem import nonlinear
+from fem.air import Added, added_mass
 from fem.assembly import Operators, assemble
 from fem.energy import Spent, audited, imbalance, mean_power, stored
 from fem.finite_strain import Elastic, Membrane, finite_strain
@@ -33,6 +34,7 @@ from fem.transient import Diverged, State, at_rest, transient
 
 __all__ = [
     "PRESETS",
+    "Added",
     "Branch",
     "Complex",
     "Diverged",
@@ -46,6 +48,7 @@ __all__ = [
     "Spent",
     "State",
     "StretchingModes",
+    "added_mass",
     "assemble",
     "at_rest",
     "audited",

@@ -9,6 +9,8 @@ with proportional damping the plain recurrence loses all accuracy after a few do
 What has relaxed of y, y / (1 + s tau_j), is a further part of the linearised vectors: its moments
 lie in the same space, so that these are the moments of the exact law.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
+Mass that moves along with a body, as air does, is dense and can only be applied: with it the shift
+is 0, where no mass is factorised.
 
 The error estimate needs no solution of the full system: it is the residual of the smaller model
 answered in the space of the next moments, where Galerkin's method makes the two answers' difference
@@ -16,12 +18,14 @@ solve the residual equation, carried on by the rate at which it has been shrinki
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.sparse.linalg import aslinearoperator
 
+from fem.air import Added
 from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
 from fem.relaxation import Branch, relaxing_stiffness
@@ -36,6 +40,7 @@ RELAXING_SHIFT = 1.0
 BATCH = 5  # moments between two looks at the error estimate
 RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which relaxes
 MOST_MOMENTS = 200
+SMALLEST = np.finfo(np.float64).tiny
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
@@ -66,6 +71,7 @@ def reduce(
     tolerance: float = 1e-3,
     *,
     loads: Floats | None = None,
+    added: Added | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -80,6 +86,7 @@ def reduce(
     tolerance : float, relative error of the probes' displacement at any frequency of the band
     loads : (3 n, k), typical nodal forces by which the error is judged; without any it is judged
         by the probes' adjoint fields in the whole body, which asks for far more moments
+    added : what moves with the body, as `added_mass` gives it; something must hold the body then
     progress : called with the fraction done, as the error estimate approaches the tolerance
 
     Raises
@@ -93,8 +100,10 @@ def reduce(
     if not moving.size:
         raise ValueError("no probe can move, all lie where the body is held; move one inwards")
     shift = 2 * np.pi * RELAXING_SHIFT * band if branches else SHIFT
+    if added is not None:
+        shift, operators = 0.0, _with_added(operators, added)
     K, C, M = operators.K, operators.C, operators.M
-    shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift)
+    shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift) if shift else K
     factor = factorise(shifted, backend=solver)
     others = [C, *(branch.K for branch in branches)]
     space = _Space([M, *others], moving.shape[1] * (MOST_MOMENTS + 1))
@@ -137,13 +146,20 @@ def reduce(
     )
 
 
+def _with_added(operators: Operators, added: Added) -> Operators:
+    """The operators of a body with what moves along, of which C and M can only be applied."""
+    C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
+    return replace(operators, C=C + added.rate * added.M, M=M + added.M)
+
+
 def _moments(
     space: "_Space", operators: Operators, shift: float, factor: Factor, seeds: Floats
 ) -> Iterator[None]:
     """Adds the next moment of seeds (n, p) to the space at each turn."""
     branches = operators.branches
     lags = [branch.time / (1 + shift * branch.time) for branch in branches]
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / shift, what has relaxed):
+    scale = shift or SHIFT
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, what has relaxed):
     # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
     taken = np.zeros((2 + len(lags), 0, 0))
     upper = space.extend(factor.solve(seeds))
@@ -154,7 +170,7 @@ def _moments(
         taken, newest = _append(taken, newest)
         y, y_before, *y_relaxed = newest
         M, C, *K_relaxing = space.images  # times the basis, whose coordinates these are
-        rest = C @ y + M @ (shift * (2 * y + y_before))
+        rest = C @ y + M @ (2 * shift * y + scale * y_before)
         for K, lag, part in zip(K_relaxing, lags, y_relaxed, strict=True):
             rest += K @ (lag * part)
         upper = space.extend(-factor.solve(rest))
@@ -162,7 +178,7 @@ def _moments(
         relaxed = [
             (1 - shift * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
         ]
-        newest = np.stack([upper, lower / shift, *relaxed])
+        newest = np.stack([upper, lower / scale, *relaxed])
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
@@ -216,7 +232,7 @@ class _Space:
         left = _norms(block, image)
         block, image = block / left, image / left
         squares, directions = np.linalg.eigh(block.T @ image)
-        new = block @ (directions[:, squares > DEPENDENT * squares.max()])
+        new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
         for _ in range(2):
             new = new - Q @ (MQ.T @ new)
             image = M @ new
@@ -231,8 +247,11 @@ class _Space:
 
 
 def _norms(block: Floats, image: Floats) -> Floats:
-    """Mass norms (k,) of columns with their image under M."""
-    return np.sqrt(np.einsum("nk,nk->k", block, image))
+    """Mass norms (k,) of columns with their image under M.
+
+    At rest every second moment of a body without loss is 0, which is no direction.
+    """
+    return np.maximum(np.sqrt(np.einsum("nk,nk->k", block, image)), SMALLEST)
 
 
 def _padded(coordinates: Floats, size: int) -> Floats:

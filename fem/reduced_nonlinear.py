@@ -15,11 +15,13 @@ Vib 315:569 (2008)).
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
 
+from fem.air import Added
 from fem.assembly import Operators
 from fem.finite_strain import (
     Elastic,
@@ -62,6 +64,7 @@ def stretching_modes(
     membrane: Membrane,
     n: int,
     *,
+    added: Added | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
@@ -71,8 +74,14 @@ def stretching_modes(
     ----------
     operators : the sheet's linear operators, from `assemble`
     membrane : all that resists stretching, among the nodes of the mesh
+    added : what moves with the sheet, as `added_mass` gives it; the modes with it are made of the
+        n lowest without
     """
     hz, shapes = modes(operators, n, solver=solver)
+    damping: Any = 0.0
+    if added is not None:
+        hz, shapes = _with_added(operators, added, hz, shapes)
+        damping = added.rate * _projected(added.M, shapes[operators.free])
     part = membrane_part(mesh, membrane)
     w = shapes.reshape(-1, 3, n)[:, 2]
     slopes = (part.D @ w).reshape(*part.G.shape[:3], n)  # (e, q, k, m)
@@ -87,13 +96,26 @@ def stretching_modes(
             progress(k / len(states))
     modal = Operators(
         K=sparse.diags_array((2 * np.pi * hz) ** 2).tocsr(),
-        C=sparse.csr_array(shapes[operators.free].T @ (operators.C @ shapes[operators.free])),
+        C=sparse.csr_array(_projected(operators.C, shapes[operators.free]) + damping),
         M=sparse.eye_array(n).tocsr(), R=sparse.csr_array((n, n)), free=np.arange(n), n_dofs=n,
     )  # fmt: skip
     return StretchingModes(
         basis=shapes, hz=hz, H=H, left_out=left_out,
         elastic=modal_elastic(modal, H, stress_lag(membrane.material)),
     )  # fmt: skip
+
+
+def _with_added(
+    operators: Operators, added: Added, hz: Floats, shapes: Floats
+) -> tuple[Floats, Floats]:
+    """Modes with a further mass, by Rayleigh and Ritz from those without."""
+    mass = np.eye(len(hz)) + _projected(added.M, shapes[operators.free])
+    squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
+    return np.sqrt(squares) / (2 * np.pi), shapes @ turn
+
+
+def _projected(A: Any, shapes: Floats) -> Floats:
+    return np.asarray(shapes.T @ (A @ shapes))
 
 
 def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:

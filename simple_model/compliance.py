@@ -120,16 +120,30 @@ def thin_sheet(
     that is left out, G = 0 at rest.
     """
 
-    def compliance(k: Complex, w: Complex) -> Complex:
-        law = complex_modulus(
+    def bending(w: Complex) -> Complex:
+        return bending_stiffness * complex_modulus(
             w, 1.0, viscosity=viscous_lag, loss_factor=loss_factor,
             relaxing_modulus=relaxing_share, relaxation_time=relaxation_time,
         )  # fmt: skip
-        bending = bending_stiffness * law
-        inertia = (mass_per_area + 2 * air_density / k) * w**2
-        return np.where(w == 0, 0, 1 / (bending * k**4 - inertia))
 
-    return Compliance(compliance)
+    def compliance(k: Complex, w: Complex) -> Complex:
+        inertia = (mass_per_area + 2 * air_density / k) * w**2
+        return np.where(w == 0, 0, 1 / (bending(w) * k**4 - inertia))
+
+    def clearance(w: Complex) -> float:
+        """Where what does not run is found: D* k^5 - m w^2 k - 2 rho_air w^2 = 0 in the first
+        quadrant, at 90 degrees for a real w, but at 45 in vacuum and 36 in air for one that only
+        decays.
+        """
+        companion = np.zeros((len(w), 5, 5), np.complex128)
+        companion[:, range(1, 5), range(4)] = 1
+        companion[:, 0, 3] = mass_per_area * w**2 / bending(w)
+        companion[:, 0, 4] = 2 * air_density * w**2 / bending(w)
+        k = np.linalg.eigvals(companion)
+        still = (k.real > 0) & (k.imag > 0.1 * np.abs(k))
+        return float(k.imag[still].min(initial=inf))
+
+    return Compliance(compliance, clearance)
 
 
 def complex_modulus(

@@ -132,6 +132,7 @@ class Body:
     relief : of a palm
     file, unit, up : of a mesh, as `meshes.body_from_file` takes them
     placement : how the body lies under the device
+    air : bool, whether air moves along on both sides of a sheet, as if in a baffle; or vacuum
 
     Raises
     ------
@@ -152,6 +153,7 @@ class Body:
     unit: str = "m"
     up: str = "+z"
     placement: Placement = FLAT
+    air: bool = False
 
     def __post_init__(self) -> None:
         choose("body kind", self.kind, KINDS)
@@ -170,6 +172,11 @@ class Body:
         if (self.kind == "mesh") != bool(self.file):
             raise ValueError(
                 "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
+            )
+        if self.air and self.kind != "sheet":
+            raise ValueError(
+                f"air = true is for a sheet, which weighs little more than the air that it moves, "
+                f"not a {self.kind}; leave it out"
             )
         if self.kind == "palm":
             self.palm  # noqa: B018 - refuses what does not fit

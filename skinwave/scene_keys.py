@@ -251,6 +251,7 @@ SECTIONS = {
         "file": _word("file"),
         "unit": _word("unit"),
         "up": _word("up"),
+        "air": Field("air", _switch, bool),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
@@ -266,7 +267,7 @@ SECTIONS = {
 }
 
 
-ONLY_OF = {"relief": "palm", "file": "mesh", "unit": "mesh", "up": "mesh"}
+ONLY_OF = {"relief": "palm", "file": "mesh", "unit": "mesh", "up": "mesh", "air": "sheet"}
 
 
 def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:

@@ -390,9 +390,10 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
     assert np.ptp(foci[:, 0, 0]) == pytest.approx(10, abs=0.5)
 
 
-def test_a_reduced_body_answers_as_simulate_does(monkeypatch):
+@pytest.mark.parametrize("air", [False, True])
+def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
     monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
-    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=air)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
     answered, scene = waves.Waves(), scenes.scene_of(values, own)
     shown = answered(scene, nothing)

@@ -7,14 +7,15 @@ from math import isfinite
 import numpy as np
 from scipy import sparse
 
-from fem.assembly import Operators, assemble
-from fem.materials import Material
+from fem.air import Added, added_mass
+from fem.assembly import LOSS_BAND, Operators, assemble
+from fem.materials import Material, rayleigh_damping
 from fem.surface import facet_normals, facet_points, load_operator
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
 from meshes.intake import FINE_RADIUS
 from meshes.structured import check_size, round_up, with_planes
 from meshes.tetmesh import Floats, Ints
-from simple_model.compliance import Compliance, half_space, slab, thin_sheet
+from simple_model.compliance import AIR_DENSITY, Compliance, half_space, slab, thin_sheet
 from skinwave.models import hands
 from skinwave.scene import Body
 
@@ -104,6 +105,43 @@ def operators(build: Build) -> Operators:
     return assemble(
         build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing, drag=build.drag
     )
+
+
+def air(body: Body, build: Build, operators: Operators) -> Added | None:
+    """The air that moves with a meshed sheet, for `fem.reduce`; None in vacuum.
+
+    Raises
+    ------
+    ValueError
+        If no frame holds the sheet: around an edge without one the air would flow.
+    """
+    if not body.air:
+        return None
+    if body.sides != "clamped":
+        raise ValueError(
+            f"elements have air around a sheet in a frame, not with {body.sides} sides; clamp "
+            "them, leave air out, or use --model flat-body"
+        )
+    by_mass, _ = rayleigh_damping(body.solid.loss_factor, LOSS_BAND)
+    sides = body.placement.rotation.T[:2]
+    return added_mass(
+        build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry, rate=by_mass
+    )
+
+
+def vacuum_only(body: Body, model: str) -> None:
+    """Refuse a body with air, which is a mass of every place upon every other.
+
+    Raises
+    ------
+    ValueError
+        If it has air.
+    """
+    if body.air:
+        raise ValueError(
+            f"{model} solves sparse equations, and air couples every place of a sheet with every "
+            "other; leave air out, or use --model fem, fem-nonlinear or flat-body"
+        )
 
 
 def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
@@ -227,7 +265,7 @@ def has_exact_waves(body: Body) -> bool:
 
 
 def compliance(body: Body) -> Compliance:
-    """How an endless body of the same section gives way; a sheet vibrates in vacuum.
+    """How an endless body of the same section gives way.
 
     Raises
     ------
@@ -243,7 +281,7 @@ def compliance(body: Body) -> Compliance:
             viscous_lag=solid.viscosity / solid.shear_modulus,
             relaxing_share=solid.relaxing_modulus / solid.shear_modulus,
             relaxation_time=solid.relaxation_time,
-            air_density=0.0,
+            air_density=AIR_DENSITY if body.air else 0.0,
         )
     if body.kind not in ("sheet", "slab") or (body.base != "clamped" and isfinite(body.depth)):
         raise ValueError(

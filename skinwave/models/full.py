@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import Build, operators, surface_load
+from skinwave.models.bodies import Build, operators, surface_load, vacuum_only
 from skinwave.models.bodies import build as build_body
 from skinwave.scene import Body, Scene
 
@@ -72,6 +72,7 @@ def transient_answer(
     solver: str = "auto",
 ) -> Response:
     """The full time stepping in steps of dt, read between steps by a cubic spline."""
+    vacuum_only(scene.body, "fem-transient")
     dt = dt or 1 / TRANSIENT_RATE
     steps = step_count(float(times[-1]), dt)
     clock = Clock()
@@ -155,6 +156,7 @@ def harmonic_answer(
 
     `mapped` is shaped like the built-in `map`; it may spread the lines over other machines.
     """
+    vacuum_only(scene.body, "fem-harmonic")
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)

@@ -11,7 +11,7 @@ from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.models.bodies import Build, surface_load
+from skinwave.models.bodies import Build, air, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.scene import Body, Scene
 
@@ -82,6 +82,7 @@ def prepare(
         *named,
         build.material,
         *ends,
+        body.air,
         probes,
         BAND,
         tolerance,
@@ -122,6 +123,7 @@ def _prepared_anew(
             BAND,
             tolerance,
             loads=P @ typical_spots(body, points),
+            added=air(body, build, operators),
             solver=solver,
             progress=lambda fraction: report("reduce", fraction),
         )

@@ -22,7 +22,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import Build, build, surface_load
+from skinwave.models.bodies import Build, air, build, surface_load, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, marched, step_count
 from skinwave.models.prepared import reduced_lines
 from skinwave.models.speeds import bending_wavenumber
@@ -118,6 +118,7 @@ def full_answer(
 ) -> Response:
     """Every unknown and every step, from rest under the mean pressure."""
     sheet_only(scene.body, "fem-nonlinear-transient")
+    vacuum_only(scene.body, "fem-nonlinear-transient")
     clock = Clock()
     with clock("assemble"):
         report("assemble", 0.0)
@@ -188,8 +189,9 @@ def _reduced(body: Body, h: float | None, solver: str) -> _Reduced:
     made = meshed_sheet(body, h or stretching_size(body, reduced=True))
     operators = stretching_body(body, made).operators
     modes = fem.stretching_modes(
-        made.mesh, operators, membrane(body, made, 1.0), mode_count(body), solver=solver
-    )
+        made.mesh, operators, membrane(body, made, 1.0), mode_count(body),
+        added=air(body, made, operators), solver=solver,
+    )  # fmt: skip
     P, points = surface_load(made)
     return _Reduced(
         made=made, modes=modes, load=P.T @ modes.basis, points=points, dofs=len(operators.free)

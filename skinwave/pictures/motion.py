@@ -14,7 +14,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort
 from simple_model.steady import path_knots
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.models.bodies import surface_load
+from skinwave.models.bodies import air, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.models.prepared import BAND, reduced_lines
 from skinwave.scene import Scene
@@ -92,6 +92,7 @@ def waves(
         seeds = fem.load_subspace(P @ spots.T, tolerance / 10)
         model = fem.reduce(
             operators, sparse.csr_array(seeds.T), BAND, tolerance,
+            added=air(scene.body, build, operators),
             solver=solver, progress=lambda fraction: report("reduce", fraction),
         )  # fmt: skip
     with clock("lines"):

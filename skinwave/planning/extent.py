@@ -55,20 +55,23 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[R
 
 
 def left_out(scene: Scene, highest: float) -> list[Row]:
-    """What the model leaves out, with the estimate behind that."""
+    """What the model leaves out, with the estimate behind that; of a sheet's air how much it is."""
     body = scene.body
     if body.kind != "sheet":
         return []
     air = air_mass(body, max(highest / 2, 20.0)) / body.mass_per_area
     force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
     sag = 0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness / body.depth
-    shift = 1 - 1 / np.sqrt(1 + air)
+    shift = 100 * (1 - 1 / np.sqrt(1 + air))
+    lowers = f"2 rho_air/k at half the highest line {{}} resonances by {shift:.1f} %"
     return [
         Row(
-            what="left out: air",
+            what="air" if body.air else "left out: air",
             value=f"+{100 * air:.0f} % mass",
-            reason=f"2 rho_air/k at half the highest line would lower resonances by "
-            f"{100 * shift:.1f} %: take the answer as that of a sheet in vacuum",
+            reason=f"{lowers.format('lowers')}; of each wavenumber its own, as air = true asks"
+            if body.air
+            else f"{lowers.format('would lower')}: take the answer as that of a sheet in vacuum, "
+            "or set air = true in [body]",
         ),
         Row(
             what="left out: stretching",

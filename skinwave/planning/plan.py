@@ -6,7 +6,7 @@ import numpy as np
 
 from simple_model.focus import spot_width
 from skinwave.effort import Progress
-from skinwave.models.bodies import check_mesh
+from skinwave.models.bodies import check_mesh, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
@@ -24,6 +24,7 @@ from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
+UNREDUCED = ("fem-transient", "fem-harmonic", "fem-nonlinear-transient")
 KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
 
 
@@ -76,6 +77,8 @@ def plan(
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    if model in UNREDUCED:
+        vacuum_only(scene.body, model)
     if dt is not None:
         step_count(float(sample_times(scene)[-1]), dt)
     if scene.body.kind == "none":

@@ -12,7 +12,6 @@ import numpy as np
 
 from fem.materials import PRESETS, Material
 from simple_model import Trajectory
-from skinwave.models.speeds import air_mass
 from skinwave.planning.estimates import motion_lines
 from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
 
@@ -171,10 +170,10 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
         solid = law(solid, 2 * np.pi * line)
         if "little loss" not in dropped:
             solid = with_little_loss(solid, 2 * np.pi * line)
-    if "vacuum" in dropped:
-        air = air_mass(body, line) if line else 0.0
-        solid = replace(solid, density=solid.density + air / body.depth)
-    changes: dict[str, object] = {"material": solid if solid != body.solid else body.material}
+    changes: dict[str, object] = {
+        "material": solid if solid != body.solid else body.material,
+        "air": "vacuum" in dropped,
+    }
     if "one material" in dropped:
         layers = tuple(
             replace(layer, material=law(solid_of(layer.material), 2 * np.pi * line))
@@ -266,7 +265,7 @@ def as_viscous(solid: Material, w: float) -> Material:
 def strongest_line(scene: Scene) -> float:
     """The line in Hz that moves the probes most, 0 if none does.
 
-    Air's mass and a law of loss differ from line to line; each is put right at this one.
+    Laws of loss differ from line to line; they are made the same at this one.
     """
     frequencies, shares = motion_lines(scene, 0.05)
     moving = frequencies > 0

@@ -183,7 +183,11 @@ def _sheet(runs: list[Run]) -> str:
         text = "The loss factor is Rayleigh damping that fits it over 50-600 Hz. "
     if runs[0].model.startswith("fem"):
         text += "The mesh is a thicker sheet of the same bending stiffness and mass per area. "
-    text += "Left out: the air that moves along, a fifth to a third of the mass of office paper"
+    text += (
+        "Air moves along on both sides. Left out: what of it flows around the edge, and its sound"
+        if runs[0].scene.body.air
+        else "Left out: the air that moves along, a fifth to a third of the mass of office paper"
+    )
     if not runs[0].model.startswith("fem-nonlinear"):
         depth = runs[0].scene.body.depth
         sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / depth

@@ -114,6 +114,8 @@ def candidates(scene: Scene) -> list[Candidate]:
             found.append(Candidate(model="flat-body", endless=True))
     found += [Candidate(model="fem", h=size) for size in sizes]
     found += [Candidate(model="fem", h=sizes[2], tolerance=t) for t in (0.3, 0.03)]
+    if scene.body.air:
+        return found
     found += [Candidate(model="fem-transient", h=sizes[2], dt=dt) for dt in (1e-3, 5e-4, 2e-4)]
     found += [Candidate(model="fem-harmonic", h=sizes[1])]
     return found

@@ -11,6 +11,7 @@ from typing import Any
 
 from skinwave.effort import Progress, versions
 from skinwave.verify import (
+    air,
     elements,
     exact,
     extremes,
@@ -83,6 +84,9 @@ def _plates() -> Iterable[Entry]:
         case = partial(plates.force_crossing_a_beam, ratio)
         yield Entry(name=f"moving-force-{ratio:g}", topic=topic, run=case)
     yield Entry(name="circling-on-plate", topic=topic, run=plates.force_circling_on_a_plate)
+    yield Entry(name="air-operator", topic=topic, run=air.gaussian_and_lambs_shape)
+    yield Entry(name="disc-in-air", topic=topic, run=air.lambs_disc)
+    yield Entry(name="focus-in-air", topic=topic, run=air.focus_on_a_sheet_in_air, slow=True)
 
 
 def _waves() -> Iterable[Entry]:

@@ -33,7 +33,7 @@ from simple_model.steady import (
     path_knots,
 )
 from skinwave.effort import Progress
-from skinwave.models.bodies import build, compliance, has_exact_waves, operators, surface_load
+from skinwave.models.bodies import air, build, compliance, has_exact_waves, operators, surface_load
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
 from skinwave.scene import Body, Scene
@@ -226,7 +226,7 @@ def reduced(
     P, points, spots = P[:, near], points[near], spots[:, near]
     seeds = fem.load_subspace(P @ spots.T, TOLERANCE / 5)
     model = fem.reduce(
-        ops, sparse.csr_array(seeds.T), BAND, TOLERANCE,
+        ops, sparse.csr_array(seeds.T), BAND, TOLERANCE, added=air(body, made, ops),
         progress=lambda done: progress("reduce", done),
     )  # fmt: skip
     progress("read the surface", 1.0)

@@ -1,0 +1,157 @@
+"""The fluid that a flat sheet moves with it: a mass of every place upon every other.
+
+Bending waves that are slow beside sound leave the fluid no time to be compressed; it flows from
+where the sheet pushes to where it gives way. In a baffle the acceleration w'' of the sheet meets,
+on both sides together, Rayleigh's integral without its delay, which is the added mass 2 rho / k of
+each wavenumber k told in space (Junger and Feit, Sound, Structures, and Their Interaction (1986),
+sections 4.6 and 5.11):
+
+    p(x) = rho/pi int w''(y) / |x - y| dA,   M_ab = rho/pi iint N_a(x) N_b(y) / |x - y| dA dA
+
+M is dense, symmetric and positive, and never formed: on a regular grid of nodes it is a convolution
+with int 1/r dA over a cell at each distance, a closed form that is finite within the cell, by an
+FFT padded with zeros. Nodes s apart make it wrong by -(k s)^2 / 24.
+
+Left out are the fluid that flows around an edge without a baffle, and sound. Sound that is long
+beside the sheet would take as much energy as a loss factor of
+
+    (rho w / pi c) (int u dA)^2 / int m u^2 dA
+
+of a mode u in which the sheet pushes more to one side than to the other: 0.006 to 0.007 for such
+modes of a clamped sheet of office paper, 100 mm wide, below 300 Hz, where paper's own is 0.03.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft, sparse
+from scipy.sparse.linalg import LinearOperator
+
+from fem.assembly import Operators
+from meshes import MeshError, TetMesh, facet_set
+from meshes.tetmesh import Floats, Ints
+
+FLAT = np.eye(3)[:2]
+UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Added:
+    """What moves with a body: `M` (n_free, n_free) in kg, and `rate` in 1/s of the force rate M u'.
+
+    Rayleigh damping stands for a loss factor at the frequencies of a body of a certain mass; with
+    more of it, what goes with mass must grow as well, or the loss factor would sink.
+    """
+
+    M: LinearOperator
+    rate: float = 0.0
+
+
+def added_mass(
+    mesh: TetMesh,
+    operators: Operators,
+    density: float,
+    *,
+    axes: Floats = FLAT,
+    mirrored: str = "",
+    facets: str | Ints = "top",
+    rate: float = 0.0,
+) -> Added:
+    """The fluid on both sides of a sheet in a baffle, without loss of its own.
+
+    Parameters
+    ----------
+    mesh : TetMesh, of a rectangle in equal cells
+    operators : of the same mesh
+    density : float, kg/m3, of the fluid
+    axes : (2, 3) unit vectors along the sides of the rectangle
+    mirrored : those of "xy" in whose positive half the mesh lies, the motion being the same in the
+        other half; M is then of the part that is meshed
+    rate : float, 1/s, of the sheet's own Rayleigh damping by mass
+
+    Raises
+    ------
+    MeshError
+        If the nodes of the facets are not on a regular grid.
+    """
+    nodes = np.unique(facet_set(mesh, facets))
+    lines = [_equal_steps(mesh.points[nodes] @ axis) for axis in axes[::-1]]
+    (rows, dy), (columns, dx) = lines
+    shape = rows.max() + 1, columns.max() + 1
+    if len(nodes) != shape[0] * shape[1]:
+        raise MeshError("a sheet with air around it needs the nodes of a rectangle in equal cells")
+    # The trapezoidal rule: half of the cell around a node on an edge is off the sheet.
+    share = np.prod([np.where((at == 0) | (at == at.max()), 0.5, 1.0) for at in (rows, columns)], 0)
+    normal = share[:, None] * np.cross(*axes)
+    dofs = 3 * nodes[:, None] + np.arange(3)
+    places = np.broadcast_to((rows * shape[1] + columns)[:, None], dofs.shape)
+    read = sparse.csr_array(
+        (normal.ravel(), (places.ravel(), dofs.ravel())), shape=(len(nodes), mesh.n_dofs)
+    )[:, operators.free]
+    field = near_field(shape, (dy, dx), [axis in mirrored for axis in "yx"])
+
+    def apply(u: Floats) -> Floats:
+        w = (read @ u).T.reshape(u.shape[1], *shape)
+        return density / np.pi * dy * dx * (read.T @ field(w).reshape(u.shape[1], len(nodes)).T)
+
+    n = len(operators.free)
+    M = LinearOperator(
+        (n, n), dtype=np.float64, matmat=apply, matvec=lambda u: apply(u.reshape(n, 1))
+    )
+    return Added(M=M, rate=rate)
+
+
+def near_field(
+    shape: tuple[int, int],
+    spacing: tuple[float, float],
+    mirrored: Sequence[bool] = (False, False),
+) -> Callable[[Floats], Floats]:
+    """int w(y) / |x - y| dA (k, ny, nx) in metre of fields w (k, ny, nx) at nodes of a grid.
+
+    `spacing` in metre along y and x, as is `mirrored`, which adds the images of a field in the
+    first line of nodes; what lies on that line counts with its image.
+    """
+    whole = [2 * n - 1 if image else n for n, image in zip(shape, mirrored, strict=True)]
+    padded = [fft.next_fast_len(2 * n - 1, real=True) for n in whole]
+    y, x = (np.fft.fftfreq(n, 1 / n) * step for n, step in zip(padded, spacing, strict=True))
+    kernel = fft.rfft2(inverse_distance(x, y[:, None], spacing[::-1])).real
+
+    def field(w: Floats) -> Floats:
+        for axis, n in ((axis, shape[axis - 1]) for axis in (1, 2) if mirrored[axis - 1]):
+            beyond = [(0, 0)] * 3
+            beyond[axis] = (n - 1, 0)
+            w = np.pad(w, beyond)
+            w = w + np.flip(w, axis)
+        p = fft.irfft2(kernel * fft.rfft2(w, padded), padded)
+        ends = [slice(n - part, n) for n, part in zip(whole, shape, strict=True)]
+        return np.asarray(p[:, *ends])
+
+    return field
+
+
+def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
+    """int 1/r dA in metre over rectangles of a size in metre, their middles at x and y.
+
+    x asinh(y/x) + y asinh(x/y) between the corners, the potential of a charged plate: Durand,
+    Electrostatique, vol. 1 (1964).
+    """
+
+    def corner(x: Floats, y: Floats) -> Floats:
+        return x * np.arcsinh(y / np.abs(x)) + y * np.arcsinh(x / np.abs(y))
+
+    (west, east), (south, north) = (
+        (at - a / 2, at + a / 2) for at, a in zip((x, y), size, strict=True)
+    )
+    return corner(east, north) - corner(west, north) - corner(east, south) + corner(west, south)
+
+
+def _equal_steps(x: Floats) -> tuple[Ints, float]:
+    """Which of equally spaced lines (n,) each coordinate (n,) lies on, and their spacing."""
+    apart = np.diff(np.sort(x))
+    step = apart[apart > UNEVEN * np.ptp(x)].min()
+    index = np.rint((x - x.min()) / step).astype(np.int64)
+    step = float(np.ptp(x) / index.max())
+    if np.abs(x - x.min() - step * index).max() > UNEVEN * step:
+        raise MeshError("the nodes of a sheet with air around it must be on a regular grid")
+    return index, step
