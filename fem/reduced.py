@@ -41,6 +41,7 @@ BATCH = 5  # moments between two looks at the error estimate
 RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which relaxes
 MOST_MOMENTS = 200
 SMALLEST = np.finfo(np.float64).tiny
+LASTING = 0.75  # power of the rate of convergence that goes on: a steep fall does not quite
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
@@ -314,5 +315,5 @@ def _change(before: Complex, now: Complex) -> float:
 
 
 def _tail(changes: list[float]) -> float:
-    """Error left after the last change, if the changes go on shrinking as they did last."""
-    return changes[-1] * min(1.0, changes[-1] / changes[-2])
+    """Error left after the last change, if the changes go on shrinking nearly as they did last."""
+    return changes[-1] * min(1.0, changes[-1] / changes[-2]) ** LASTING
