@@ -90,16 +90,16 @@ def test_sides_that_send_nothing_back_need_no_elements():
         "material = {density_kg_m3=1000, shear_modulus_pa=10e3, poisson=0.499, viscosity_pa_s=9}"
     )
     text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
-    required = plan(loads(text), 0.08)
+    required = plan(loads(text), 0.12)
     assert required.model == "flat-body"
-    assert 0 < required.error < 0.08
+    assert 0 < required.error < 0.12
 
 
 @pytest.mark.parametrize(
-    ("material", "width", "duration", "low"),
-    [("silicone", 100, 0.03, 0.15), ("overdamped", 60, 0.02, 0.4)],
+    ("material", "width", "duration", "h", "low"),
+    [("silicone", 100, 0.03, 0.005, 0.15), ("overdamped", 80, 0.02, 0.004, 0.25)],
 )
-def test_what_free_sides_send_back_is_judged_in_time(material, width, duration, low):
+def test_what_free_sides_send_back_is_judged_in_time(material, width, duration, h, low):
     """A load that only begins has no line that comes back, and viscous stress no front."""
     modulus, poisson, viscosity = {"silicone": (25e3, 0.4999, 3), "overdamped": (1e3, 0.499, 50)}[
         material
@@ -117,7 +117,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
 """.replace(",\n", ",")
     )
     returned = waves_returned(scene)
-    found = compare(simulate(scene, "fem", h=0.005), simulate(scene, "flat-body")).relative_l2
+    found = compare(simulate(scene, "fem", h=h), simulate(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
 
