@@ -172,7 +172,9 @@ def _without_mesh(
 ) -> Plan:
     start = start_share(scene)
     if model is None:
-        model = "flat-body-harmonic" if returned + start <= tolerance else "flat-body"
+        # One is of the load's lines, the other of the body's own: their powers add.
+        both = np.hypot(returned, start)
+        model = "flat-body-harmonic" if both <= tolerance else "flat-body"
     left = start if model == "flat-body-harmonic" else 0.0
     reason = "a homogeneous flat slab without sides that reflect: exact waves, no mesh"
     if scene.body.sides != "absorbing":
@@ -191,8 +193,8 @@ def _without_mesh(
         *left_out(scene, highest),
     ]
     return Plan(
-        model=model, body=scene.body, highest=highest, error=returned + left, seconds=2.0,
-        memory=3e8, rows=tuple(rows), warnings=warnings,
+        model=model, body=scene.body, highest=highest, error=float(np.hypot(returned, left)),
+        seconds=2.0, memory=3e8, rows=tuple(rows), warnings=warnings,
     )  # fmt: skip
 
 
