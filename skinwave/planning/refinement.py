@@ -19,6 +19,7 @@ from skinwave.scene import Body, Scene
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two sizes next to each other
 ORDER = 2.5  # of a waveform's error in the element size, at least; measured 2.4 to 3.5
 AIM = 0.6  # of the tolerance, so that one more mesh is enough
+STRIDE = 1.6  # between two sizes at most: coarse meshes make their errors out too large
 FINEST = 0.4  # of the default element size, beyond which no more is promised
 
 
@@ -73,7 +74,7 @@ def refined(
             return Refined(h=size, error=error, coarser=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
         before, coarse = size, fine
-        size = max(least, min(size / RATIO, max(wanted, size / 2)))
+        size = max(least, min(size / RATIO, max(wanted, size / STRIDE)))
 
 
 def error_left(coarse: Response, fine: Response, ratio: float) -> float:
