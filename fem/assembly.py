@@ -23,7 +23,7 @@ from scipy import sparse
 from fem.boundary import dashpots, fixed_dofs
 from fem.dilatation import projected_dilatation
 from fem.elements import shape_functions, tetrahedron_rule
-from fem.geometry import gradients, is_straight, jacobians
+from fem.geometry import gradients, jacobians, shape_nodes
 from fem.materials import Material, rayleigh_damping
 from fem.pattern import UPPER, Pattern, from_blocks, from_masses
 from fem.relaxation import Branch, on_free
@@ -32,7 +32,7 @@ from meshes.tetmesh import Floats, Ints
 
 SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
 LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, up to which 10-node tetrahedra need no remedy
-DIRECT = 2.0  # lam / mu that acts directly beyond it: best between 1 and 3, measured by `verify`
+DIRECT = 2.0  # lam / mu that acts directly beyond it; a slab erred least with 1 to 3
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
 
@@ -140,8 +140,10 @@ def _volume_operators(
         for time in np.unique(times[relaxing > 0])
     )
     C = stiffness(hysteretic_lag + _of(materials, "viscosity") / mu)
-    if mass_rate.any():
+    if np.ptp(mass_rate):
         C = C + from_masses(pattern, masses * mass_rate[region, None, None])
+    elif mass_rate[0]:
+        C = C + mass_rate[0] * M
     return K, C, M, branches
 
 
@@ -163,11 +165,11 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
     blocks, masses = np.empty((6, m, n_nodes, n_nodes)), np.empty((m, n_nodes, n_nodes))
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
     NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
-    shape_of = mesh.tets[:, :4] if is_straight(mesh) else mesh.tets
+    shapes = shape_nodes(mesh)
     for start in range(0, m, SLAB):
         slab = slice(start, start + SLAB)
-        corners = mesh.points[shape_of[slab]]
-        slopes, volumes = gradients(corners, n_nodes, 2, start)
+        nodes = shapes[slab]
+        slopes, volumes = gradients(nodes, n_nodes, 2, start)
         e, q = volumes.shape
         G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
         H = np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
@@ -179,7 +181,7 @@ def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tup
             block += m2 * H[:, j, :, i]
             if i == j:
                 block += shear
-        weights = rho[slab, None] * jacobians(corners, 5, start)[2]
+        weights = rho[slab, None] * jacobians(nodes, 5, start)[2]
         masses[slab] = (weights @ NN).reshape(e, n_nodes, n_nodes)
     return blocks, masses
 

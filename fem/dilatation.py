@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.elements import shape_functions, tetrahedron_rule
-from fem.geometry import gradients, is_straight
-from meshes import TetMesh, boundary_facets
-from meshes.tetmesh import EDGES, FACES, Floats, Ints
+from fem.geometry import gradients, jacobians, shape_nodes
+from meshes import TetMesh
+from meshes.tetmesh import EDGES, FACES, Floats, Ints, neighbours
 
 
 def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
@@ -23,7 +23,7 @@ def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
     squared projection of div u, and D u its coefficients by the `linear_functions`.
     """
     cluster, sloping = clusters(mesh)
-    slopes, volumes = gradients(_shape(mesh), 10, 2, 0)
+    slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
     q = linear_functions(mesh, cluster, sloping)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
     starts = 10 * np.arange(len(cluster) + 1)
@@ -40,10 +40,10 @@ def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -
     """1, x, y and z made orthonormal over each of the `clusters`, in m^-3/2, at the points of each
     element for degree 2 (e, q, 4); 1 alone, and else 0, where nothing slopes.
     """
-    nodes = _shape(mesh)
-    barycentric, _ = tetrahedron_rule(2)
-    _, volumes = gradients(nodes, 10, 2, 0)
-    x = np.einsum("qa,eai->eqi", shape_functions(barycentric, nodes.shape[1]), nodes)
+    nodes = shape_nodes(mesh)
+    volumes = jacobians(nodes, 2, 0)[2]
+    N = shape_functions(tetrahedron_rule(2)[0], nodes.shape[1])
+    x = np.einsum("qa,eai->eqi", N, nodes)
     size = np.bincount(cluster, volumes.sum(axis=1))
     moments = np.einsum("eq,eqi->ie", volumes, x)
     middle = np.stack([np.bincount(cluster, m) for m in moments], axis=1) / size[:, None]
@@ -65,7 +65,8 @@ def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
     middles, ends = mesh.tets[:, 4:], mesh.points[mesh.tets[:, EDGES]]
     lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
     around = np.bincount(middles.ravel(), minlength=len(mesh.points))
-    around[boundary_facets(mesh.tets)[:, 3:]] = -1  # of edges that are not inside
+    beyond = neighbours(mesh.tets)
+    around[mesh.tets[:, FACES[:, 3:]][beyond < 0]] = -1  # of edges that are not inside
     edge = np.full(len(middles), -1)  # what each element is around, by the edge's middle node
     while True:
         untaken = np.bincount(middles[edge < 0].ravel(), minlength=len(around)) == around
@@ -77,10 +78,11 @@ def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
         if not taken.any():
             break
         edge[taken] = longest[taken]
-    beyond = _neighbours(mesh.tets)
     while True:
         theirs = np.where(beyond >= 0, edge[beyond], -1)
-        size = np.where(theirs >= 0, np.bincount(edge[edge >= 0])[theirs], len(edge))
+        size = np.where(
+            theirs >= 0, np.bincount(edge[edge >= 0], minlength=len(around))[theirs], len(edge)
+        )
         smallest = size.argmin(axis=1)
         joining = (edge < 0) & (theirs >= 0).any(axis=1)
         if not joining.any():
@@ -90,19 +92,3 @@ def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
     edge[alone] = len(around) + alone
     names, cluster = np.unique(edge, return_inverse=True)
     return cluster, names < len(around)
-
-
-def _shape(mesh: TetMesh) -> Floats:
-    """The nodes (e, a, 3) that give each element its shape."""
-    return mesh.points[mesh.tets[:, :4] if is_straight(mesh) else mesh.tets]
-
-
-def _neighbours(tets: Ints) -> Ints:
-    """The element (e, 4) beyond each facet, -1 where there is none."""
-    facets = np.sort(tets[:, FACES[:, :3]].reshape(-1, 3), axis=1)
-    order = np.lexsort(facets.T)
-    same = (facets[order[1:]] == facets[order[:-1]]).all(axis=1)
-    one, other = order[:-1][same], order[1:][same]
-    beyond = np.full(len(facets), -1)
-    beyond[one], beyond[other] = other // 4, one // 4
-    return beyond.reshape(-1, 4)

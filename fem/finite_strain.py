@@ -19,7 +19,7 @@ from scipy import sparse
 
 from fem.assembly import LOSS_BAND, SLAB, Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
-from fem.geometry import gradients, is_straight
+from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
 from fem.pattern import UPPER, Pattern, from_blocks
 from meshes import MeshError, TetMesh
@@ -159,8 +159,7 @@ def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Pa
                 "displacement, where these elements would lock; use the linear fem for it"
             )
     lam, mu = np.array([(m.first_lame, m.shear_modulus) for m in materials])[region].T
-    shape_of = mesh.tets[:, :4] if is_straight(mesh) else mesh.tets
-    G, volume = gradients(mesh.points[shape_of], mesh.tets.shape[1], 2, 0)
+    G, volume = gradients(shape_nodes(mesh), mesh.tets.shape[1], 2, 0)
     return Part.of(mesh.tets, G, volume, lam, mu, len(mesh.points))
 
 

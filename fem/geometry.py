@@ -17,6 +17,11 @@ def is_straight(mesh: TetMesh) -> bool:
     return bool(bow < 1e-10 * np.abs(ends[:, :, 0] - ends[:, :, 1]).max())
 
 
+def shape_nodes(mesh: TetMesh) -> Floats:
+    """The nodes (e, a, 3) that give each element its shape: the corners of straight ones."""
+    return mesh.points[mesh.tets[:, :4] if is_straight(mesh) else mesh.tets]
+
+
 def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
     """Shape gradients (e, q, i, a) and quadrature volumes (e, q); `nodes` (e, a, i) give shape."""
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)

@@ -98,14 +98,19 @@ def corner_volumes(points: Floats, tets: Ints) -> Floats:
 def boundary_facets(tets: Ints) -> Ints:
     """Facets (k, 3 or 6) that belong to one tetrahedron only, seen from outside."""
     width = 3 if tets.shape[1] == 4 else 6
-    facets = tets[:, FACES[:, :width]].reshape(-1, width)
-    low, middle, high = np.sort(facets[:, :3], axis=1).T
-    n = tets.max() + 1
-    order = np.lexsort((high, low * n + middle))
-    key = np.stack([low, middle, high], axis=1)[order]
-    same = (key[1:] == key[:-1]).all(axis=1)
-    alone = ~np.append(same, False) & ~np.append(False, same)
-    return facets[np.sort(order[alone])]
+    return tets[:, FACES[:, :width]][neighbours(tets) < 0]
+
+
+def neighbours(tets: Ints) -> Ints:
+    """The tetrahedron (m, 4) beyond each of the `FACES`, -1 where there is none."""
+    low, middle, high = np.sort(tets[:, FACES[:, :3]].reshape(-1, 3), axis=1).T
+    edge = low * (tets.max() + 1) + middle
+    order = np.lexsort((high, edge))
+    same = (np.diff(edge[order]) == 0) & (np.diff(high[order]) == 0)
+    one, other = order[:-1][same], order[1:][same]
+    beyond = np.full(len(order), -1)
+    beyond[one], beyond[other] = other // 4, one // 4
+    return beyond.reshape(-1, 4)
 
 
 def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:

@@ -83,6 +83,16 @@ def test_clusters_are_the_boxes_of_a_mesh_of_boxes():
     assert (highest - lowest).max() < 0.5
 
 
+def test_an_element_without_inner_edges_is_a_cluster_of_its_own():
+    points = np.vstack([np.zeros(3), np.eye(3)])
+    mesh = meshes.quadratic(TetMesh(points=points, tets=[[0, 1, 2, 3]]))
+    cluster, sloping = clusters(mesh)
+    np.testing.assert_array_equal(cluster, [0])
+    np.testing.assert_array_equal(sloping, [False])
+    swelling = projected_dilatation(mesh) @ mesh.points.ravel()
+    assert (swelling**2).sum() == pytest.approx(3**2 / 6)  # div u squared, times the volume
+
+
 def test_mass_and_weight_are_those_of_the_body(distorted_cube):
     material = fem.Material(density=700, shear_modulus=1, poisson=0.3)
     M = fem.assemble(distorted_cube, material, fixed=np.zeros_like(distorted_cube.points, bool)).M

@@ -63,15 +63,15 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
     force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
     sag = 0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness / body.depth
     shift = 100 * (1 - 1 / np.sqrt(1 + air))
-    lowers = f"2 rho_air/k at half the highest line {{}} resonances by {shift:.1f} %"
+    lowered = f"resonances lower by {shift:.1f} %, by 2 rho_air/k at half the highest line"
     return [
         Row(
             what="air" if body.air else "left out: air",
             value=f"+{100 * air:.0f} % mass",
-            reason=f"{lowers.format('lowers')}; of each wavenumber its own, as air = true asks"
+            reason=f"{lowered}; each wavenumber has its own, as air = true asks"
             if body.air
-            else f"{lowers.format('would lower')}: take the answer as that of a sheet in vacuum, "
-            "or set air = true in [body]",
+            else f"{lowered}: take the answer as that of a sheet in vacuum, or set air = true in "
+            "[body]",
         ),
         Row(
             what="left out: stretching",
