@@ -11,7 +11,7 @@ from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
 from skinwave.models.prepared import answer, prepare
-from skinwave.planning.estimates import waves_returned
+from skinwave.planning.estimates import returned_and_start
 from skinwave.planning.plan import plan
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import Body
@@ -64,7 +64,7 @@ def test_a_sheets_plan_says_what_it_leaves_out():
 
 
 def test_a_long_steady_pattern_needs_no_start():
-    """What the start leaves is estimated from above, whatever the scene."""
+    """What the start leaves is followed until it has nearly died out, and estimated from above."""
     scene = loads(SHORT.replace("duration_s = 0.05", "duration_s = 0.5"))
     for shape in ("point", "circle"):
         path = Trajectory(shape=shape, size=0.02, speed=9.0)
@@ -74,13 +74,13 @@ def test_a_long_steady_pattern_needs_no_start():
         assert required.model == "flat-body-harmonic"
         whole, steady = (simulate(asked, model) for model in ("flat-body", required.model))
         left = compare(whole, steady).relative_l2.max()
-        assert 0.01 < left < required.error < 0.25
+        assert 0.01 < left < required.error < 1.2 * left
         late = whole.times > 0.4
         np.testing.assert_allclose(steady.displacement[late], whole.displacement[late],
                                    atol=3e-3 * np.abs(whole.displacement).max())  # fmt: skip
-        tight = plan(asked, 0.1)
-        assert tight.model == "flat-body"
-        said = plan(asked, 0.1, model="flat-body-harmonic").warnings
+        tight = 0.9 * left
+        assert plan(asked, tight).model == "flat-body"
+        said = plan(asked, tight, model="flat-body-harmonic").warnings
         assert any("leaves out how the motion starts" in warning for warning in said)
     assert plan(scene, 0.25, model="fem").model == "fem"
 
@@ -90,9 +90,10 @@ def test_sides_that_send_nothing_back_need_no_elements():
         "material = {density_kg_m3=1000, shear_modulus_pa=10e3, poisson=0.499, viscosity_pa_s=9}"
     )
     text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
-    required = plan(loads(text), 0.12)
-    assert required.model == "flat-body"
-    assert 0 < required.error < 0.12
+    for tolerance, model in ((0.12, "flat-body-harmonic"), (0.08, "flat-body")):
+        required = plan(loads(text), tolerance)
+        assert required.model == model
+        assert 0 < required.error < tolerance
 
 
 @pytest.mark.parametrize(
@@ -116,7 +117,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
              viscosity_pa_s={viscosity}}}
 """.replace(",\n", ",")
     )
-    returned = waves_returned(scene)
+    returned, _ = returned_and_start(scene)
     found = compare(simulate(scene, "fem", h=h), simulate(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()

@@ -172,16 +172,23 @@ def check_mesh(body: Body, h: float) -> None:
 
 def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
     """Grid lines along x, y and z: fine where the focus travels, with a layer that absorbs."""
-    along, down = (
-        Grading(radius=radius, growth=growth, coarsest=coarsest * h)
-        for radius, growth, coarsest in zip((FINE_RADIUS, 0.0), GROWTH, COARSEST, strict=True)
-    )
+    along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
     halves = [graded_axis(side / 2, h, along) for side in (body.width, body.height)]
     if has_layer(body):
         halves = [np.concatenate([half, half[-1] + _layer_line(body, half)]) for half in halves]
     x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
-    z = graded_axis(body.depth, h, down)
-    return x, y, -with_planes(z, [start for start, _ in body.strata[1:]])[::-1]
+    return x, y, -_depth_line(body, h)[::-1]
+
+
+def _depth_line(body: Body, h: float) -> Floats:
+    """Grid lines of a slab from its top downwards."""
+    down = Grading(radius=0.0, growth=GROWTH[1], coarsest=COARSEST[1] * h)
+    return with_planes(graded_axis(body.depth, h, down), [start for start, _ in body.strata[1:]])
+
+
+def cell_layers(body: Body, h: float) -> int:
+    """How many cells of h in metre lie below each other in a slab."""
+    return len(_depth_line(body, h)) - 1
 
 
 def _strata(starts: Sequence[float], depth: Floats, h: float) -> Ints:

@@ -11,12 +11,15 @@ from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
 from simple_model.trajectory import BY_POINTS
 from skinwave.models.bodies import compliance, has_exact_waves
-from skinwave.scene import Scene
+from skinwave.scene import Body, Scene
 
 REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
-IN_STEP = 3.0  # overdamped slabs of 80 to 120 mm gave back 0.9 to 1.1 times this, of 70 up to 1.5
+# The four sides may be in step; slabs gave back 0.5 to 0.9 times as much. Where viscosity rules, a
+# free side gives back more than its image: overdamped slabs of 80 to 120 mm gave back 0.9 to 1.1
+# times as much as both factors make it, of 70 mm up to 1.5.
+IN_STEP, OVERDAMPED = 2.0, 1.5
 FAR = 0.25  # m, beyond which waves are not followed
-FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: how waves that return are followed
+FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: how waves are followed
 
 
 def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
@@ -52,40 +55,42 @@ def is_flat(scene: Scene) -> bool:
     return has_exact_waves(scene.body) and scene.pressure.focus == "gaussian"
 
 
-def start_share(scene: Scene) -> float:
-    """The share of an endless slab's waveforms that is not their steady state, at most 1.
-
-    What the start leaves is taken for as large as the steady state, at the cut-off of shear waves
-    across the depth, w = pi c / 2 H: the lowest there is, which viscosity damps least.
-    """
-    solid, tacton = scene.body.solid, scene.tacton
-    if tacton.is_sampled or tacton.trajectory.shape == "recorded":
-        return 1.0
-    w = np.pi * solid.shear_speed / (2 * scene.body.depth)
-    modulus = solid.complex_modulus(w)
-    decayed = w * tacton.duration * modulus.imag / modulus.real
-    return float(1 / np.sqrt(max(decayed, 1.0)))
-
-
-def waves_returned(scene: Scene) -> float:
-    """Motion that the sides send back to the probes, over their own; at most 1.
+def returned_and_start(scene: Scene) -> tuple[float, float]:
+    """What the sides send back to the probes over their motion in an endless body, and what of that
+    motion is not its steady state; at most 1 each. Both are followed for the first `FOLLOWED`.
 
     What a side sends back to a probe is what an endless body would have at the probe's mirror
-    image in it; `IN_STEP` times the root of the four energies, because they may add up, and where
-    viscosity rules a free side gives back more than its image. Sides that absorb send nothing back.
+    image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
+    `OVERDAMPED` times that where shear waves cannot oscillate. Sides that absorb send nothing back.
     """
-    body, probes = scene.body, scene.probe_points
-    if body.sides == "absorbing":
-        return 0.0
+    body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
-    if _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
-        return 1.0
-    seen = np.vstack([probes, *_mirrored(probes, half)])
-    duration = min(scene.tacton.duration, FOLLOWED)
-    times = np.arange(max(2, round(duration * FOLLOWED_AT))) / FOLLOWED_AT
+    images = [] if body.sides == "absorbing" else _mirrored(probes, half)
+    if images and _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
+        return 1.0, 1.0
+    times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
+    seen = np.vstack([probes, *images])
     u = flat_body(compliance(body), scene.pressure, seen, times).displacement
-    own, *returned = (u**2).sum(axis=0).reshape(-1, len(probes))
-    return min(1.0, IN_STEP * float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max())))
+    own, *returned = (u**2).mean(axis=0).reshape(-1, len(probes))
+    share = float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max()))
+    critical = min(1.0, _loss_at_cut_off(body) / 2)
+    back = min(1.0, IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share)
+    if tacton.is_sampled or tacton.trajectory.shape == "recorded":
+        return back, 1.0
+    f, a = steady_lines(compliance(body), scene.pressure, probes, threshold=1e-3)
+    steady = np.real(np.exp(2j * np.pi * np.outer(times, f)) @ a)
+    left = (u[:, : len(probes)] - steady) ** 2
+    # What is left at the end of that time is taken to last: it is less.
+    lasting = left[-len(left) // 4 :].mean(axis=0) * (tacton.duration - len(times) / FOLLOWED_AT)
+    energy = left.sum(axis=0) / FOLLOWED_AT + np.maximum(lasting, 0.0)
+    own = np.maximum((steady**2).mean(axis=0) * tacton.duration, 1e-300)
+    return back, min(1.0, float(np.sqrt((energy / own).max())))
+
+
+def _loss_at_cut_off(body: Body) -> float:
+    """The loss tangent at the lowest cut-off of shear waves across the depth, w = pi c / 2 H."""
+    modulus = body.solid.complex_modulus(np.pi * body.solid.shear_speed / (2 * body.depth))
+    return float(modulus.imag / modulus.real)
 
 
 def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:

@@ -15,8 +15,7 @@ from skinwave.planning.estimates import (
     highest_line,
     is_flat,
     motion_lines,
-    start_share,
-    waves_returned,
+    returned_and_start,
 )
 from skinwave.planning.extent import Row, extent, left_out, symmetry
 from skinwave.planning.refinement import AIM, ORDER, Refined, refined
@@ -100,13 +99,11 @@ def plan(
             f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    returned = waves_returned(scene) if is_flat(scene) else 1.0
+    returned, start = returned_and_start(scene) if is_flat(scene) else (1.0, 1.0)
     flat = model in ("flat-body", "flat-body-harmonic")
     if flat or (model is None and returned <= WAVES_SHARE * tolerance):
-        return _without_mesh(scene, tolerance, model, highest, returned, rows)
+        return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
     body, cut = extent(scene, tolerance, highest)
-    if h:
-        check_mesh(body, h)  # refuses what cannot be meshed before anything is computed
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *cut]
     axes = symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
@@ -168,9 +165,9 @@ def _without_mesh(
     model: str | None,
     highest: float,
     returned: float,
+    start: float,
     rows: list[Row],
 ) -> Plan:
-    start = start_share(scene)
     if model is None:
         # One is of the load's lines, the other of the body's own: their powers add.
         both = np.hypot(returned, start)
@@ -180,7 +177,7 @@ def _without_mesh(
     if scene.body.sides != "absorbing":
         reason = f"waves that come back from the sides are {100 * returned:.2g} %: take none"
     if left:
-        reason += f"; of how the motion starts at most {100 * start:.2g} % is left"
+        reason += f"; how the motion starts, {100 * start:.2g} %, is left out"
     warnings = (
         *exceeds(f"{model}, which lets no wave return from the sides,", returned, tolerance,
                   "fem is"),
@@ -213,8 +210,9 @@ def _element_rows(
         Row(
             what="element size",
             value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} unknowns",
-            reason=f"{'as asked' if h else 'refined until good enough'}: {1e3 * found.coarser:.2f} "
-            f"mm differ by so much that an error of {100 * found.error:.2g} % is left",
+            reason=f"{'as asked' if h else 'refined until good enough'}: those of "
+            f"{1e3 * found.compared:.2f} mm differ by so much that an error of "
+            f"{100 * found.error:.2g} % is left",
         ),
         Row(
             what="reduction",

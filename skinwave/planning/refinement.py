@@ -2,22 +2,24 @@
 
 Near a resonance a mesh that is a little too stiff moves the waveform by many times as much as
 elsewhere, and soft or thin bodies need more elements than stiff ones. Each mesh of a rising
-ladder is judged by what the next one changes, with the order that all of them reach.
+ladder is judged by what the next one changes, with the order that all of them reach. All axes are
+refined alike: a slab has few layers, and one more changes as much as all that is between.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.effort import Progress
 from skinwave.models import hands
-from skinwave.models.bodies import default_size
+from skinwave.models.bodies import cell_layers, check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two sizes next to each other
-ORDER = 2.5  # of a waveform's error in the element size, at least; measured 2.4 to 3.5
+ORDER = 2.25  # of a waveform's error in the element size; measured 1.9 to 3.5
 AIM = 0.6  # of the tolerance, so that one more mesh is enough
 STRIDE = 1.6  # between two sizes at most: coarse meshes make their errors out too large
 FINEST = 0.4  # of the default element size, beyond which no more is promised
@@ -25,13 +27,13 @@ FINEST = 0.4  # of the default element size, beyond which no more is promised
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Element size `h` in metre, the expected relative `error` with it, by how much the `coarser`
-    mesh of size in metre differs, and the body `prepared` with it.
+    """Element size `h` in metre, the expected relative `error` with it, the size in metre that it
+    was `compared` with, and the body `prepared` with it.
     """
 
     h: float
     error: float
-    coarser: float
+    compared: float
     prepared: Prepared
 
 
@@ -48,6 +50,11 @@ def refined(
     """The coarsest mesh of a ladder that is right to a tolerance, or how right h is.
 
     A mesh that is not good enough at the end of the ladder comes back with its error.
+
+    Raises
+    ------
+    ValueError
+        If the body has no mesh of that size.
     """
 
     def answered(size: float) -> tuple[Prepared, Response]:
@@ -57,33 +64,65 @@ def refined(
         )  # fmt: skip
         return prepared, answer(prepared, scene)
 
+    check_mesh(body, h or default_size(body))
     if scene.body.kind in hands.KINDS:
         h = h or default_size(scene.body)  # each mesh takes a minute: two tell how good the last is
-    least = FINEST * default_size(scene.body)
-    longest = max(body.width, body.height)
-    before = min(h * RATIO if h else FIRST * default_size(scene.body), longest)
-    size = h or before / RATIO
-    coarse = answered(before)[1]
+    sizes = ladder(body)
+    before, size = (_beside(body, h), h) if h else (sizes[0], sizes[sizes <= sizes[0] / RATIO][0])
+    other = answered(before)[1]
     while True:
-        prepared, fine = answered(size)
-        if coarse.effort.dofs == fine.effort.dofs:  # two sizes beyond the body's own: one mesh
+        prepared, found = answered(size)
+        if other.effort.dofs == found.effort.dofs:  # two sizes beyond the body's own: one mesh
             error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
         else:
-            error = error_left(coarse, fine, before / size)
-        if h or error <= tolerance or size <= least:
-            return Refined(h=size, error=error, coarser=before, prepared=prepared)
+            error = error_left(other, found, coarser_by(body, before, size))
+        if h or error <= tolerance or size == sizes[-1]:
+            return Refined(h=size, error=error, compared=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
-        before, coarse = size, fine
-        size = max(least, min(size / RATIO, max(wanted, size / STRIDE)))
+        before, other = size, found
+        finer = sizes[np.count_nonzero(sizes > size / RATIO) :]
+        size = finer[abs(np.log(finer / max(wanted, size / STRIDE))).argmin()]
 
 
-def error_left(coarse: Response, fine: Response, ratio: float) -> float:
-    """The expected relative error of the finer of two answers, whose sizes have this ratio."""
-    return _change(coarse, fine) / (ratio**ORDER - 1)
+def ladder(body: Body) -> Floats:
+    """Sizes (k,) in metre that a body may be meshed with, falling."""
+    coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
+    if body.kind != "slab":
+        return np.geomspace(coarsest, finest, 64)
+    most = int(np.ceil(body.depth / finest))
+    found = [_layered(body, n, body.depth / n) for n in range(1, most + 1)]
+    sizes = np.array([h for h in found if finest <= h < np.inf])
+    return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
 
-def _change(coarse: Response, fine: Response) -> float:
-    """Relative L2 change of the worst probe's waveform."""
-    size = np.maximum(np.linalg.norm(fine.displacement, axis=0), 1e-300)
-    change = np.linalg.norm(fine.displacement - coarse.displacement, axis=0)
-    return float((change / size).max())
+def _beside(body: Body, h: float) -> float:
+    """A size that a given one can be compared with: coarser, or finer than a single layer."""
+    if body.kind == "slab":
+        layers = cell_layers(body, h)
+        other = layers - 1 if layers > 1 else 2
+        if np.isfinite(found := _layered(body, other, h * layers / other)):
+            return found
+    return min(RATIO * h, body.width, body.height)
+
+
+def _layered(body: Body, layers: int, near: float) -> float:
+    """The size in metre next to another of which a slab has so many layers; infinite if none is."""
+    sizes = near * 2 ** np.linspace(-1, 1, 101)
+    fitting = [h for h in sizes.tolist() if cell_layers(body, h) == layers]
+    return min(fitting, key=lambda h: abs(np.log(h / near)), default=np.inf)
+
+
+def coarser_by(body: Body, other: float, h: float) -> float:
+    """How many times as coarse as one mesh another is, along the axis where that is least."""
+    ratio = other / h
+    if body.kind != "slab":
+        return ratio
+    down = cell_layers(body, h) / cell_layers(body, other)
+    return min(ratio, down) if ratio > 1 else max(ratio, down)
+
+
+def error_left(other: Response, found: Response, ratio: float) -> float:
+    """The expected relative error of an answer by another with elements `ratio` times as large."""
+    size = np.maximum(np.linalg.norm(found.displacement, axis=0), 1e-300)
+    change = np.linalg.norm(found.displacement - other.displacement, axis=0)
+    return float((change / size).max() / abs(ratio**ORDER - 1))

@@ -15,7 +15,7 @@ from simple_model import Response, tacton_lines
 from skinwave.effort import Progress, silent
 from skinwave.models.prepared import REDUCTION_TOLERANCE, Prepared, answer, prepare
 from skinwave.planning.estimates import is_flat
-from skinwave.planning.refinement import error_left, refined
+from skinwave.planning.refinement import coarser_by, error_left, refined
 from skinwave.scene import Body, Scene
 from skinwave.simulation import MODELS, check_knobs, simulate
 from skinwave.sweeps import dataset, engine
@@ -201,7 +201,7 @@ def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
             _prepared(scene.body, scene.probes, knobs.h, knobs)
             return Mesh(h=knobs.h)
         found = refined(scene, scene.body, knobs.tolerance, solver=knobs.solver)
-        return Mesh(h=found.h, coarser=found.coarser)
+        return Mesh(h=found.h, coarser=found.compared)
     except Exception as error:  # any: it is that of every run on this body
         return Mesh(error=_said(error))
 
@@ -270,7 +270,8 @@ def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> tuple[Response, dict[str
         return found, row
     coarse = answer(_prepared(scene.body, scene.probes, mesh.coarser, knobs), scene)
     if coarse.effort.dofs != found.effort.dofs:
-        row["expected_error"] = error = error_left(coarse, found, mesh.coarser / mesh.h)
+        ratio = coarser_by(scene.body, mesh.coarser, mesh.h)
+        row["expected_error"] = error = error_left(coarse, found, ratio)
         if error > knobs.tolerance:
             said = (
                 f"elements of {1e3 * mesh.h:.3g} mm will be wrong by about {100 * error:.2g} %, "
