@@ -10,9 +10,11 @@ from meshes import cache
 from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
+from skinwave.models.bodies import cell_layers
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import returned_and_start
 from skinwave.planning.plan import plan
+from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import Body
 from skinwave.studies.paper15 import scenes, tactons
@@ -121,6 +123,30 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
     found = compare(simulate(scene, "fem", h=h), simulate(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
+
+
+@pytest.mark.parametrize("depth", [1, 8.4, 15, 60])
+def test_slabs_are_refined_along_all_axes_alike(depth):
+    body = loads(f"[body]\ndepth_mm = {depth}").body
+    sizes = ladder(body)
+    layers = np.array([cell_layers(body, h) for h in sizes])
+    assert (np.diff(sizes) < 0).all()
+    assert (np.diff(layers) > 0).all()
+    assert (layers * sizes < 1.001 * body.depth).all()  # no cell is much flatter than it is wide
+    for h in np.geomspace(0.2, 1.0, 9) * body.depth:
+        other = compared_with(body, h)
+        ratio = coarser_by(body, other, h)
+        assert 1.03 < max(ratio, 1 / ratio) < 2.3
+        assert (other > h) == (ratio > 1) == (cell_layers(body, h) > 1)
+
+
+@pytest.mark.parametrize("h", [0.0075, 0.0062, 0.0049])
+def test_what_is_expected_of_a_mesh_is_near_its_true_error(h):
+    """Also where it has as many layers as the next coarser one, or twice as many."""
+    scene = loads(SHORT)
+    found = refined(scene, scene.body, 0.05, h=h)
+    true = compare(answer(found.prepared, scene), simulate(scene, "flat-body")).relative_l2.max()
+    assert 0.4 < found.error / true < 2.5
 
 
 def test_a_body_that_nothing_holds_is_warned_of():

@@ -104,7 +104,7 @@ def plan(
     if flat or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
     body, cut = extent(scene, tolerance, highest)
-    rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene)), *cut]
+    rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene, returned)), *cut]
     axes = symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
@@ -243,7 +243,7 @@ def _enough(found: Refined, tolerance: float) -> float:
     return found.h * (aim / max(aim, found.error)) ** (1 / ORDER)
 
 
-def _why_elements(scene: Scene) -> str:
+def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
         return f"exact waves need a Gaussian focus, not '{scene.pressure.focus}'"
@@ -253,4 +253,10 @@ def _why_elements(scene: Scene) -> str:
         return f"{len(body.strata)} layers; exact waves are for one material"
     if body.placement != FLAT:
         return "the body is tilted or moved; exact waves are for a flat one across the beam"
-    return f"the {body.sides} sides of this {body.kind} reflect; exact waves are endless"
+    if body.kind == "sheet":
+        return f"the {body.sides} sides of this sheet reflect; exact waves are endless"
+    if not is_flat(scene):
+        return f"a {body.base} base; exact waves are for one that holds the slab, or none"
+    if body.sides == "absorbing":
+        return "as asked; there are exact waves of this body"
+    return f"the {body.sides} sides send back about {100 * returned:.2g} %; exact waves are endless"

@@ -68,7 +68,9 @@ def refined(
     if scene.body.kind in hands.KINDS:
         h = h or default_size(scene.body)  # each mesh takes a minute: two tell how good the last is
     sizes = ladder(body)
-    before, size = (_beside(body, h), h) if h else (sizes[0], sizes[sizes <= sizes[0] / RATIO][0])
+    before, size = (
+        (compared_with(body, h), h) if h else (sizes[0], sizes[sizes <= sizes[0] / RATIO][0])
+    )
     other = answered(before)[1]
     while True:
         prepared, found = answered(size)
@@ -87,38 +89,43 @@ def refined(
 def ladder(body: Body) -> Floats:
     """Sizes (k,) in metre that a body may be meshed with, falling."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
-    if body.kind != "slab":
+    if not _has_cell_layers(body):
         return np.geomspace(coarsest, finest, 64)
-    most = int(np.ceil(body.depth / finest))
-    found = [_layered(body, n, body.depth / n) for n in range(1, most + 1)]
-    sizes = np.array([h for h in found if finest <= h < np.inf])
+    found, layers = [body.depth], 1
+    while found[-1] > finest:
+        layers = max(layers + 1, round(RATIO * layers))
+        found.append(_layered(body, layers, body.depth / layers))
+    sizes = np.array(found)
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
 
-def _beside(body: Body, h: float) -> float:
+def compared_with(body: Body, h: float) -> float:
     """A size that a given one can be compared with: coarser, or finer than a single layer."""
-    if body.kind == "slab":
-        layers = cell_layers(body, h)
-        other = layers - 1 if layers > 1 else 2
-        if np.isfinite(found := _layered(body, other, h * layers / other)):
-            return found
-    return min(RATIO * h, body.width, body.height)
+    if not _has_cell_layers(body):
+        return min(RATIO * h, max(body.width, body.height))
+    layers = cell_layers(body, h)
+    other = layers - 1 if layers > 1 else 2
+    return _layered(body, other, min(h, body.depth) * layers / other)
+
+
+def _has_cell_layers(body: Body) -> bool:
+    """Whether the size alone says how many cells lie below each other, not the body's layers."""
+    return body.kind == "slab" and len(body.strata) == 1
 
 
 def _layered(body: Body, layers: int, near: float) -> float:
-    """The size in metre next to another of which a slab has so many layers; infinite if none is."""
+    """The size in metre next to another of which a slab has so many layers of cells."""
     sizes = near * 2 ** np.linspace(-1, 1, 101)
     fitting = [h for h in sizes.tolist() if cell_layers(body, h) == layers]
-    return min(fitting, key=lambda h: abs(np.log(h / near)), default=np.inf)
+    return min(fitting, key=lambda h: abs(np.log(h / near)))
 
 
 def coarser_by(body: Body, other: float, h: float) -> float:
-    """How many times as coarse as one mesh another is, along the axis where that is least."""
-    ratio = other / h
-    if body.kind != "slab":
-        return ratio
+    """How many times as coarse as one mesh another is, along the axis where they differ less."""
+    if not _has_cell_layers(body):
+        return other / h
     down = cell_layers(body, h) / cell_layers(body, other)
-    return min(ratio, down) if ratio > 1 else max(ratio, down)
+    return min(other / h, down, key=lambda ratio: abs(np.log(ratio)))
 
 
 def error_left(other: Response, found: Response, ratio: float) -> float:
