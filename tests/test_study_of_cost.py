@@ -10,7 +10,7 @@ from meshes import cache
 from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
-from skinwave.models.bodies import cell_layers
+from skinwave.models.bodies import cell_layers, default_size
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import returned_and_start
 from skinwave.planning.plan import plan
@@ -138,6 +138,15 @@ def test_slabs_are_refined_along_all_axes_alike(depth):
         ratio = coarser_by(body, other, h)
         assert 1.03 < max(ratio, 1 / ratio) < 2.3
         assert (other > h) == (ratio > 1) == (cell_layers(body, h) > 1)
+
+
+def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
+    """Also if the step to it is a short one."""
+    monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.1)
+    scene = loads("[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'")
+    found = refined(scene, scene.body, 1e-9)
+    assert found.h == pytest.approx(2.1 * default_size(scene.body))
+    assert found.error > 1e-3
 
 
 @pytest.mark.parametrize("h", [0.0075, 0.0062, 0.0049])

@@ -68,9 +68,8 @@ def refined(
     if scene.body.kind in hands.KINDS:
         h = h or default_size(scene.body)  # each mesh takes a minute: two tell how good the last is
     sizes = ladder(body)
-    before, size = (
-        (compared_with(body, h), h) if h else (sizes[0], sizes[sizes <= sizes[0] / RATIO][0])
-    )
+    before = compared_with(body, h) if h else sizes[0]
+    size = h or _finer(sizes, before)[0]
     other = answered(before)[1]
     while True:
         prepared, found = answered(size)
@@ -82,7 +81,7 @@ def refined(
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
         before, other = size, found
-        finer = sizes[np.count_nonzero(sizes > size / RATIO) :]
+        finer = _finer(sizes, size)
         size = finer[abs(np.log(finer / max(wanted, size / STRIDE))).argmin()]
 
 
@@ -97,6 +96,12 @@ def ladder(body: Body) -> Floats:
         found.append(_layered(body, layers, body.depth / layers))
     sizes = np.array(found)
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
+
+
+def _finer(sizes: Floats, size: float) -> Floats:
+    """Those that are finer by `RATIO` or more; the last if none is."""
+    coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
+    return sizes[min(coarser, len(sizes) - 1) :]
 
 
 def compared_with(body: Body, h: float) -> float:
