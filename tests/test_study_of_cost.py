@@ -143,7 +143,9 @@ def test_slabs_are_refined_along_all_axes_alike(depth):
 def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
     """Also if the step to it is a short one."""
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.1)
-    scene = loads("[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'")
+    scene = loads(
+        "[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'\nwidth_mm = 60\nheight_mm = 60"
+    )
     found = refined(scene, scene.body, 0.01)
     assert found.h == pytest.approx(2.1 * default_size(scene.body))
     assert found.error > 0.01
