@@ -42,6 +42,7 @@ RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which 
 MOST_MOMENTS = 200
 SMALLEST = np.finfo(np.float64).tiny
 LASTING = 0.75  # power of the rate of convergence that goes on: a steep fall does not quite
+DISTINCT = 1e-6  # of the strongest: what less of probes is not told apart
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
@@ -97,9 +98,11 @@ def reduce(
     """
     free, branches = operators.free, operators.branches
     seeds = probes[:, free].toarray().T
-    moving = seeds[:, seeds.any(axis=0)]  # a probe on a clamped edge stays where it is
-    if not moving.size:
+    if not seeds.any():
         raise ValueError("no probe can move, all lie where the body is held; move one inwards")
+    # Probes on a clamped edge stay where they are, those in one element know of each other.
+    directions, strengths, _ = np.linalg.svd(seeds, full_matrices=False)
+    moving = directions[:, strengths > DISTINCT * strengths[0]]
     shift = 2 * np.pi * RELAXING_SHIFT * band if branches else SHIFT
     if added is not None:
         shift, operators = 0.0, _with_added(operators, added)

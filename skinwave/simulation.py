@@ -10,7 +10,7 @@ from simple_model.choices import choose
 from skinwave.effort import Progress, silent
 from skinwave.models.bodies import compliance
 from skinwave.models.full import Map, harmonic_answer, transient_answer
-from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare, sample_times
+from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
 from skinwave.planning.plan import plan
 from skinwave.scene import Scene
@@ -95,10 +95,10 @@ def simulate(
         return reduced_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-nonlinear-transient":
         return full_answer(scene, times, report, h=h, dt=dt, solver=solver)
-    reduction = min(REDUCTION_TOLERANCE, tolerance / 50)
     prepared = prepare(
-        scene.body, scene.probe_points, report, h=h, solver=solver, tolerance=reduction
-    )
+        scene.body, scene.probe_points, report, h=h, solver=solver,
+        tolerance=reduction_tolerance(tolerance),
+    )  # fmt: skip
     return answer(prepared, scene, report)
 
 

@@ -125,7 +125,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
     assert returned < 6 * found.max()
 
 
-@pytest.mark.parametrize("depth", [1, 8.4, 15, 60])
+@pytest.mark.parametrize("depth", [1, 8.4, 15, 60, 300])
 def test_slabs_are_refined_along_all_axes_alike(depth):
     body = loads(f"[body]\ndepth_mm = {depth}").body
     sizes = ladder(body)
@@ -173,6 +173,16 @@ def test_a_loss_factor_is_warned_of_where_its_fit_is_far_off():
     (said,) = (w for w in plan(loads(text.format(15)), 0.5, h=0.005).warnings if "loss" in w)
     assert "fitted over 50 to 600 Hz" in said
     assert not any("loss" in w for w in plan(loads(text.format(200)), 0.5, h=0.005).warnings)
+
+
+@pytest.mark.parametrize("sides", ["free", "clamped"])
+def test_sides_that_reflect_are_where_they_are(sides):
+    soft = "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.499, viscosity_pa_s=2}"
+    text = f"{SHORT}\n[body]\nsides = '{sides}'\nwidth_mm = 100\nheight_mm = 100\n{soft}"
+    body = loads(text.replace("[body]\nwidth_mm = 60\nheight_mm = 60\n", "", 1)).body
+    required = plan(replace(loads(SHORT), body=body), 0.05, h=0.015)
+    assert required.model == "fem"
+    assert required.body == body
 
 
 def test_only_as_much_of_a_body_is_meshed_as_waves_come_back_from():
@@ -227,7 +237,7 @@ def test_meshes_are_refined_until_they_are_good_enough():
 
 def test_a_mesh_coarser_than_the_body_is_not_taken_for_converged():
     required = plan(loads(SHORT), 0.1, model="fem", h=0.05)
-    assert required.error == 1.0
+    assert 0.5 < required.error <= 1.0
     assert required.warnings
 
 

@@ -234,7 +234,8 @@ def _checked(body: Body, h: float) -> float:
     if body.kind == "mesh":
         return h
     if not isfinite(body.depth):
-        raise ValueError("depth_mm = inf has no mesh; use --model flat-body or a finite depth")
+        exact = "use --model flat-body or " if has_exact_waves(body) else ""
+        raise ValueError(f"depth_mm = inf has no mesh; {exact}give a finite depth")
     longest = max(body.width, body.height, body.depth)
     if h > longest:
         raise ValueError(

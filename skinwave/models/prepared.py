@@ -23,6 +23,11 @@ ARRAYS = ("damping", "radiation", "relaxing", "relaxation_times", "read", "load"
 NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
 
 
+def reduction_tolerance(tolerance: float) -> float:
+    """What a reduction is asked for where a waveform may be wrong by so much: little of it."""
+    return min(REDUCTION_TOLERANCE, tolerance / 50)
+
+
 def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
     """Times (t,) in s of a response: from 0 up to the duration, at least two."""
     return np.arange(max(2, round(scene.tacton.duration * rate))) / rate

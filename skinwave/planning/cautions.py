@@ -51,7 +51,7 @@ def other_loss(
     return (
         f"at {frequencies[worst]:.3g} Hz the loss factor is {ratio[worst]:.2g} times the one asked "
         f"for, which is fitted over {low:g} to {high:g} Hz: a resonance there is "
-        f"{1 / ratio[worst]:.2g} times as high as it should be; no model here has it right",
+        f"{1 / ratio[worst]:.2g} times as high as it should be in elements",
     )
 
 
@@ -59,8 +59,9 @@ def exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, 
     """Of what will be more wrong than it may be."""
     if not error > tolerance:
         return ()
+    percent = f"{100 * error:.0f}" if error > 0.1 else f"{100 * error:.2g}"
     return (
-        f"{what} will be wrong by about {100 * error:.2g} %, more than the tolerance of "
+        f"{what} will be wrong by about {percent} %, more than the tolerance of "
         f"{100 * tolerance:g} %; {cure} enough",
     )
 

@@ -1,6 +1,7 @@
 """How wrong an answer will be, estimated before it is computed."""
 
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 
@@ -61,11 +62,13 @@ def returned_and_start(scene: Scene) -> tuple[float, float]:
 
     What a side sends back to a probe is what an endless body would have at the probe's mirror
     image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
-    `OVERDAMPED` times that where shear waves cannot oscillate. Sides that absorb send nothing back.
+    `OVERDAMPED` times that where shear waves cannot oscillate. Sides that absorb and
+    a half-space, which has none, send nothing back.
     """
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
-    images = [] if body.sides == "absorbing" else _mirrored(probes, half)
+    endless = body.sides == "absorbing" or not isfinite(body.depth)
+    images = [] if endless else _mirrored(probes, half)
     if images and _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
@@ -140,5 +143,7 @@ def _along(path: Trajectory) -> Floats:
 
 def mean_gain(scene: Scene) -> float:
     """Pa of all foci together, on average over a Tacton."""
-    gain: Floats = scene.pressure.gain(np.arange(2000) / 2000 * scene.tacton.duration)
+    # At random, because any even spacing would take some modulation for a constant.
+    times = np.random.default_rng(0).uniform(0, scene.tacton.duration, 20_000)
+    gain: Floats = scene.pressure.gain(np.sort(times))
     return float(abs(gain.mean())) * len(scene.tacton.foci)

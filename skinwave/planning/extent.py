@@ -9,6 +9,8 @@ from skinwave.models.speeds import air_mass
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
 
+LOWEST = 20.0  # Hz at which air is weighed where no line is higher
+
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
@@ -29,9 +31,13 @@ def symmetry(scene: Scene) -> str:
 
 
 def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
-    """The body as far as waves come back from, and the reason if that is not all of it."""
+    """The body as far as waves come back from, and the reason if that is not all of it.
+
+    Only sides that absorb are moved inwards: what others send back belongs to the answer.
+    """
     body = scene.body
-    if body.kind != "slab" or body.base != "clamped" or not body.is_plain:
+    plain = body.kind == "slab" and body.base == "clamped" and body.is_plain
+    if not plain or body.sides != "absorbing":
         return body, []
     half = np.array([body.width, body.height]) / 2
     cut = half.copy()
@@ -51,7 +57,7 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[R
         reason=f"what comes back from further away is below {10 * tolerance:.2g} %; absorbing "
         f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
     )
-    return replace(body, width=width, height=height, sides="absorbing"), [row]
+    return replace(body, width=width, height=height), [row]
 
 
 def left_out(scene: Scene, highest: float) -> list[Row]:
@@ -59,11 +65,13 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
     body = scene.body
     if body.kind != "sheet":
         return []
-    air = air_mass(body, max(highest / 2, 20.0)) / body.mass_per_area
+    air = air_mass(body, max(highest / 2, LOWEST)) / body.mass_per_area
     force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
     sag = 0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness / body.depth
     shift = 100 * (1 - 1 / np.sqrt(1 + air))
-    lowered = f"resonances lower by {shift:.1f} %, by 2 rho_air/k at half the highest line"
+    lowered = (
+        f"resonances lower by {shift:.1f} %, by 2 rho_air/k at {max(highest / 2, LOWEST):.0f} Hz"
+    )
     return [
         Row(
             what="air" if body.air else "left out: air",

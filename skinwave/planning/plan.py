@@ -8,7 +8,7 @@ from simple_model.focus import spot_width
 from skinwave.effort import Progress
 from skinwave.models.bodies import check_mesh, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
-from skinwave.models.prepared import BAND, REDUCTION_TOLERANCE, Prepared, sample_times
+from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
 from skinwave.planning.cautions import exceeds, other_loss, under_resolved, unheld, unknown
 from skinwave.planning.estimates import (
@@ -108,7 +108,8 @@ def plan(
     axes = symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
-    step_error, start_error = _march_errors(scene, model, dt)
+    step = dt or 1 / TRANSIENT_RATE
+    step_error, start_error = _march_errors(scene, model, step)
     return Plan(
         model=model or "fem", body=body, symmetry=axes, h=found.h, highest=highest,
         error=found.error + step_error + start_error,
@@ -120,8 +121,8 @@ def plan(
             *unheld(scene),
             *other_loss(scene, *spectrum, tolerance),
             *exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
-                      f"about {1e3 * _enough(found, tolerance):.2g} mm is"),
-            *exceeds(f"a time step of {1e3 * (dt or 0):.3g} ms", step_error, tolerance,
+                      f"about {1e3 * _enough(body, found, tolerance):.2g} mm is"),
+            *exceeds(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
                       tolerance, "fem is"),
@@ -205,7 +206,7 @@ def _element_rows(
             value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[axes],
             reason=f"the load is its own mirror image across {' and '.join(axes)} = 0"
             if axes
-            else "the path of the focus leaves the middle planes",
+            else "all of the body is modelled",
         ),
         Row(
             what="element size",
@@ -217,7 +218,7 @@ def _element_rows(
         Row(
             what="reduction",
             value=f"{effort.reduced_dofs} unknowns, {effort.estimate:.0e} up to {BAND:.0f} Hz",
-            reason=f"asked for {min(REDUCTION_TOLERANCE, tolerance / 50):.1g}: it costs little",
+            reason=f"asked for {reduction_tolerance(tolerance):.1g}: it costs little",
         ),
         *left_out(scene, highest),
         Row(
@@ -228,19 +229,20 @@ def _element_rows(
     ]
 
 
-def _march_errors(scene: Scene, model: str | None, dt: float | None) -> tuple[float, float]:
+def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, float]:
     """Expected relative errors of a time step, and of leaving out how the motion starts."""
     if model not in ("fem-transient", "fem-harmonic"):
         return 0.0, 0.0
     known = sensitivity(scene)
     # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
-    step = known.value * (2 * np.pi * known.frequency * (dt or 1 / TRANSIENT_RATE)) ** 2 / 12
+    step = known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12
     return (min(1.0, step), 0.0) if model == "fem-transient" else (0.0, known.start)
 
 
-def _enough(found: Refined, tolerance: float) -> float:
-    aim = AIM * tolerance
-    return found.h * (aim / max(aim, found.error)) ** (1 / ORDER)
+def _enough(body: Body, found: Refined, tolerance: float) -> float:
+    """A size in metre that will do; a slab's cells are never higher than it."""
+    aim, size = AIM * tolerance, min(found.h, body.depth if body.kind == "slab" else found.h)
+    return size * (aim / max(aim, found.error)) ** (1 / ORDER)
 
 
 def _why_elements(scene: Scene, returned: float) -> str:
@@ -256,7 +258,7 @@ def _why_elements(scene: Scene, returned: float) -> str:
     if body.kind == "sheet":
         return f"the {body.sides} sides of this sheet reflect; exact waves are endless"
     if not is_flat(scene):
-        return f"a {body.base} base; exact waves are for one that holds the slab, or none"
+        return f"its base is {body.base}; exact waves are for one that holds the slab, or none"
     if body.sides == "absorbing":
         return "as asked; there are exact waves of this body"
-    return f"the {body.sides} sides send back about {100 * returned:.2g} %; exact waves are endless"
+    return f"the {body.sides} sides send back about {100 * returned:.3g} %; exact waves are endless"

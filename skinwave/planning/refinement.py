@@ -15,7 +15,7 @@ from simple_model import Response
 from skinwave.effort import Progress
 from skinwave.models import hands
 from skinwave.models.bodies import cell_layers, check_mesh, default_size
-from skinwave.models.prepared import Prepared, answer, prepare
+from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two sizes next to each other
@@ -60,7 +60,7 @@ def refined(
     def answered(size: float) -> tuple[Prepared, Response]:
         prepared = prepare(
             body, scene.probe_points, progress, h=size,
-            tolerance=min(1e-3, tolerance / 50), symmetry=symmetry, solver=solver,
+            tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=solver,
         )  # fmt: skip
         return prepared, answer(prepared, scene)
 
@@ -93,7 +93,8 @@ def ladder(body: Body) -> Floats:
     found, layers = [body.depth], 1
     while found[-1] > finest:
         layers = max(layers + 1, round(RATIO * layers))
-        found.append(_layered(body, layers, body.depth / layers))
+        size = _layered(body, layers, body.depth / layers)
+        found += [size] if size < found[-1] else []
     sizes = np.array(found)
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
@@ -109,7 +110,7 @@ def compared_with(body: Body, h: float) -> float:
     if not _has_cell_layers(body):
         return min(RATIO * h, max(body.width, body.height))
     layers = cell_layers(body, h)
-    other = layers - 1 if layers > 1 else 2
+    other = min(layers - 1, round(layers / RATIO)) or 2
     return _layered(body, other, min(h, body.depth) * layers / other)
 
 
@@ -119,10 +120,9 @@ def _has_cell_layers(body: Body) -> bool:
 
 
 def _layered(body: Body, layers: int, near: float) -> float:
-    """The size in metre next to another of which a slab has so many layers of cells."""
-    sizes = near * 2 ** np.linspace(-1, 1, 101)
-    fitting = [h for h in sizes.tolist() if cell_layers(body, h) == layers]
-    return min(fitting, key=lambda h: abs(np.log(h / near)))
+    """The size in metre next to another of which a slab has so many layers of cells, or nearly."""
+    sizes = (near * 2 ** np.linspace(-1, 1, 101)).tolist()
+    return min(sizes, key=lambda h: (abs(cell_layers(body, h) - layers), abs(np.log(h / near))))
 
 
 def coarser_by(body: Body, other: float, h: float) -> float:

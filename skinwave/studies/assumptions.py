@@ -59,7 +59,8 @@ def ladder(scene: Scene) -> tuple[str, ...]:
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
         "one material": slab and sum(x.thickness for x in LAYERS) < body.depth,
-        "flat": slab and body.placement == FLAT,
+        # The palm that stands for a hand has mounds, which a thin body has no room for.
+        "flat": slab and body.placement == FLAT and body.relief.thenar_height < body.depth < np.inf,
         "small deflection": sheet and body.sides == "clamped",
     }
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))

@@ -7,6 +7,7 @@ and its memory are its own.
 
 import os
 import time
+from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
@@ -137,7 +138,7 @@ def climb(
     todo, found = [*up, *aside, *but_one], []
     for k, (name, dropped) in enumerate(todo):
         progress(name, k / len(todo))
-        found.append(_answered(drawn(scene, dropped), scene, name, dropped, h))
+        found.append(_answered(drawn, scene, name, dropped, h))
     first, second = len(up), len(up) + len(aside)
     return Ladder(
         scene=scene, rungs=tuple(found[:first]), beside=tuple(found[first:second]),
@@ -146,13 +147,14 @@ def climb(
 
 
 def _answered(
-    changed_to: tuple[Scene, str], scene: Scene, name: str, dropped: tuple[str, ...],
-    h: float | None,
+    drawn: Callable[[Scene, tuple[str, ...]], tuple[Scene, str]], scene: Scene, name: str,
+    dropped: tuple[str, ...], h: float | None,
 ) -> Rung:  # fmt: skip
-    changed, model = changed_to
-    rung = {"name": name, "dropped": dropped, "model": model}
-    size = (h or default_size(scene.body)) if model == "fem" else None
+    rung = {"name": name, "dropped": dropped, "model": "none"}
     try:
+        changed, model = drawn(scene, dropped)
+        rung["model"] = model
+        size = (h or default_size(scene.body)) if model == "fem" else None
         response, seconds, memory = apart(_timed, changed, model, size)
     except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
         return Rung(**rung, error=str(error))  # type: ignore[arg-type]

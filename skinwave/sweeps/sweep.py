@@ -13,7 +13,7 @@ import numpy as np
 
 from simple_model import Response, tacton_lines
 from skinwave.effort import Progress, silent
-from skinwave.models.prepared import REDUCTION_TOLERANCE, Prepared, answer, prepare
+from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import is_flat
 from skinwave.planning.refinement import coarser_by, error_left, refined
 from skinwave.scene import Body, Scene
@@ -210,7 +210,7 @@ def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
 def _prepared(
     body: Body, probes: tuple[tuple[float, float], ...], h: float, knobs: Knobs
 ) -> Prepared:
-    tolerance = min(REDUCTION_TOLERANCE, knobs.tolerance / 50)
+    tolerance = reduction_tolerance(knobs.tolerance)
     return prepare(body, np.array(probes), h=h, solver=knobs.solver, tolerance=tolerance)
 
 
