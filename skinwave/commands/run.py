@@ -42,7 +42,8 @@ def run(options: argparse.Namespace) -> int:
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
-        if options.h or options.model in ("point-kernel", *EXACT):  # runs without a plan
+        unplanned = options.h and options.model != "auto"
+        if unplanned or options.model in ("point-kernel", *EXACT):  # runs without a plan
             required_plan(options, scene)
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             response = simulate(

@@ -26,9 +26,10 @@ def unheld(scene: Scene) -> tuple[str, ...]:
     """Of a body that a mean pressure pushes away."""
     if "clamped" in (scene.body.base, scene.body.sides) or not mean_gain(scene):
         return ()
+    endless = ", or take depth_mm = inf" if scene.body.kind == "slab" else ""
     return (
         "nothing holds this body, and a lasting pressure pushes it ever further: only motion about "
-        "the mean counts; clamp its base or its sides, or take depth_mm = inf",
+        f"the mean counts; clamp its base or its sides{endless}",
     )
 
 

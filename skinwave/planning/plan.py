@@ -213,7 +213,9 @@ def _element_rows(
             value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} unknowns",
             reason=f"{'as asked' if h else 'refined until good enough'}: those of "
             f"{1e3 * found.compared:.2f} mm differ by so much that an error of "
-            f"{100 * found.error:.2g} % is left",
+            f"{100 * found.error:.2g} % is left"
+            if np.isfinite(found.error)
+            else "the file's own, without another to compare it with",
         ),
         Row(
             what="reduction",

@@ -58,7 +58,8 @@ def ladder(scene: Scene) -> tuple[str, ...]:
         "vacuum": sheet,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
-        "one material": slab and sum(x.thickness for x in LAYERS) < body.depth,
+        "one material": slab
+        and (bool(body.layers) or sum(x.thickness for x in LAYERS) < body.depth),
         # The palm that stands for a hand has mounds, which a thin body has no room for.
         "flat": slab and body.placement == FLAT and body.relief.thenar_height < body.depth < np.inf,
         "small deflection": sheet and body.sides == "clamped",
