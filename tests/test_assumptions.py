@@ -49,6 +49,16 @@ def test_a_slab_and_a_sheet_have_their_own_ladders():
         ladder(replace(SKIN, body=BODIES["none"]))
 
 
+@pytest.mark.parametrize("depth", [0.004, np.inf])
+def test_a_body_without_room_for_a_palm_stays_flat(depth):
+    body = replace(SKIN.body, depth=depth)
+    names = ladder(replace(SKIN, body=body))
+    assert "flat" not in names
+    assert "no propagation" in names
+    layers = (Layer(thickness=0.001, material="dermis"), Layer(thickness=0.002, material="fat"))
+    assert "one material" in ladder(replace(SKIN, body=replace(body, layers=layers)))
+
+
 def test_nothing_dropped_is_the_published_model():
     scene, model = relaxed(SKIN, ())
     assert model == "point-kernel"
