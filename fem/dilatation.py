@@ -80,10 +80,8 @@ def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
         edge[taken] = longest[taken]
     while True:
         theirs = np.where(beyond >= 0, edge[beyond], -1)
-        size = np.where(
-            theirs >= 0, np.bincount(edge[edge >= 0], minlength=len(around))[theirs], len(edge)
-        )
-        smallest = size.argmin(axis=1)
+        size = np.bincount(edge[edge >= 0], minlength=len(around))
+        smallest = np.where(theirs >= 0, size[theirs], len(edge)).argmin(axis=1)
         joining = (edge < 0) & (theirs >= 0).any(axis=1)
         if not joining.any():
             break

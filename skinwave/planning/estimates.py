@@ -7,7 +7,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Trajectory
-from simple_model.flat_body import flat_body, point_response, steady_lines
+from simple_model.flat_body import flat_body, point_response, steady_lines, steady_state
 from simple_model.focus import spot_width
 from simple_model.steady import load_lines, summed
 from simple_model.trajectory import BY_POINTS
@@ -62,8 +62,8 @@ def returned_and_start(scene: Scene) -> tuple[float, float]:
 
     What a side sends back to a probe is what an endless body would have at the probe's mirror
     image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
-    `OVERDAMPED` times that where shear waves cannot oscillate. Sides that absorb and
-    a half-space, which has none, send nothing back.
+    `OVERDAMPED` times that where shear waves cannot oscillate. Sides that absorb send
+    nothing back, and a half-space has none.
     """
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
@@ -80,8 +80,7 @@ def returned_and_start(scene: Scene) -> tuple[float, float]:
     back = min(1.0, IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share)
     if tacton.is_sampled or tacton.trajectory.shape == "recorded":
         return back, 1.0
-    f, a = steady_lines(compliance(body), scene.pressure, probes, threshold=1e-3)
-    steady = np.real(np.exp(2j * np.pi * np.outer(times, f)) @ a)
+    steady = steady_state(compliance(body), scene.pressure, probes, times).displacement
     left = (u[:, : len(probes)] - steady) ** 2
     # What is left at the end of that time is taken to last: it is less.
     lasting = left[-len(left) // 4 :].mean(axis=0) * (tacton.duration - len(times) / FOLLOWED_AT)

@@ -65,13 +65,12 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
     body = scene.body
     if body.kind != "sheet":
         return []
-    air = air_mass(body, max(highest / 2, LOWEST)) / body.mass_per_area
+    middle = max(highest / 2, LOWEST)
+    air = air_mass(body, middle) / body.mass_per_area
     force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
     sag = 0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness / body.depth
     shift = 100 * (1 - 1 / np.sqrt(1 + air))
-    lowered = (
-        f"resonances lower by {shift:.1f} %, by 2 rho_air/k at {max(highest / 2, LOWEST):.0f} Hz"
-    )
+    lowered = f"resonances lower by {shift:.1f} %, by 2 rho_air/k at {middle:.0f} Hz"
     return [
         Row(
             what="air" if body.air else "left out: air",
