@@ -12,9 +12,10 @@ The basis is mass-orthonormal: the reduced mass is the identity, and field norms
 Mass that moves along with a body, as air does, is dense and can only be applied: with it the shift
 is 0, where no mass is factorised.
 
-The error estimate needs no solution of the full system: it is the residual of the smaller model
-answered in the space of the next moments, where Galerkin's method makes the two answers' difference
-solve the residual equation, carried on by the rate at which it has been shrinking.
+The error estimate needs no solution of the full system: it is the residual of the model answered
+in the space of some more moments, where Galerkin's method makes the two answers' difference solve
+the residual equation. Those moments are then dropped: a model of theirs would have an error that
+nobody knows, because convergence may at any moment become steep or stall.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,11 +38,12 @@ SHIFT = 2 * np.pi * 200.0  # rad/s: best between 200 and 400 Hz for a band of 1 
 # Of the band, if stiffness relaxes: fast waves lose little then, and many of them count. Best
 # between 0.8 and 1.6; the shift above takes nearly twice as many moments.
 RELAXING_SHIFT = 1.0
-BATCH = 5  # moments between two looks at the error estimate
-RELAXING_BATCH = 15  # the same of the larger models that stiffness takes which relaxes
+# Moments between two looks at the error: at least so many, which tell it to a factor of 4, and
+# this share of all, because a look at a large model costs more than its moments.
+AHEAD = 3
+SHARE_AHEAD = 1 / 16
 MOST_MOMENTS = 200
 SMALLEST = np.finfo(np.float64).tiny
-LASTING = 0.75  # power of the rate of convergence that goes on: a steep fall does not quite
 DISTINCT = 1e-6  # of the strongest: what less of probes is not told apart
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
@@ -51,8 +53,8 @@ class ReducedModel:
     """u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
 
     `basis` (3 n, r) in kg^-1/2, `K`, `C` and `R` (r, r), `outputs` (p, r), `branches` beside K of
-    (r, r) each; `estimate` is the relative change of the probes' adjoint fields by the last
-    moments, `moments` how many there are.
+    (r, r) each; `estimate` is the relative change of the probes' response by some more moments,
+    `moments` how many there are.
     """
 
     basis: Floats
@@ -112,41 +114,43 @@ def reduce(
     others = [C, *(branch.K for branch in branches)]
     space = _Space([M, *others], moving.shape[1] * (MOST_MOMENTS + 1))
     small = [np.empty((0, 0)) for _ in [K, *others]]
-    errors: list[float] = []
-    before = None
     grown = _moments(space, operators, shift, factor, moving)
+    looked, size, before = 0, 0, None
+    errors: list[float] = []
     for moment in range(1, MOST_MOMENTS + 1):
         next(grown)
         basis, images = space.basis, space.images
         new = slice(len(small[0]), None)
         moved = [K @ basis[:, new], *(image[:, new] for image in images[1:])]
         small = [_bordered(part, basis.T @ f) for part, f in zip(small, moved, strict=True)]
-        if moment % (RELAXING_BATCH if branches else BATCH):
+        if moment < looked + max(AHEAD, SHARE_AHEAD * moment):
             continue
-        weights = None if loads is None else space.basis.T @ loads[free]
+        weights = None if loads is None else basis.T @ loads[free]
         model = (small[0], small[1], _branches(small[2:], branches))
-        now = _probe_response(*model, space.basis.T @ seeds, weights, band)
+        now = _probe_response(*model, basis.T @ seeds, weights, band)
         errors += [] if before is None else [_change(before, now)]
-        before = now
-        if progress and errors:
-            progress(min(1.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
-        if len(errors) > 1 and _tail(errors) <= tolerance:
+        if errors and errors[-1] <= tolerance:
             break
+        if errors and progress:
+            progress(max(0.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
+        looked, size, before = moment, space.size, now
     else:
         raise ValueError(
-            f"{MOST_MOMENTS} moments leave an error of {_tail(errors):.2g}, above the tolerance "
+            f"{MOST_MOMENTS} moments leave an error of {errors[-1]:.2g}, above the tolerance "
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )
+    basis = space.basis[:, :size]
+    K, C, *relaxing = (part[:size, :size].copy() for part in small)
     return ReducedModel(
-        basis=operators.expand(space.basis),
-        K=small[0],
-        C=small[1],
-        R=space.basis.T @ (operators.R @ space.basis),
-        outputs=seeds.T @ space.basis,
-        moments=moment,
-        estimate=_tail(errors),
+        basis=operators.expand(basis),
+        K=K,
+        C=C,
+        R=basis.T @ (operators.R @ basis),
+        outputs=seeds.T @ basis,
+        moments=looked,
+        estimate=errors[-1],
         solver=factor.backend,
-        branches=_branches(small[2:], branches),
+        branches=_branches(relaxing, branches),
     )
 
 
@@ -315,8 +319,3 @@ def _change(before: Complex, now: Complex) -> float:
     change = now.copy()
     change[:, : before.shape[1]] -= before
     return float((np.linalg.norm(change, axis=(1, 2)) / np.linalg.norm(now, axis=(1, 2))).max())
-
-
-def _tail(changes: list[float]) -> float:
-    """Error left after the last change, if the changes go on shrinking nearly as they did last."""
-    return changes[-1] * min(1.0, changes[-1] / changes[-2]) ** LASTING

@@ -98,9 +98,7 @@ def test_a_sheet_of_other_cells_is_refused():
         added_mass(disc, fem.assemble(disc, fem.PRESETS["paper"]), 1.2, facets=part)
 
 
-def test_moments_at_rest_are_enough_and_their_error_estimate_holds(monkeypatch):
-    """Looked at after every second moment, they stop near the tolerance."""
-    monkeypatch.setattr("fem.reduced.BATCH", 2)
+def test_moments_at_rest_are_enough_and_their_error_estimate_holds():
     made = build(SHEET, H)
     ops = operators(made)
     P, points = surface_load(made)
@@ -112,7 +110,7 @@ def test_moments_at_rest_are_enough_and_their_error_estimate_holds(monkeypatch):
     hz = np.linspace(5, 1000, 100)
     a, b = (fem.transfer(model, model.basis.T @ loads_, hz) for model in (few, many))
     error = np.linalg.norm(a - b, axis=(1, 2)) / np.linalg.norm(b, axis=(1, 2))
-    assert error.max() < 1e-3
+    assert few.estimate / 4 < error.max() < few.estimate * 4
     basis = few.basis[ops.free]
     mass = basis.T @ (ops.M @ basis + air(SHEET, made, ops).M @ basis)
     np.testing.assert_allclose(mass, np.eye(len(mass)), atol=1e-9)

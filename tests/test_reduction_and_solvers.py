@@ -167,20 +167,24 @@ def test_reduction_alone_costs_less_than_a_thousandth(kind, h, seconds):
     assert misfit(reduced, full) <= 1e-3
 
 
-@pytest.mark.parametrize("kind", ["skin", "sheet"])
-def test_the_estimate_is_near_the_true_error(kind):
-    mesh, ops = body(kind)
+@pytest.mark.parametrize(
+    ("kind", "h"), [("skin", 0.006), ("sheet", 0.1 / 24), ("sheet", 0.1 / 25), ("sheet", 0.1 / 30)]
+)
+def test_the_estimate_is_near_the_true_error(kind, h):
+    """Also where moments converge ever faster, as those of sheets with little loss do."""
+    mesh, ops = body(kind, h)
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
     S = fem.probe_operator(mesh, PROBES)
     centres = np.random.default_rng(2).uniform(-0.02, 0.02, (12, 2))
     F = P @ MovingPressure(tacton=Tacton()).spot(points, centres).T
-    model = fem.reduce(ops, S, 1000.0, 5e-3, loads=F)
     frequencies = [0.0, 250.0, 700.0, 1000.0]
-    found = fem.transfer(model, model.basis.T @ F, frequencies)
     exact = np.array([S @ fem.harmonic(ops, F, f)[0] for f in frequencies])
-    error = np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
-    assert model.estimate <= 5e-3
-    assert model.estimate / 10 < error.max() < model.estimate * 10
+    for tolerance in (5e-3, 1e-3, 1e-4):
+        model = fem.reduce(ops, S, 1000.0, tolerance, loads=F)
+        found = fem.transfer(model, model.basis.T @ F, frequencies)
+        error = np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+        assert model.estimate <= tolerance
+        assert model.estimate / 4 < error.max() < model.estimate * 4
 
 
 def test_probes_in_one_element_are_no_more_than_what_moves_it():
