@@ -13,7 +13,7 @@ Where nu > 0.45 most of lam acts on a projection of the dilatation, see `dilatat
 displacements some wavelengths away come out several per cent too small.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,13 +25,13 @@ from fem.dilatation import projected_dilatation
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.pattern import UPPER, Pattern, from_blocks, from_masses
+from fem.pattern import UPPER, Pattern, from_components, from_nodal
 from fem.relaxation import Branch, on_free
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
-SLAB = 8192  # elements at a time: keeps the temporaries in tens of megabytes
-LOCKING_FREE = 9.0  # lam / mu at nu = 0.45, up to which 10-node tetrahedra need no remedy
+SLAB = 1024  # elements at a time: their temporaries stay near the processor
+LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra need no remedy up to it
 DIRECT = 2.0  # lam / mu that acts directly beyond it; a slab erred least with 1 to 3
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
@@ -98,7 +98,8 @@ def assemble(
         R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
     if drag is not None:
         R = R + _drag(mesh, pattern, _of(materials, "density")[region] * drag)
-    C = C + R
+    if R.nnz:
+        C = C + R
     if len(free) < mesh.n_dofs:
         K, C, M, R = (operator[free][:, free] for operator in (K, C, M, R))
         branches = on_free(branches, free)
@@ -119,29 +120,33 @@ def _volume_operators(
         [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
     ).T
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
-    blocks, masses = element_matrices(mesh, rho[region], mu[region], direct[region])
     D = {m: projected_dilatation(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
     projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
-    K = sum(projected.values(), start=from_blocks(pattern, blocks)).tocsr()
 
     def stiffness(share: Floats) -> sparse.csr_array:
         """K of a share (r,) of each material's."""
-        if np.ptp(share) == 0:
+        slabs = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
+        summed = from_components(pattern, pattern.sum(slabs, 6))
+        return sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
+
+    def portion(share: Floats) -> sparse.csr_array:
+        """The same, which is a multiple of K if all materials have one share."""
+        if not np.ptp(share):
             return share[0] * K if share[0] else sparse.csr_array(K.shape)
-        summed = from_blocks(pattern, blocks * share[region, None, None])
-        summed = sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
+        summed = stiffness(share)
         summed.eliminate_zeros()
         return summed
 
-    M = from_masses(pattern, masses)
+    K = stiffness(np.ones(len(materials)))
+    M = _mass(mesh, pattern, rho[region])
     relaxing, times = (_of(materials, name) for name in ("relaxing_modulus", "relaxation_time"))
     branches = tuple(
-        Branch(K=stiffness((times == time) * relaxing / mu), time=time)
+        Branch(K=portion((times == time) * relaxing / mu), time=time)
         for time in np.unique(times[relaxing > 0])
     )
-    C = stiffness(hysteretic_lag + _of(materials, "viscosity") / mu)
+    C = portion(hysteretic_lag + _of(materials, "viscosity") / mu)
     if np.ptp(mass_rate):
-        C = C + from_masses(pattern, masses * mass_rate[region, None, None])
+        C = C + _mass(mesh, pattern, (mass_rate * rho)[region])
     elif mass_rate[0]:
         C = C + mass_rate[0] * M
     return K, C, M, branches
@@ -157,42 +162,50 @@ def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
     return replace(mesh, tets=mesh.tets[chosen], region=mesh.region[chosen], facets={})
 
 
-def element_matrices(mesh: TetMesh, rho: Floats, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
-    """Element stiffness blocks (k, e, a, b) in N/m for the components (i, j) = UPPER[k], and
-    masses (e, a, b) in kg. The blocks below the diagonal are these, transposed.
+def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[slice, Floats]]:
+    """Which elements, and their stiffness blocks (k, e, a, b) in N/m for the components
+    (i, j) = UPPER[k]. The blocks below the diagonal are these, transposed.
     """
-    m, n_nodes = mesh.tets.shape
-    blocks, masses = np.empty((6, m, n_nodes, n_nodes)), np.empty((m, n_nodes, n_nodes))
-    N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
-    NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
-    shapes = shape_nodes(mesh)
-    for start in range(0, m, SLAB):
-        slab = slice(start, start + SLAB)
-        nodes = shapes[slab]
-        slopes, volumes = gradients(nodes, n_nodes, 2, start)
+    n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
+    for slab in _slabs(mesh):
+        slopes, volumes = gradients(shapes[slab], n_nodes, 2, slab.start)
         e, q = volumes.shape
         G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
         H = np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
         l2, m2 = lam[slab, None, None], mu[slab, None, None]
         shear = m2 * np.einsum("eiaib->eab", H)
-        for k, (i, j) in enumerate(UPPER):
-            block = blocks[k, slab]
+        blocks = np.empty((6, e, n_nodes, n_nodes))
+        for block, (i, j) in zip(blocks, UPPER, strict=True):
             np.multiply(l2, H[:, i, :, j], out=block)
             block += m2 * H[:, j, :, i]
             if i == j:
                 block += shear
-        weights = rho[slab, None] * jacobians(nodes, 5, start)[2]
-        masses[slab] = (weights @ NN).reshape(e, n_nodes, n_nodes)
-    return blocks, masses
+        yield slab, blocks
+
+
+def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]:
+    """Which elements, and their masses (1, e, a, b) in kg."""
+    n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
+    N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
+    NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
+    for slab in _slabs(mesh):
+        weights = rho[slab, None] * jacobians(shapes[slab], 5, slab.start)[2]
+        yield slab, (weights @ NN).reshape(1, -1, n_nodes, n_nodes)
+
+
+def _slabs(mesh: TetMesh) -> list[slice]:
+    return [slice(start, start + SLAB) for start in range(0, len(mesh.tets), SLAB)]
+
+
+def _mass(mesh: TetMesh, pattern: Pattern, rho: Floats) -> sparse.csr_array:
+    """int rho N_a N_b dV (3 n, 3 n)."""
+    return from_nodal(pattern, pattern.sum(element_masses(mesh, rho), 1)[0])
 
 
 def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
-    """int rate N_a N_b dV (3 n, 3 n), of a rate (m,) in kg/m3/s that is 0 in most elements."""
-    masses = np.zeros((len(mesh.tets), *2 * mesh.tets.shape[1:]))
+    """The same of a rate (m,) in kg/m3/s that is 0 in most elements."""
     layer = np.flatnonzero(rate)
-    none = np.zeros(len(layer))
-    masses[layer] = element_matrices(_part(mesh, layer), rate[layer], none, none)[1]
-    R = from_masses(pattern, masses)
+    R = _mass(_part(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
     R.eliminate_zeros()
     return R
 

@@ -49,7 +49,7 @@ def dashpots(
     impedance = pressure[:, None, None, None] * along
     impedance += shear[:, None, None, None] * (np.eye(3) - along)
     local = np.einsum("eq,eqij,qa,qb->eaibj", area, impedance, N, N, optimize=True)
-    dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+    dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1).astype(np.int32)
     rows = np.broadcast_to(dofs[:, :, None], (*dofs.shape, dofs.shape[1]))
     columns = rows.transpose(0, 2, 1)
     shape = (mesh.n_dofs, mesh.n_dofs)

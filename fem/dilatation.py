@@ -26,13 +26,13 @@ def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
     q = linear_functions(mesh, cluster, sloping)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
-    starts = 10 * np.arange(len(cluster) + 1)
+    starts = 10 * np.arange(len(cluster) + 1, dtype=np.int32)
     by_element = sparse.bsr_array(
-        (values, mesh.tets.ravel(), starts), shape=(4 * len(cluster), mesh.n_dofs)
+        (values, mesh.tets.ravel().astype(np.int32), starts), shape=(4 * len(cluster), mesh.n_dofs)
     )
-    order = np.argsort(cluster, kind="stable")
+    order = np.argsort(cluster, kind="stable").astype(np.int32)
     ones = np.broadcast_to(np.eye(4), (len(cluster), 4, 4))
-    starts = np.searchsorted(cluster[order], np.arange(len(sloping) + 1))
+    starts = np.searchsorted(cluster[order], np.arange(len(sloping) + 1)).astype(np.int32)
     return sparse.bsr_array((ones, order, starts)) @ by_element
 
 

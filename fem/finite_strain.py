@@ -21,7 +21,7 @@ from fem.assembly import LOSS_BAND, SLAB, Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.pattern import UPPER, Pattern, from_blocks
+from fem.pattern import UPPER, Pattern, from_components
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 
@@ -245,16 +245,13 @@ def tangent(part: Part, u: Floats) -> sparse.csr_array:
     """
     F, E = deformation(part, u)
     S = stress(part, E)
-    e, a = part.nodes.shape
-    blocks = np.empty((6, e, a, a))
-    for start in range(0, e, SLAB):
-        slab = slice(start, start + SLAB)
-        _tangent_blocks(part, slab, F[slab], S[slab], blocks[:, slab])
-    return from_blocks(part.pattern, blocks).tocsr()
+    slabs = (slice(start, start + SLAB) for start in range(0, len(part.nodes), SLAB))
+    blocks = ((slab, _tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs)
+    return from_components(part.pattern, part.pattern.sum(blocks, 6))
 
 
-def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats, blocks: Floats) -> None:
-    """Element blocks (6, e, a, b) of the tangent, in place."""
+def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
+    """Element blocks (6, e, a, b) of the tangent."""
     V, G = part.volume[slab, :, None, None], part.G[slab]
     G_transposed = G.swapaxes(2, 3)
     A = G_transposed @ F  # (e, q, a, i)
@@ -262,9 +259,11 @@ def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats, blocks: Float
     stretch = part.mu[slab, None, None, None] * (F.swapaxes(2, 3) @ F)
     geometric = (V * (G_transposed @ (S @ G))).sum(axis=1)
     lam, mu = part.lam[slab, None, None], part.mu[slab, None, None]
+    blocks = np.empty((6, *geometric.shape))
     for block, (i, j) in zip(blocks, UPPER, strict=True):
         across = np.einsum("eqa,eqb->eab", V[..., 0] * A[..., i], A[..., j], optimize=True)
         block[:] = lam * across + mu * across.swapaxes(1, 2)
         block += np.einsum("eqab,eq->eab", slopes, stretch[..., i, j])
         if i == j:
             block += geometric
+    return blocks

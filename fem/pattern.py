@@ -1,5 +1,6 @@
 """Where the values of elements are summed into sparse matrices."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,14 +27,27 @@ class Pattern:
         bits = int(key.size).bit_length()
         if int(n_nodes**2).bit_length() + bits > 63:
             raise MeshError(f"{len(tets)} tetrahedra are too many for one assembly; coarsen")
-        packed = np.sort((key << bits) | np.arange(key.size))
-        key, origin = packed >> bits, packed & ((1 << bits) - 1)
+        # In place: memory that is touched for the first time costs more than the sums.
+        key <<= bits
+        key |= np.arange(key.size)
+        key.sort()
+        origin = key & ((1 << bits) - 1)
+        key >>= bits
         first = np.append(True, key[1:] != key[:-1])
-        slot = np.empty(key.size, np.int64)
-        slot[origin] = np.cumsum(first) - 1
         rows, indices = np.divmod(key[first], n_nodes)
+        slot = key
+        slot[origin] = np.cumsum(first) - 1
         indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
         return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
+
+    def sum(self, slabs: Iterable[tuple[slice, Floats]], parts: int) -> Floats:
+        """Values (parts, e, a, b) of some elements at a time summed into slots (parts, slots)."""
+        summed = np.zeros((parts, len(self.indices)))
+        for slab, values in slabs:
+            slots = self.slot[slab].ravel()
+            for total, part in zip(summed, values, strict=True):
+                np.add.at(total, slots, part.ravel())
+        return summed
 
     def mirrored(self) -> Ints:
         """The slot (slots,) of each pair taken the other way round."""
@@ -43,31 +57,44 @@ class Pattern:
         )
         return slots.tocsc().data
 
-    def sum(self, values: Floats) -> Floats:
-        """Element values (e, a, b) summed into the slots."""
-        summed = np.bincount(self.slot.ravel(), values.ravel(), len(self.indices))
-        return summed.astype(np.float64, copy=False)
+    def rows(self) -> tuple[list[Ints], Ints]:
+        """Where slots are if each node has three rows: places (slots,) in each, and their indptr
+        (3 n + 1,).
+        """
+        lengths = np.diff(self.indptr)
+        first = np.arange(len(self.indices)) + 2 * np.repeat(self.indptr[:-1], lengths)
+        further = np.repeat(lengths, lengths)
+        starts = 3 * self.indptr[:-1, None] + lengths[:, None] * np.arange(3)
+        places = [first, first + further, first + 2 * further]
+        return places, np.append(starts.ravel(), 3 * self.indptr[-1])
 
 
-def from_blocks(pattern: Pattern, blocks: Floats) -> sparse.bsr_array:
-    """Symmetric matrix (3 n, 3 n) of element blocks (k, e, a, b), components UPPER[k]."""
-    data = np.empty((len(pattern.indices), 3, 3))
-    mirrored = pattern.mirrored()
-    for k, (i, j) in enumerate(UPPER):
-        data[:, i, j] = component = pattern.sum(blocks[k])
+def from_components(pattern: Pattern, summed: Floats) -> sparse.csr_array:
+    """Symmetric matrix (3 n, 3 n) of slots (6, slots) for the components UPPER."""
+    (places, indptr), mirrored = pattern.rows(), pattern.mirrored()
+    n, slots, index = len(indptr) - 1, len(mirrored), _index(9 * len(mirrored))
+    data, columns = np.empty((3 * slots, 3)), np.empty((3 * slots, 3), index)
+    for rows in places:
+        for j in range(3):
+            columns[rows, j] = 3 * pattern.indices + j
+    for component, (i, j) in zip(summed, UPPER, strict=True):
+        data[places[i], j] = component
         if i != j:
-            data[:, j, i] = component[mirrored]
-    n = 3 * (len(pattern.indptr) - 1)
-    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
+            data[places[j], i] = component[mirrored]
+    indptr = (3 * indptr).astype(index)
+    return sparse.csr_array((data.ravel(), columns.ravel(), indptr), shape=(n, n))
 
 
-def from_masses(pattern: Pattern, masses: Floats) -> sparse.csr_array:
-    """The mass matrix of nodes, repeated for each of the three components."""
-    nodal, lengths = pattern.sum(masses), np.repeat(np.diff(pattern.indptr), 3)
-    indptr = np.concatenate([[0], np.cumsum(lengths)])
-    # Entry k of a row comes from entry k of its node's row.
-    source = np.arange(indptr[-1]) + np.repeat(
-        np.repeat(pattern.indptr[:-1], 3) - indptr[:-1], lengths
-    )
-    component = np.repeat(np.tile(np.arange(3), len(pattern.indptr) - 1), lengths)
-    return sparse.csr_array((nodal[source], 3 * pattern.indices[source] + component, indptr))
+def from_nodal(pattern: Pattern, summed: Floats) -> sparse.csr_array:
+    """The matrix (3 n, 3 n) of slots (slots,), the same for each of the three components."""
+    places, indptr = pattern.rows()
+    n, slots, index = len(indptr) - 1, len(summed), _index(3 * len(summed))
+    data, columns = np.empty(3 * slots), np.empty(3 * slots, index)
+    for i, rows in enumerate(places):
+        data[rows], columns[rows] = summed, 3 * pattern.indices + i
+    return sparse.csr_array((data, columns, indptr.astype(index)), shape=(n, n))
+
+
+def _index(entries: int) -> type[np.signedinteger]:
+    """The smallest type that numbers so many entries, which every later product reads."""
+    return np.int32 if entries <= np.iinfo(np.int32).max else np.int64
