@@ -308,7 +308,8 @@ def _probe_response(
     band: float,
 ) -> Complex:
     """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
-    w = 2 * np.pi * np.linspace(0, band, 41)
+    # Nearly from rest: at rest itself a body that nothing holds has no answer.
+    w = 2 * np.pi * np.linspace(1e-3 * band, band, 41)
     # One by one: all at once would be as large as the body's own factors.
     fields = (np.linalg.solve(_impedance(K, C, branches, at)[0], seeds) for at in w[:, None])
     return np.array([x if loads is None else loads.T @ x for x in fields])

@@ -229,6 +229,11 @@ class Body:
         return tuple(found)
 
     @property
+    def is_held(self) -> bool:
+        """Whether anything keeps it in its place."""
+        return "clamped" in (self.base, self.sides)
+
+    @property
     def is_plain(self) -> bool:
         """Whether it is of one material and lies flat under the device."""
         return len(self.strata) == 1 and self.placement == FLAT

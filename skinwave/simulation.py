@@ -8,7 +8,7 @@ import fem
 from simple_model import Response, flat_body, point_kernel, steady_state
 from simple_model.choices import choose
 from skinwave.effort import Progress, silent
-from skinwave.models.bodies import compliance
+from skinwave.models.bodies import exact_waves
 from skinwave.models.full import Map, harmonic_answer, transient_answer
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
@@ -66,24 +66,19 @@ def simulate(
         asked = None if model == "auto" else model
         required = plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
         if required.model == "fem" and required.prepared:
-            return _warned(answer(required.prepared, scene, progress), required.warnings)
+            return warned(answer(required.prepared, scene, progress), required.warnings)
         scene = replace(scene, body=required.body)
         found = simulate(
             scene, required.model, tolerance, progress,
             h=required.h or h, dt=dt, solver=solver, mapped=mapped,
         )  # fmt: skip
-        return _warned(found, required.warnings)
+        return warned(found, required.warnings)
     times = sample_times(scene)
     if model == "point-kernel":
         return point_kernel(scene.pressure, scene.probe_points, times)
     if model in EXACT:
-        if not scene.body.is_plain:
-            raise ValueError(
-                f"{model} takes one material that lies flat across the beam, not layers or a "
-                "placement; use fem"
-            )
-        waves = EXACT[model]
-        return waves(compliance(scene.body), scene.pressure, scene.probe_points, times)
+        waves, body = EXACT[model], exact_waves(scene.body, model)
+        return waves(body, scene.pressure, scene.probe_points, times)
     report = progress or silent
     if model == "fem-transient":
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
@@ -102,7 +97,8 @@ def simulate(
     return answer(prepared, scene, report)
 
 
-def _warned(response: Response, warnings: tuple[str, ...]) -> Response:
+def warned(response: Response, warnings: tuple[str, ...]) -> Response:
+    """A response that says what is less than was asked for."""
     return replace(response, effort=replace(response.effort, warnings=warnings))
 
 

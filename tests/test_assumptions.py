@@ -20,6 +20,7 @@ from skinwave.studies.assumptions import (
     as_relaxing,
     as_viscous,
     beside,
+    can_be_alone,
     held,
     ladder,
     relaxed,
@@ -64,6 +65,19 @@ def test_nothing_dropped_is_the_published_model():
     assert model == "point-kernel"
     assert scene.body.kind == "none"
     assert (scene.pressure.drive, scene.pressure.focus) == ("linear", "main_lobe")
+
+
+def test_an_endless_body_of_elements_has_sides_that_absorb():
+    thin = replace(SKIN, body=replace(SKIN.body, depth=0.004, sides="clamped"))
+    names = ladder(thin)
+    body = {
+        name: relaxed(thin, [n for n in names if n != name])[0].body for name in ("endless", "flat")
+    }
+    assert body["endless"].sides == "absorbing"
+    assert body["flat"].sides == "clamped"
+    assert can_be_alone("endless", names, thin)
+    assert not can_be_alone("endless", ladder(SKIN), SKIN)  # a palm ends
+    assert not can_be_alone("endless", ladder(PAPER), PAPER)
 
 
 def test_all_dropped_is_the_richest():
@@ -209,6 +223,8 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     # with a mean in the load its lines at multiples of f_d come from nothing
     assert effects["linear drive"]["decibel"]["f_d"] > 40
     assert effects["continuous path"]["waveform"] < 0.1 < effects["no propagation"]["waveform"]
+    assert effects["viscous loss"]["alone"] is None  # it stands beside the ladder
+    assert all(e["alone"] is not None for name, e in effects.items() if name != "viscous loss")
     assert all(rung["seconds"] > 0 for rung in record["rungs"])
     with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
         assert {"t", "probes", "as published", "endless"} <= set(kept.files)

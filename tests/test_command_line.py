@@ -151,6 +151,23 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
     assert not os.path.exists(tmp_path / "cut.partial")
 
 
+def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(
+        "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n"
+        '[body]\nwidth_mm = 30\nheight_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
+    )
+    for model, cause in (
+        ("fem", "elements of 15 mm will be wrong"),
+        ("flat-body", "flat-body, which lets no wave"),
+    ):
+        asked = ["run", "scene.toml", "--model", model, "--h", "15", "--quiet", "--overwrite"]
+        assert main(asked) == 0
+        said = capsys.readouterr().err
+        assert said.count(f"warning: {cause}") == 1
+        assert f"Take care: {cause}" in (tmp_path / "scene-out/index.html").read_text()
+
+
 def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
     """A run that was left to plan itself, with a ladder of meshes that ends too early."""
     monkeypatch.chdir(tmp_path)

@@ -18,12 +18,15 @@ import pytest
 from meshes import cache
 from skinwave import read
 from skinwave.cli import main
+from skinwave.planning.plan import Plan
+from skinwave.scene import BODIES
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(sys.platform == "win32", reason="signals and limits differ"),
 ]
 KILLS = 20
+PLANNED = Plan(model="flat-body", body=BODIES["skin-slab"])
 COMPARE = [sys.executable, "-m", "skinwave", "compare", "good.toml", "--h", "4", "--out", "out"]
 
 
@@ -162,7 +165,7 @@ def test_a_full_or_read_only_disk_is_said_and_nothing_is_left(
         arguments = [command, "good.toml", *knobs, "--quiet", "--overwrite", "--out", "above/out"]
         with monkeypatch.context() as patch:
             patch.setenv("SKINWAVE_CACHE", "")
-            patch.setattr("skinwave.commands.run.required_plan", lambda options, scene: None)
+            patch.setattr("skinwave.commands.run.required_plan", lambda *asked: PLANNED)
             patch.setattr(what, fails)
             said = refused(capsys, folder, arguments)
         assert f"cannot be written ({os.strerror(code)})" in said

@@ -6,17 +6,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fem import PRESETS
 from meshes import cache
-from simple_model import Trajectory
+from simple_model import Response, Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
-from skinwave.models.bodies import cell_layers, default_size
+from skinwave.models.bodies import cell_layers, coarsest_size, default_size
 from skinwave.models.prepared import answer, prepare
+from skinwave.planning.cautions import other_loss
 from skinwave.planning.estimates import returned_and_start
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
+from skinwave.planning.refinement import (
+    ORDER,
+    coarser_by,
+    compared_with,
+    error_left,
+    ladder,
+    refined,
+)
 from skinwave.planning.sensitivity import sensitivity
-from skinwave.scene import Body
+from skinwave.scene import Body, Layer
 from skinwave.studies.paper15 import scenes, tactons
 from skinwave.studies.tradeoff import Candidate, sentences, study, write
 
@@ -173,6 +182,47 @@ def test_a_loss_factor_is_warned_of_where_its_fit_is_far_off():
     (said,) = (w for w in plan(loads(text.format(15)), 0.5, h=0.005).warnings if "loss" in w)
     assert "fitted over 50 to 600 Hz" in said
     assert not any("loss" in w for w in plan(loads(text.format(200)), 0.5, h=0.005).warnings)
+
+
+def test_a_layers_own_loss_factor_is_warned_of_too():
+    lossy = replace(PRESETS["paper"], loss_factor=0.1)
+    scene = loads(SHORT)
+    layers = (Layer(thickness=1e-3, material=lossy),)
+    layered = replace(scene, body=replace(scene.body, layers=layers))
+    asked = np.array([0.0, 10.0]), np.array([[0.5], [0.5]]), 0.05
+    assert other_loss(scene, *asked) == ()
+    (said,) = other_loss(layered, *asked)
+    assert "at 10 Hz the loss factor is" in said
+
+
+def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
+    t = np.arange(1000) / 1e4
+    wave, drift = np.sin(2 * np.pi * 140 * t)[:, None], (1e3 * t**2)[:, None]
+    coarse, fine = (
+        Response(model="fem", times=t, probes=np.zeros((1, 2)), displacement=u)
+        for u in (1.1 * wave + drift, wave + drift)
+    )
+    expected = 0.1 / (1.3**ORDER - 1)
+    assert error_left(coarse, fine, 1.3, held=True) < 0.3 * expected
+    assert error_left(coarse, fine, 1.3, held=False) == pytest.approx(expected, rel=1e-3)
+
+
+def test_exact_waves_are_not_planned_for_what_has_none():
+    tilted = SHORT + "[placement]\ntilt_x_deg = 5"
+    layered = SHORT + "[[body.layers]]\nthickness_mm = 1\nmaterial = 'dermis'"
+    for text in (tilted, layered):
+        for do in (plan, lambda scene, model: simulate(scene, model)):
+            with pytest.raises(ValueError, match="one material that lies flat"):
+                do(loads(text), model="flat-body")
+
+
+def test_meshes_of_a_palm_tell_its_layers_apart():
+    thin = Body(kind="palm", layers=(Layer(thickness=1e-3, material="dermis"),))
+    assert default_size(thin) == coarsest_size(thin) == 2e-3
+    assert compared_with(thin, 2e-3) == pytest.approx(2e-3 / 1.3)
+    thick = Body(kind="palm", layers=(Layer(thickness=2.5e-3, material="dermis"),))
+    assert default_size(thick) == default_size(Body(kind="palm"))
+    assert compared_with(thick, 3e-3) == pytest.approx(3.9e-3)
 
 
 @pytest.mark.parametrize("sides", ["free", "clamped"])

@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.run import Run
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
-    from skinwave.simulation import EXACT, simulate
+    from skinwave.simulation import EXACT, simulate, warned
     from skinwave.studies.study import write_single
 
     scene = read(options.scene)
@@ -43,18 +43,21 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
         unplanned = options.h and options.model != "auto"
-        if unplanned or options.model in ("point-kernel", *EXACT):  # runs without a plan
-            required_plan(options, scene)
+        unplanned = unplanned or options.model in ("point-kernel", *EXACT)
+        told = required_plan(options, scene).warnings if unplanned else ()
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             response = simulate(
                 scene, options.model, options.tolerance, progress,
                 h=metre(options.h), dt=options.dt, solver=options.solver, mapped=mapped,
             )  # fmt: skip
+        if unplanned:
+            response = warned(response, told)
+        else:
+            warn(response.effort.warnings)
         run = Run(
             tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
         )
         write_single(folder, run)
-    warn(response.effort.warnings)
     summary = {
         "out": str(out),
         "model": response.model,

@@ -194,7 +194,7 @@ def cell_layers(body: Body, h: float) -> int:
 def _strata(starts: Sequence[float], depth: Floats, h: float) -> Ints:
     """Which stratum (m,) the middle of each tetrahedron lies in, of a mesh without its planes."""
     thinnest = np.diff(starts).min(initial=np.inf)
-    if thinnest < 0.5 * h:
+    if thinnest < 0.5 * h * (1 - 1e-9):
         raise ValueError(
             f"a layer of {1e3 * thinnest:g} mm is thinner than half an element of {1e3 * h:g} mm; "
             "take smaller elements, thicker layers, or a slab, whose elements follow its layers"
@@ -249,7 +249,13 @@ def default_size(body: Body) -> float:
     """Element size in metre of a body whose user asks for none."""
     if body.kind == "sheet":
         return min(body.width, body.height) / SHEET_CELLS
-    return min(SLAB_CELL, body.depth / 2)
+    return min(SLAB_CELL, body.depth / 2, coarsest_size(body))
+
+
+def coarsest_size(body: Body) -> float:
+    """Element size in metre that still tells a body's layers apart; those of a slab follow them."""
+    starts = [start for start, _ in body.strata]
+    return 2 * float(np.diff(starts).min(initial=np.inf)) if body.kind != "slab" else np.inf
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
@@ -270,6 +276,22 @@ def has_exact_waves(body: Body) -> bool:
     """Whether exact waves of an endless slab stand for a body, but for what its sides send back."""
     layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
     return layer and body.is_plain
+
+
+def exact_waves(body: Body, model: str) -> Compliance:
+    """How a body gives way that a model of exact waves is asked for.
+
+    Raises
+    ------
+    ValueError
+        If there is no body, or none that has exact waves.
+    """
+    if not body.is_plain:
+        raise ValueError(
+            f"{model} takes one material that lies flat across the beam, not layers or a "
+            "placement; use fem"
+        )
+    return compliance(body)
 
 
 def compliance(body: Body) -> Compliance:

@@ -24,7 +24,7 @@ def unknown(found: Refined) -> tuple[str, ...]:
 
 def unheld(scene: Scene) -> tuple[str, ...]:
     """Of a body that a mean pressure pushes away."""
-    if "clamped" in (scene.body.base, scene.body.sides) or not mean_gain(scene):
+    if scene.body.is_held or not mean_gain(scene):
         return ()
     endless = ", or take depth_mm = inf" if scene.body.kind == "slab" else ""
     return (
@@ -37,12 +37,11 @@ def other_loss(
     scene: Scene, frequencies: Floats, shares: Floats, tolerance: float
 ) -> tuple[str, ...]:
     """Where Rayleigh damping is far from the loss factor that it stands for."""
-    asked = scene.body.solid.loss_factor
-    if not asked:
+    if not any(solid.loss_factor for _, solid in scene.body.strata):
         return ()
-    by_mass, by_stiffness = rayleigh_damping(asked, LOSS_BAND)
+    by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND)
     w = 2 * np.pi * np.maximum(frequencies, 1e-9)
-    ratio = (by_mass / w + by_stiffness * w) / asked
+    ratio = by_mass / w + by_stiffness * w
     heard = (frequencies > 0) & (np.sqrt(shares.max(axis=1)) > tolerance)
     beyond = heard & (abs(ratio - 1) > LOSS_ERROR)
     if not beyond.any():

@@ -6,7 +6,7 @@ import numpy as np
 
 from simple_model.focus import spot_width
 from skinwave.effort import Progress
-from skinwave.models.bodies import check_mesh, vacuum_only
+from skinwave.models.bodies import check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
@@ -23,6 +23,7 @@ from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
+EXACT = ("flat-body", "flat-body-harmonic")
 UNREDUCED = ("fem-transient", "fem-harmonic", "fem-nonlinear-transient")
 KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
 
@@ -89,6 +90,8 @@ def plan(
         return _kernel(scene, tolerance)
     if model in ("fem-nonlinear", "fem-nonlinear-transient"):
         return _nonlinear(scene, tolerance, model, h)
+    if model in EXACT:
+        exact_waves(scene.body, model)
     spectrum = motion_lines(scene, tolerance)
     highest = highest_line(*spectrum, tolerance)
     rows = [
@@ -100,8 +103,7 @@ def plan(
         )
     ]
     returned, start = returned_and_start(scene) if is_flat(scene) else (1.0, 1.0)
-    flat = model in ("flat-body", "flat-body-harmonic")
-    if flat or (model is None and returned <= WAVES_SHARE * tolerance):
+    if model in EXACT or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
     body, cut = extent(scene, tolerance, highest)
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene, returned)), *cut]
@@ -200,6 +202,7 @@ def _element_rows(
     scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
 ) -> list[Row]:
     effort = found.prepared.effort
+    kept = "" if "factorise and reduce" in effort.seconds else ", which is kept"
     return [
         Row(
             what="symmetry",
@@ -226,7 +229,7 @@ def _element_rows(
         Row(
             what="cost",
             value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
-            reason="the last mesh; 0.05 s for each further Tacton on the same body",
+            reason=f"the last mesh{kept}; 0.05 s for each further Tacton on the same body",
         ),
     ]
 
@@ -257,6 +260,8 @@ def _why_elements(scene: Scene, returned: float) -> str:
         return f"{len(body.strata)} layers; exact waves are for one material"
     if body.placement != FLAT:
         return "the body is tilted or moved; exact waves are for a flat one across the beam"
+    if body.kind == "sheet" and body.sides == "absorbing":
+        return "sides of a sheet absorb some of what reaches them; exact waves are endless"
     if body.kind == "sheet":
         return f"the {body.sides} sides of this sheet reflect; exact waves are endless"
     if not is_flat(scene):

@@ -11,7 +11,7 @@ import numpy as np
 
 import fem
 from meshes.tetmesh import Floats
-from skinwave.models.bodies import default_size
+from skinwave.models.bodies import coarsest_size, default_size
 from skinwave.models.prepared import SAMPLE_RATE as RATE
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.scene import Scene
@@ -36,7 +36,8 @@ class Sensitivity:
 
 def sensitivity(scene: Scene) -> Sensitivity:
     """Found from two answers of a coarse reduced model, which takes seconds once per body."""
-    coarse = prepare(scene.body, scene.probe_points, h=COARSENING * default_size(scene.body))
+    h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
+    coarse = prepare(scene.body, scene.probe_points, h=h)
     values = coarse.poles.values * (1 - DETUNING)
     frequencies, forces = reduced_lines(scene.pressure, coarse.points, coarse.load)
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE

@@ -79,6 +79,11 @@ def beside(scene: Scene) -> tuple[str, ...]:
     return (*names[: names.index("little loss") + 1], "viscous loss")
 
 
+def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
+    """Whether elements can keep an assumption: an endless body is one whose sides absorb."""
+    return name != "endless" or (scene.body.kind == "slab" and "flat" not in names)
+
+
 def relaxed(
     scene: Scene,
     dropped: Collection[str],
@@ -109,6 +114,8 @@ def relaxed(
         return replace(scene, pressure=pressure, body=BODIES["none"]), "point-kernel"
     body = _body(scene, dropped)
     model = "fem" if elements else "flat-body"
+    if elements and body.kind == "slab" and "endless" not in dropped:
+        body = replace(body, sides="absorbing")
     if "small deflection" in dropped:
         model = "fem-nonlinear"
     return replace(scene, pressure=pressure, body=body), model

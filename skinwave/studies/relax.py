@@ -24,6 +24,7 @@ from skinwave.simulation import simulate
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
     beside,
+    can_be_alone,
     check_rate,
     held,
     ladder,
@@ -94,7 +95,9 @@ class Ladder:
     def effects(self) -> list[Effect]:
         """What each assumption changes, the greatest first; rungs that failed are passed over."""
         answered = [rung for rung in self.rungs if rung.response]
-        kept = {set(self.rungs[-1].dropped).difference(r.dropped).pop(): r for r in self.but_one}
+        all_of_them = set(self.rungs[-1].dropped)
+        left = [(all_of_them.difference(r.dropped), r) for r in (*self.rungs, *self.but_one)]
+        kept = {names.pop(): rung for names, rung in left if len(names) == 1}
         found = [
             effect(self.scene, before, rung, answered[-1], kept.get(rung.name))
             for before, rung in self.pairs()
@@ -133,7 +136,7 @@ def climb(
     but_one = [
         (f"all but: {name}", tuple(n for n in names if n != name))
         for name in names
-        if tuple(n for n in names if n != name) not in asked
+        if tuple(n for n in names if n != name) not in asked and can_be_alone(name, names, scene)
     ]
     todo, found = [*up, *aside, *but_one], []
     for k, (name, dropped) in enumerate(todo):
@@ -154,7 +157,7 @@ def _answered(
     try:
         changed, model = drawn(scene, dropped)
         rung["model"] = model
-        size = (h or default_size(scene.body)) if model == "fem" else None
+        size = h or default_size(scene.body) if model == "fem" else h
         response, seconds, memory = apart(_timed, changed, model, size)
     except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
         return Rung(**rung, error=str(error))  # type: ignore[arg-type]

@@ -271,7 +271,7 @@ def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> tuple[Response, dict[str
     coarse = answer(_prepared(scene.body, scene.probes, mesh.coarser, knobs), scene)
     if coarse.effort.dofs != found.effort.dofs:
         ratio = coarser_by(scene.body, mesh.coarser, mesh.h)
-        row["expected_error"] = error = error_left(coarse, found, ratio)
+        row["expected_error"] = error = error_left(coarse, found, ratio, held=scene.body.is_held)
         if error > knobs.tolerance:
             said = (
                 f"elements of {1e3 * mesh.h:.3g} mm will be wrong by about {100 * error:.2g} %, "
