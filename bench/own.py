@@ -16,8 +16,8 @@ from skinwave.models.prepared import answer, prepare
 from skinwave.scene import PROBES, Body
 from skinwave.studies import paper15
 
-SIZES = (7e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.4e-3)  # m, of elements: 10 k to 500 k unknowns
-MOST_MEMORY = 12 * 2**30  # bytes
+SIZES = (10e-3, 6e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.7e-3)  # m, of elements: to 500 k unknowns
+MOST_MEMORY = 16 * 2**30  # bytes
 
 
 def growth() -> None:

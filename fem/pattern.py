@@ -1,6 +1,6 @@
 """Where the values of elements are summed into sparse matrices."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,12 +31,13 @@ class Pattern:
         key <<= bits
         key |= np.arange(key.size)
         key.sort()
-        origin = key & ((1 << bits) - 1)
+        index = _index(key.size)
+        origin = (key & ((1 << bits) - 1)).astype(index)
         key >>= bits
         first = np.append(True, key[1:] != key[:-1])
         rows, indices = np.divmod(key[first], n_nodes)
-        slot = key
-        slot[origin] = np.cumsum(first) - 1
+        slot = np.empty(key.size, index)
+        slot[origin] = np.cumsum(first, dtype=index) - index(1)
         indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
         return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
 
@@ -57,30 +58,28 @@ class Pattern:
         )
         return slots.tocsc().data
 
-    def rows(self) -> tuple[list[Ints], Ints]:
-        """Where slots are if each node has three rows: places (slots,) in each, and their indptr
-        (3 n + 1,).
+    def rows(self) -> tuple[Callable[[int], Ints], Ints]:
+        """Where slots are if each node has three rows: places (slots,) in the row of a component,
+        and the rows' indptr (3 n + 1,).
         """
         lengths = np.diff(self.indptr)
         first = np.arange(len(self.indices)) + 2 * np.repeat(self.indptr[:-1], lengths)
         further = np.repeat(lengths, lengths)
         starts = 3 * self.indptr[:-1, None] + lengths[:, None] * np.arange(3)
-        places = [first, first + further, first + 2 * further]
-        return places, np.append(starts.ravel(), 3 * self.indptr[-1])
+        return lambda i: first + i * further, np.append(starts.ravel(), 3 * self.indptr[-1])
 
 
 def from_components(pattern: Pattern, summed: Floats) -> sparse.csr_array:
     """Symmetric matrix (3 n, 3 n) of slots (6, slots) for the components UPPER."""
-    (places, indptr), mirrored = pattern.rows(), pattern.mirrored()
+    mirrored, (places, indptr) = pattern.mirrored(), pattern.rows()
     n, slots, index = len(indptr) - 1, len(mirrored), _index(9 * len(mirrored))
     data, columns = np.empty((3 * slots, 3)), np.empty((3 * slots, 3), index)
-    for rows in places:
-        for j in range(3):
-            columns[rows, j] = 3 * pattern.indices + j
     for component, (i, j) in zip(summed, UPPER, strict=True):
-        data[places[i], j] = component
+        data[places(i), j] = component
         if i != j:
-            data[places[j], i] = component[mirrored]
+            data[places(j), i] = component[mirrored]
+    for i in range(3):
+        columns[places(i)] = 3 * pattern.indices[:, None].astype(index) + np.arange(3, dtype=index)
     indptr = (3 * indptr).astype(index)
     return sparse.csr_array((data.ravel(), columns.ravel(), indptr), shape=(n, n))
 
@@ -90,8 +89,8 @@ def from_nodal(pattern: Pattern, summed: Floats) -> sparse.csr_array:
     places, indptr = pattern.rows()
     n, slots, index = len(indptr) - 1, len(summed), _index(3 * len(summed))
     data, columns = np.empty(3 * slots), np.empty(3 * slots, index)
-    for i, rows in enumerate(places):
-        data[rows], columns[rows] = summed, 3 * pattern.indices + i
+    for i in range(3):
+        data[places(i)], columns[places(i)] = summed, 3 * pattern.indices + i
     return sparse.csr_array((data, columns, indptr.astype(index)), shape=(n, n))
 
 
