@@ -67,6 +67,11 @@ class Material:
             )
 
     @property
+    def has_loss(self) -> bool:
+        """Whether waves lose anything in it."""
+        return self.viscosity + self.loss_factor + self.relaxing_modulus > 0
+
+    @property
     def young(self) -> float:
         """Young's modulus, Pa."""
         return 2 * self.shear_modulus * (1 + self.poisson)

@@ -45,6 +45,7 @@ SHARE_AHEAD = 1 / 16
 MOST_MOMENTS = 200
 SMALLEST = np.finfo(np.float64).tiny
 DISTINCT = 1e-6  # of the strongest: what less of probes is not told apart
+ROUND_OFF = 1e-12  # of a direction, of which what is left after orthogonalisation says nothing
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
@@ -238,7 +239,8 @@ class _Space:
             overlap = overlap + coordinates
         image = M @ block
         left = _norms(block, image)
-        block, image = block / left, image / left
+        fresh = left > ROUND_OFF  # of 1: in a space that holds all of a body there is nothing new
+        block, image = (np.where(fresh, x / left, 0.0) for x in (block, image))
         squares, directions = np.linalg.eigh(block.T @ image)
         new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
         for _ in range(2):

@@ -10,12 +10,13 @@ import pytest
 import fem
 import skinwave
 from fem import Material
-from simple_model import MovingPressure, Tacton, Trajectory, lines, point_kernel
+from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, point_kernel
 from skinwave.cli import main
-from skinwave.scene import BODIES, Body, Layer
+from skinwave.scene import BODIES, Body, Layer, solid_of
 from skinwave.scene_file import dumps
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
+    LAYERS,
     as_one,
     as_relaxing,
     as_viscous,
@@ -27,7 +28,7 @@ from skinwave.studies.assumptions import (
     strongest_line,
 )
 from skinwave.studies.mechanisms import paper_vs_skin, signatures, write
-from skinwave.studies.relax import climb, line_changes
+from skinwave.studies.relax import Ladder, Rung, climb, line_changes
 
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
@@ -76,6 +77,9 @@ def test_an_endless_body_of_elements_has_sides_that_absorb():
     assert body["endless"].sides == "absorbing"
     assert body["flat"].sides == "clamped"
     assert can_be_alone("endless", names, thin)
+    for kept in ({"sides": "absorbing"}, {"base": "free"}):  # no other body; none that stays
+        other = replace(thin, body=replace(thin.body, **kept))
+        assert not can_be_alone("endless", ladder(other), other)
     assert not can_be_alone("endless", ladder(SKIN), SKIN)  # a palm ends
     assert not can_be_alone("endless", ladder(PAPER), PAPER)
 
@@ -233,6 +237,30 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     assert {row["line"] for row in rows} >= {"f_AM", "2f_AM", "f_d"}
     page = (tmp_path / "scene-relaxed/index.html").read_text()
     assert "What each assumption changes" in page
+
+
+def test_little_loss_is_that_of_layers_too():
+    dropped = [name for name in ladder(SKIN) if name not in ("little loss", "flat")]
+    body = relaxed(SKIN, dropped)[0].body
+    for layer in body.layers:
+        known = next(x for x in LAYERS if x.thickness == layer.thickness)
+        assert solid_of(layer.material).viscosity == pytest.approx(
+            0.1 * solid_of(known.material).viscosity
+        )
+
+
+def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
+    times = np.arange(4.0)
+    told = Response(model="fem", times=times, probes=np.zeros((1, 2)), displacement=times[:, None])
+    rungs = [
+        Rung(name=name, dropped=dropped, model="fem", response=response)
+        for name, dropped, response in (
+            ("as published", (), told), ("a", ("a",), None), ("b", ("a", "b"), told),
+            ("c", ("a", "b", "c"), told),
+        )
+    ]  # fmt: skip
+    found = Ladder(scene=SKIN, rungs=tuple(rungs), beside=(), but_one=())
+    assert [(a.name, b.name) for a, b in found.pairs()] == [("b", "c")]
 
 
 def test_a_rung_that_fails_leaves_the_others(monkeypatch):

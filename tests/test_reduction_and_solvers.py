@@ -185,6 +185,22 @@ def test_the_estimate_is_near_the_true_error(kind, h):
         assert model.estimate / 4 < error.max() < model.estimate * 4
 
 
+def test_a_space_that_holds_all_of_a_body_is_the_body():
+    """More moments bring nothing but round-off, which is no direction."""
+    mesh = meshes.block((0.06, 0.06, 0.015), 0.06)
+    ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], viscosity=0.0))
+    S = fem.probe_operator(mesh, np.column_stack([np.linspace(0, 0.02, 40)] * 2))
+    F = fem.load_operator(mesh).toarray()
+    for probes, tolerance in ((S, 0.5), (S, 1e-3), (S[:6], 1e-3)):
+        model = fem.reduce(ops, probes, 1000.0, tolerance, loads=F)
+        assert len(model.K) <= len(ops.free)
+        basis = model.basis[ops.free]
+        np.testing.assert_allclose(basis.T @ (ops.M @ basis), np.eye(len(model.K)), atol=1e-9)
+        found = fem.transfer(model, model.basis.T @ F, [100.0, 700.0])
+        exact = np.array([probes @ fem.harmonic(ops, F, f)[0] for f in (100.0, 700.0)])
+        assert np.linalg.norm(found - exact) < max(1e-9, 4 * model.estimate) * np.linalg.norm(exact)
+
+
 def test_probes_in_one_element_are_no_more_than_what_moves_it():
     """Their seeds depend on each other: forty-one probes, two of them in one place."""
     mesh = meshes.block((0.03, 0.03, 0.01), 0.008)

@@ -30,6 +30,12 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 LAYER_WIDTH, LAYER_DRAG = 7.0, 0.35  # of the depth; of the angular frequency of cut-on
 LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
 LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
+FINE_PALM = 2e-3  # m: cells of a palm with thin layers, of 300,000 unknowns; more must be asked for
+THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it can tell
+TOO_THIN = (
+    "a layer of {:g} mm is thinner than half an element of {:g} mm; take smaller elements, thicker "
+    "layers, or a slab, whose elements follow its layers"
+)
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and the fatter elements are far more accurate: thin ones lock.
@@ -164,6 +170,8 @@ def check_mesh(body: Body, h: float) -> None:
         If cells are larger than the body, or more than can be solved for.
     """
     h = _checked(body, h)
+    if h > coarsest_size(body) * (1 + 1e-9):
+        raise ValueError(TOO_THIN.format(1e3 * THINNEST * coarsest_size(body), 1e3 * h))
     if body.kind == "sheet":
         check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
     elif body.kind == "slab":
@@ -193,12 +201,9 @@ def cell_layers(body: Body, h: float) -> int:
 
 def _strata(starts: Sequence[float], depth: Floats, h: float) -> Ints:
     """Which stratum (m,) the middle of each tetrahedron lies in, of a mesh without its planes."""
-    thinnest = np.diff(starts).min(initial=np.inf)
-    if thinnest < 0.5 * h * (1 - 1e-9):
-        raise ValueError(
-            f"a layer of {1e3 * thinnest:g} mm is thinner than half an element of {1e3 * h:g} mm; "
-            "take smaller elements, thicker layers, or a slab, whose elements follow its layers"
-        )
+    thinnest = float(np.diff(starts).min(initial=np.inf))
+    if thinnest < 0.75 * THINNEST * h:  # a coarser mesh may be compared with what is asked for
+        raise ValueError(TOO_THIN.format(1e3 * thinnest, 1e3 * h))
     return np.searchsorted(starts[1:], depth, side="right")
 
 
@@ -249,13 +254,14 @@ def default_size(body: Body) -> float:
     """Element size in metre of a body whose user asks for none."""
     if body.kind == "sheet":
         return min(body.width, body.height) / SHEET_CELLS
-    return min(SLAB_CELL, body.depth / 2, coarsest_size(body))
+    return min(SLAB_CELL, body.depth / 2, max(coarsest_size(body), FINE_PALM))
 
 
 def coarsest_size(body: Body) -> float:
     """Element size in metre that still tells a body's layers apart; those of a slab follow them."""
     starts = [start for start, _ in body.strata]
-    return 2 * float(np.diff(starts).min(initial=np.inf)) if body.kind != "slab" else np.inf
+    followed = body.kind not in hands.KINDS
+    return np.inf if followed else float(np.diff(starts).min(initial=np.inf)) / THINNEST
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
@@ -273,9 +279,12 @@ def bending_equivalent(material: Material, ratio: float) -> Material:
 
 
 def has_exact_waves(body: Body) -> bool:
-    """Whether exact waves of an endless slab stand for a body, but for what its sides send back."""
+    """Whether exact waves of an endless slab stand for a body, but for what its sides send back.
+
+    Without any loss a slab's resonances have no limit.
+    """
     layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
-    return layer and body.is_plain
+    return layer and body.is_plain and body.solid.has_loss
 
 
 def exact_waves(body: Body, model: str) -> Compliance:

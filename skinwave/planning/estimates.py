@@ -31,7 +31,9 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     if scene.tacton.trajectory.shape == "recorded":
         lines = load_lines(scene.pressure, tolerance / 100)
         f, a = summed(lines.frequencies, lines.strengths[:, None].astype(complex))
-    elif body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped"):
+    elif not body.solid.has_loss or (
+        body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped")
+    ):
         lines = load_lines(scene.pressure, tolerance / 100)
         f, a = summed(lines.frequencies, lines.coefficients[:, None])
     else:

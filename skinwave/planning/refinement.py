@@ -7,15 +7,18 @@ refined alike: a slab has few layers, and one more changes as much as all that i
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+import fem
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.effort import Progress
 from skinwave.models import hands
-from skinwave.models.bodies import cell_layers, check_mesh, coarsest_size, default_size
-from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.models.bodies import cell_layers, check_mesh, default_size
+from skinwave.models.prepared import Prepared, answer, prepare, reduced_lines, reduction_tolerance
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two sizes next to each other
@@ -57,12 +60,12 @@ def refined(
         If the body has no mesh of that size.
     """
 
-    def answered(size: float) -> tuple[Prepared, Response]:
+    def answered(size: float) -> tuple[Prepared, NDArray[Any]]:
         prepared = prepare(
             body, scene.probe_points, progress, h=size,
             tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=solver,
         )  # fmt: skip
-        return prepared, answer(prepared, scene)
+        return prepared, counted(prepared, scene, answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
     if scene.body.kind in hands.KINDS:
@@ -70,17 +73,17 @@ def refined(
     sizes = ladder(body)
     before = compared_with(body, h) if h else sizes[0]
     size = h or _finer(sizes, before)[0]
-    other = answered(before)[1]
+    coarse, other = answered(before)
     while True:
         prepared, found = answered(size)
-        if other.effort.dofs == found.effort.dofs:  # two sizes beyond the body's own: one mesh
+        if coarse.effort.dofs == prepared.effort.dofs:  # two sizes beyond the body's own: one mesh
             error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
         else:
-            error = error_left(other, found, coarser_by(body, before, size), held=body.is_held)
+            error = error_left(other, found, coarser_by(body, before, size))
         if h or error <= tolerance or size == sizes[-1]:
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
-        before, other = size, found
+        before, coarse, other = size, prepared, found
         finer = _finer(sizes, size)
         size = finer[abs(np.log(finer / max(wanted, size / STRIDE))).argmin()]
 
@@ -106,9 +109,7 @@ def _finer(sizes: Floats, size: float) -> Floats:
 
 
 def compared_with(body: Body, h: float) -> float:
-    """A size that a given one can be compared with: coarser, or finer if that leaves out layers."""
-    if RATIO * h > coarsest_size(body) * (1 + 1e-9):
-        return h / RATIO
+    """A size that a given one can be compared with: coarser, or finer than a single layer."""
     if not _has_cell_layers(body):
         return min(RATIO * h, max(body.width, body.height))
     layers = cell_layers(body, h)
@@ -135,16 +136,21 @@ def coarser_by(body: Body, other: float, h: float) -> float:
     return min(other / h, down, key=lambda ratio: abs(np.log(ratio)))
 
 
-def error_left(other: Response, found: Response, ratio: float, *, held: bool) -> float:
-    """The expected relative error of an answer by another with elements `ratio` times as large.
-
-    What nothing holds is pushed ever further, mostly as a whole: that drift, a parabola in time,
-    is not counted, because it would hide the rest.
+def counted(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
+    """What an answer is judged by: waveforms (t, p); the lines (f, p) beside the mean of a body
+    that nothing holds, because the mean pushes it ever further, and that would hide the rest.
     """
-    u, difference = found.displacement, found.displacement - other.displacement
-    if not held:
-        drift = np.linalg.qr(np.vander(found.times, min(3, len(u) - 1)))[0]
-        u, difference = (x - drift @ (drift.T @ x) for x in (u, difference))
-    size = np.maximum(np.linalg.norm(u, axis=0), 1e-300)
-    change = np.linalg.norm(difference, axis=0)
+    if scene.body.is_held:
+        return found.displacement
+    frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
+    lines, _ = fem.line_response(prepared.poles, forces, frequencies)
+    return lines[frequencies > 0] @ prepared.read.T
+
+
+def error_left(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
+    """The expected relative error of what is `counted` of an answer, (k, p), by that of another
+    with elements `ratio` times as large.
+    """
+    size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
+    change = np.linalg.norm(found - other, axis=0)
     return float((change / size).max() / abs(ratio**ORDER - 1))

@@ -21,7 +21,7 @@ ASSUMPTIONS = {
     "little loss": "the material loses as much as it does",
     "viscous loss": "what is lost relaxes, as in a standard linear solid, and is the same only at "
     "the strongest line",
-    "endless": "the body has its own size and sides",
+    "endless": "the body has its own size and sides, and is made of elements",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
@@ -53,7 +53,7 @@ def ladder(scene: Scene) -> tuple[str, ...]:
         raise ValueError("a scene without a body keeps every assumption; give it one")
     sheet, slab, solid = body.kind == "sheet", body.kind == "slab", body.solid
     kept = {
-        "little loss": slab and solid.viscosity + solid.loss_factor + solid.relaxing_modulus > 0,
+        "little loss": slab and solid.has_loss,
         "viscous loss": slab and solid.relaxing_modulus > 0,
         "vacuum": sheet,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
@@ -80,8 +80,12 @@ def beside(scene: Scene) -> tuple[str, ...]:
 
 
 def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
-    """Whether elements can keep an assumption: an endless body is one whose sides absorb."""
-    return name != "endless" or (scene.body.kind == "slab" and "flat" not in names)
+    """Whether elements can keep an assumption: an endless body is one whose sides absorb, if they
+    do not anyway, and if something holds it then.
+    """
+    body, endless = scene.body, replace(scene.body, sides="absorbing")
+    flat = body.kind == "slab" and "flat" not in names
+    return name != "endless" or (flat and endless != body and endless.is_held)
 
 
 def relaxed(
@@ -175,17 +179,21 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
     body = scene.body
     solid, line = body.solid, strongest_line(scene)
     law = as_relaxing if "viscous loss" in dropped else as_viscous
-    if body.kind == "slab":
+
+    def made(solid: Material) -> Material:
+        """A tissue as the assumptions have it."""
         solid = law(solid, 2 * np.pi * line)
-        if "little loss" not in dropped:
-            solid = with_little_loss(solid, 2 * np.pi * line)
+        return solid if "little loss" in dropped else with_little_loss(solid, 2 * np.pi * line)
+
+    if body.kind == "slab":
+        solid = made(solid)
     changes: dict[str, object] = {
         "material": solid if solid != body.solid else body.material,
         "air": "vacuum" in dropped,
     }
     if "one material" in dropped:
         layers = tuple(
-            replace(layer, material=law(solid_of(layer.material), 2 * np.pi * line))
+            replace(layer, material=made(solid_of(layer.material)))
             for layer in body.layers or LAYERS
         )
         changes["layers"] = (as_one(layers),) if "flat" in dropped else layers

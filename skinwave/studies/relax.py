@@ -82,9 +82,11 @@ class Ladder:
         return (*self.rungs, *self.beside, *self.but_one)
 
     def pairs(self) -> list[tuple[Rung, Rung]]:
-        """Each answered rung of the ladder and beside it, after the one that it is judged by."""
+        """Each answered rung of the ladder and beside it, after the one that it is judged by: what
+        follows one that failed is not, because two assumptions differ.
+        """
         answered = [rung for rung in self.rungs if rung.response]
-        found = [*pairwise(answered)]
+        found = [(a, b) for a, b in pairwise(self.rungs) if a.response and b.response]
         for rung in self.beside:
             kept = set(rung.dropped) - {rung.name}
             before = next((r for r in answered if set(r.dropped) == kept), None)

@@ -15,7 +15,7 @@ from simple_model import Response, tacton_lines
 from skinwave.effort import Progress, silent
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import is_flat
-from skinwave.planning.refinement import coarser_by, error_left, refined
+from skinwave.planning.refinement import coarser_by, counted, error_left, refined
 from skinwave.scene import Body, Scene
 from skinwave.simulation import MODELS, check_knobs, simulate
 from skinwave.sweeps import dataset, engine
@@ -264,14 +264,18 @@ def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> tuple[Response, dict[str
     """An answer of the body prepared, and how wrong its mesh makes it."""
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
-    found = answer(_prepared(scene.body, scene.probes, mesh.h, knobs), scene)
+    prepared = _prepared(scene.body, scene.probes, mesh.h, knobs)
+    found = answer(prepared, scene)
     row = {"h_mm": 1e3 * mesh.h}
     if mesh.coarser is None:
         return found, row
-    coarse = answer(_prepared(scene.body, scene.probes, mesh.coarser, knobs), scene)
-    if coarse.effort.dofs != found.effort.dofs:
+    coarser = _prepared(scene.body, scene.probes, mesh.coarser, knobs)
+    if coarser.effort.dofs != prepared.effort.dofs:
+        coarse = answer(coarser, scene)
         ratio = coarser_by(scene.body, mesh.coarser, mesh.h)
-        row["expected_error"] = error = error_left(coarse, found, ratio, held=scene.body.is_held)
+        row["expected_error"] = error = error_left(
+            counted(coarser, scene, coarse), counted(prepared, scene, found), ratio
+        )
         if error > knobs.tolerance:
             said = (
                 f"elements of {1e3 * mesh.h:.3g} mm will be wrong by about {100 * error:.2g} %, "
