@@ -330,6 +330,13 @@ def test_foci_follow_paths_of_their_own(page, tmp_path):
         page.locator(f"#own-{column}-1").fill(value)
         page.locator(f"#own-{column}-1").press("Tab")
     query_has(page, "square/15/22.5/-10")
+    page.locator("#own-2-1").fill("21")  # an answer to something else meanwhile
+    for drawn in (80, 90):
+        page.evaluate("drawn => window.trame.state.set('drawn', drawn)", drawn)
+        query_has(page, f"drawn={drawn}")
+    assert page.locator("#own-2-1").input_value() == "21"
+    page.locator("#own-2-1").fill("22.5")
+    page.locator("#own-2-1").press("Tab")
     page.wait_for_function("() => window.trame.state.get('own_speeds') === '5.65, 5.4 m/s'")
     assert "90.00 times a second" in page.locator("#own-speeds").inner_text()
     assert page.locator("#kernel-map path[stroke='#56B4E9']").get_attribute("d").count("M") == 2

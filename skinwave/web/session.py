@@ -36,6 +36,7 @@ class Session:
         self.zoomed: tuple[float, float] | None = None
         self._loop: Any = None
         self.state.update({**self.good, **shown.first(own)})
+        self.state.client_only("draft")
 
     @property
     def values(self) -> Values:

@@ -26,7 +26,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
         "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
-        "about": False, "drawer": None, "opened": None, "bodies": bodies(own),
+        "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "untold": "",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip

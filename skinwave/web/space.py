@@ -62,8 +62,12 @@ def _own_paths(session: Session) -> None:
     number(session, "drawn")
     options = "".join(f'<option value="{name}">{name}</option>' for name in SHAPES)
     cells = "".join(
-        f'<td><input inputmode="decimal" :id="`own-{part}-${{k}}`" :value="row[{part}]" '
-        f'@change="{_set(part)}" :aria-label="`{name} of path ${{k + 1}}, mm`" {more}/></td>'
+        # What is being typed stays when the answer to the cell before arrives.
+        f'<td><input inputmode="decimal" :id="`own-{part}-${{k}}`" '
+        f':value="draft[`{part}-${{k}}`] ?? row[{part}]" '
+        f'@input="draft = {{ [`{part}-${{k}}`]: $event.target.value }}" '
+        f'@change="{_set(part)}; draft = {{}}" '
+        f':aria-label="`{name} of path ${{k + 1}}, mm`" {more}/></td>'
         for part, (name, more) in enumerate(COLUMNS.items(), 1)
     )
     HtmlElement("table", classes="sw-own", id="own", children=[
