@@ -25,12 +25,11 @@ from fem.dilatation import projected_dilatation
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.pattern import UPPER, Pattern, from_components, from_nodal
+from fem.pattern import UPPER, Pattern, from_components, from_nodal, slabs
 from fem.relaxation import Branch, on_free
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
-SLAB = 1024  # elements at a time: their temporaries stay near the processor
 LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra need no remedy up to it
 DIRECT = 2.0  # lam / mu that acts directly beyond it; a slab erred least with 1 to 3
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
@@ -125,8 +124,8 @@ def _volume_operators(
 
     def stiffness(share: Floats) -> sparse.csr_array:
         """K of a share (r,) of each material's."""
-        slabs = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
-        summed = from_components(pattern, pattern.sum(slabs, 6))
+        blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
+        summed = from_components(pattern, pattern.sum(blocks, 6))
         return sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
 
     def portion(share: Floats) -> sparse.csr_array:
@@ -167,7 +166,7 @@ def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[
     (i, j) = UPPER[k]. The blocks below the diagonal are these, transposed.
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
-    for slab in _slabs(mesh):
+    for slab in slabs(len(mesh.tets)):
         slopes, volumes = gradients(shapes[slab], n_nodes, 2, slab.start)
         e, q = volumes.shape
         G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
@@ -188,13 +187,9 @@ def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
     NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
-    for slab in _slabs(mesh):
+    for slab in slabs(len(mesh.tets)):
         weights = rho[slab, None] * jacobians(shapes[slab], 5, slab.start)[2]
         yield slab, (weights @ NN).reshape(1, -1, n_nodes, n_nodes)
-
-
-def _slabs(mesh: TetMesh) -> list[slice]:
-    return [slice(start, start + SLAB) for start in range(0, len(mesh.tets), SLAB)]
 
 
 def _mass(mesh: TetMesh, pattern: Pattern, rho: Floats) -> sparse.csr_array:

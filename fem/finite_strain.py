@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.assembly import LOSS_BAND, SLAB, Operators, assemble, by_region
+from fem.assembly import LOSS_BAND, Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.pattern import UPPER, Pattern, from_components
+from fem.pattern import UPPER, Pattern, from_components, slabs
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 
@@ -245,8 +245,9 @@ def tangent(part: Part, u: Floats) -> sparse.csr_array:
     """
     F, E = deformation(part, u)
     S = stress(part, E)
-    slabs = (slice(start, start + SLAB) for start in range(0, len(part.nodes), SLAB))
-    blocks = ((slab, _tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs)
+    blocks = (
+        (slab, _tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs(len(part.nodes))
+    )
     return from_components(part.pattern, part.pattern.sum(blocks, 6))
 
 

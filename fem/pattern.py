@@ -9,6 +9,7 @@ from scipy import sparse
 from meshes import MeshError
 from meshes.tetmesh import Floats, Ints
 
+SLAB = 1024  # elements at a time: their temporaries stay near the processor
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 
 
@@ -92,6 +93,11 @@ def from_nodal(pattern: Pattern, summed: Floats) -> sparse.csr_array:
     for i in range(3):
         data[places(i)], columns[places(i)] = summed, 3 * pattern.indices + i
     return sparse.csr_array((data, columns, indptr.astype(index)), shape=(n, n))
+
+
+def slabs(count: int) -> list[slice]:
+    """Elements a few at a time."""
+    return [slice(start, start + SLAB) for start in range(0, count, SLAB)]
 
 
 def _index(entries: int) -> type[np.signedinteger]:

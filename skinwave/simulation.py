@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from simple_model import Response, flat_body, point_kernel, steady_state
+from simple_model import Response, point_kernel
 from simple_model.choices import choose
 from skinwave.effort import Progress, silent
-from skinwave.models.bodies import exact_waves
+from skinwave.models.bodies import EXACT, exact_waves
 from skinwave.models.full import Map, harmonic_answer, transient_answer
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
@@ -19,7 +19,6 @@ MODELS = (
     "auto", "point-kernel", "flat-body", "flat-body-harmonic", "fem", "fem-harmonic",
     "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
 )  # fmt: skip
-EXACT = {"flat-body": flat_body, "flat-body-harmonic": steady_state}
 
 
 def simulate(

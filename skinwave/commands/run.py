@@ -32,18 +32,19 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import output_folder
+    from skinwave.models.bodies import EXACT
     from skinwave.run import Run
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
-    from skinwave.simulation import EXACT, simulate, warned
+    from skinwave.simulation import simulate, warned
     from skinwave.studies.study import write_single
 
     scene = read(options.scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
-        unplanned = options.h and options.model != "auto"
-        unplanned = unplanned or options.model in ("point-kernel", *EXACT)
+        sized = options.h and options.model != "auto"
+        unplanned = sized or options.model in ("point-kernel", *EXACT)
         told = required_plan(options, scene).warnings if unplanned else ()
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             response = simulate(

@@ -15,6 +15,7 @@ from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
 from meshes.intake import FINE_RADIUS
 from meshes.structured import check_size, round_up, with_planes
 from meshes.tetmesh import Floats, Ints
+from simple_model import flat_body, steady_state
 from simple_model.compliance import AIR_DENSITY, Compliance, half_space, slab, thin_sheet
 from skinwave.models import hands
 from skinwave.scene import Body
@@ -32,14 +33,16 @@ LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
 LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
 FINE_PALM = 2e-3  # m: cells of a palm with thin layers, of 300,000 unknowns; more must be asked for
 THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it can tell
-TOO_THIN = (
-    "a layer of {:g} mm is thinner than half an element of {:g} mm; take smaller elements, thicker "
-    "layers, or a slab, whose elements follow its layers"
-)
+COMPARED = (
+    4 / 3
+)  # of a size that is asked for: a mesh that it is compared with may be so much coarser
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and the fatter elements are far more accurate: thin ones lock.
 SHEET_THICKNESS = 0.01
+
+
+EXACT = {"flat-body": flat_body, "flat-body-harmonic": steady_state}  # models of exact waves
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,7 +74,7 @@ def build(
     ValueError
         If the body is "none", or would have too many unknowns.
     """
-    size, drag = _checked(body, h or default_size(body)), None
+    size, drag = _checked(body, h or default_size(body), COMPARED), None
     if body.kind == "sheet":
         thickness = thickness or SHEET_THICKNESS * min(body.width, body.height)
         thickness = max(body.depth, thickness)
@@ -85,7 +88,7 @@ def build(
         else:
             mesh = hands.hand(body, size)
             depth = hands.depths(mesh)
-        mesh = replace(mesh, region=_strata(starts, depth, size if body.kind != "slab" else 0.0))
+        mesh = replace(mesh, region=np.searchsorted(starts[1:], depth, side="right"))
     ends = {"bottom": body.base, "sides": body.sides}
     fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
     for axis in symmetry:
@@ -170,8 +173,6 @@ def check_mesh(body: Body, h: float) -> None:
         If cells are larger than the body, or more than can be solved for.
     """
     h = _checked(body, h)
-    if h > coarsest_size(body) * (1 + 1e-9):
-        raise ValueError(TOO_THIN.format(1e3 * THINNEST * coarsest_size(body), 1e3 * h))
     if body.kind == "sheet":
         check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
     elif body.kind == "slab":
@@ -197,14 +198,6 @@ def _depth_line(body: Body, h: float) -> Floats:
 def cell_layers(body: Body, h: float) -> int:
     """How many cells of h in metre lie below each other in a slab."""
     return len(_depth_line(body, h)) - 1
-
-
-def _strata(starts: Sequence[float], depth: Floats, h: float) -> Ints:
-    """Which stratum (m,) the middle of each tetrahedron lies in, of a mesh without its planes."""
-    thinnest = float(np.diff(starts).min(initial=np.inf))
-    if thinnest < 0.75 * THINNEST * h:  # a coarser mesh may be compared with what is asked for
-        raise ValueError(TOO_THIN.format(1e3 * thinnest, 1e3 * h))
-    return np.searchsorted(starts[1:], depth, side="right")
 
 
 def has_layer(body: Body) -> bool:
@@ -233,9 +226,15 @@ def layer_drag(body: Body, mesh: TetMesh) -> Floats:
     return LAYER_DRAG * 2 * np.pi * body.solid.shear_speed / (4 * scale) * beyond**2
 
 
-def _checked(body: Body, h: float) -> float:
+def _checked(body: Body, h: float, slack: float = 1.0) -> float:
     if body.kind == "none":
         raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    if h > slack * coarsest_size(body) * (1 + 1e-9):
+        raise ValueError(
+            f"a layer of {1e3 * THINNEST * coarsest_size(body):g} mm is thinner than half an "
+            f"element of {1e3 * h:g} mm; take smaller elements, thicker layers, or a slab, whose "
+            "elements follow its layers"
+        )
     if body.kind == "mesh":
         return h
     if not isfinite(body.depth):

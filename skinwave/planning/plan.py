@@ -6,7 +6,7 @@ import numpy as np
 
 from simple_model.focus import spot_width
 from skinwave.effort import Progress
-from skinwave.models.bodies import check_mesh, exact_waves, vacuum_only
+from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
@@ -23,7 +23,6 @@ from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
-EXACT = ("flat-body", "flat-body-harmonic")
 UNREDUCED = ("fem-transient", "fem-harmonic", "fem-nonlinear-transient")
 KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
 
