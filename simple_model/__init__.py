@@ -3,7 +3,7 @@
 from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.joined import evenly, joined
-from simple_model.point_kernel import point_kernel
+from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, lines, spectrum, tacton_lines, told_apart
 from simple_model.rhythm import Rhythm, Signal
@@ -30,6 +30,8 @@ __all__ = [
     "lines",
     "modulation",
     "point_kernel",
+    "point_kernel_published",
+    "published",
     "relative_intensity",
     "sensation_level",
     "spectrum",

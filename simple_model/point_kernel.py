@@ -1,9 +1,13 @@
-"""The paper's model, equation 2 with U(t) = 1: the pressure of the focus, weighted by distance.
+"""Point-kernel model of Lim, Seifi and Park (CHI EA '24), equation 2 with U(t) = 1: the pressure
+of the focus, weighted by distance.
 
-Nothing propagates: a skin point feels the moving pressure where it is, when it is there.
+Nothing propagates: a skin point feels the moving pressure where it is, when it is there. As
+published, the load is the commanded signal itself (drive law "linear") in a focal spot without side
+lobes ("main_lobe"); under any other load it is the same model.
 """
 
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,8 +17,21 @@ from simple_model.response import Effort, Response
 from simple_model.trajectory import Floats
 
 
+def published(pressure: MovingPressure) -> MovingPressure:
+    """The same Tacton at the same height as the paper has it: linear drive, main lobe, no mean."""
+    return replace(pressure, drive="linear", focus="main_lobe")
+
+
+def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
+    """Stimulation in Pa under the published load, whatever drive law and focus are given; arguments
+    and errors as of `point_kernel`.
+    """
+    response = point_kernel(published(pressure), probes, times)
+    return replace(response, model="point-kernel-published")
+
+
 def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation in Pa at probes (p, 2) in metre and times (t,) in s.
+    """Stimulation in Pa at probes (p, 2) in metre and times (t,) in s, under the load as given.
 
     Raises
     ------

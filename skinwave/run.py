@@ -22,6 +22,11 @@ class Run:
         """The model that answered."""
         return self.response.model
 
+    @property
+    def column(self) -> str:
+        """What tables and figures know it by: its body or, of a point kernel, the model."""
+        return self.model if self.body == "none" else self.body
+
     @cached_property
     def frequencies(self) -> dict[str, float]:
         """Names and frequencies in Hz of the Tacton's lines, but for those of `untold`."""

@@ -56,9 +56,8 @@ def loads(text: str) -> Scene:
     }
     body = _body(parts["body"] | parts["placement"])
     tacton, path = _split(parts["tacton"], PATH)
-    presets = {"drive": "linear", "focus": "main_lobe"} if body.kind == "none" else {}
     pressure = MovingPressure(
-        tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **presets | parts["focus"]
+        tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
     )
     return Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from simple_model import Response, point_kernel
+from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.choices import choose
 from skinwave.effort import Progress, silent
 from skinwave.models.bodies import EXACT, exact_waves
@@ -16,9 +16,10 @@ from skinwave.planning.plan import plan
 from skinwave.scene import Scene
 
 MODELS = (
-    "auto", "point-kernel", "flat-body", "flat-body-harmonic", "fem", "fem-harmonic",
-    "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
+    "auto", "point-kernel", "point-kernel-published", "flat-body", "flat-body-harmonic",
+    "fem", "fem-harmonic", "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
 )  # fmt: skip
+KERNELS = {"point-kernel": point_kernel, "point-kernel-published": point_kernel_published}
 
 
 def simulate(
@@ -37,7 +38,9 @@ def simulate(
     Parameters
     ----------
     scene : Scene
-    model : "point-kernel"; "flat-body", exact waves in an endless body; "fem", the reduced model;
+    model : "point-kernel", without propagation, under the scene's own load;
+        "point-kernel-published", the same under the paper's load (linear drive, main lobe);
+        "flat-body", exact waves in an endless body; "fem", the reduced model;
         "fem-transient", every time step; "flat-body-harmonic" and "fem-harmonic", the steady state
         line by line; "fem-nonlinear", a sheet that stretches as it bends, in its modes, about its
         rest under the mean pressure; "fem-nonlinear-transient", the same with all unknowns; or
@@ -73,8 +76,8 @@ def simulate(
         )  # fmt: skip
         return warned(found, required.warnings)
     times = sample_times(scene)
-    if model == "point-kernel":
-        return point_kernel(scene.pressure, scene.probe_points, times)
+    if model in KERNELS:
+        return KERNELS[model](scene.pressure, scene.probe_points, times)
     if model in EXACT:
         waves, body = EXACT[model], exact_waves(scene.body, model)
         return waves(body, scene.pressure, scene.probe_points, times)

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from skinwave.scene import Scene
 
 MODELS = (
-    "point-kernel", "flat-body", "flat-body-harmonic", "fem", "fem-harmonic",
-    "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
+    "point-kernel", "point-kernel-published", "flat-body", "flat-body-harmonic",
+    "fem", "fem-harmonic", "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
 )  # fmt: skip
 TOLERANCE = "relative error of waveforms"
 

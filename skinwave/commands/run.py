@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
         sized = options.h and options.model != "auto"
-        unplanned = sized or options.model in ("point-kernel", *EXACT)
+        unplanned = sized or options.model in ("point-kernel", "point-kernel-published", *EXACT)
         told = required_plan(options, scene).warnings if unplanned else ()
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             response = simulate(

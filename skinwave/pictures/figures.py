@@ -15,13 +15,20 @@ from skinwave.comparison import moving_rms
 from skinwave.run import Run
 
 # Okabe and Ito's colours, told apart by every kind of colour vision; one model, one colour.
-COLOURS = {"none": "#000000", "paper-sheet": "#D55E00", "skin-slab": "#0072B2"}
+COLOURS = {
+    "point-kernel": "#000000",
+    "point-kernel-published": "#999999",
+    "paper-sheet": "#D55E00",
+    "skin-slab": "#0072B2",
+}
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 LABELS = {
-    "none": "point kernel",
+    "point-kernel": "kernel, same load",
+    "point-kernel-published": "kernel, as published",
     "paper-sheet": "paper sheet",
     "skin-slab": "skin slab",
 }
+MARKERS = {"point-kernel": "o", "point-kernel-published": "x", "paper-sheet": "s"}
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
@@ -77,31 +84,31 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     return figure
 
 
-def colour(body: str) -> str:
-    """The colour of a body in every picture."""
-    return COLOURS.get(body) or SPARE[sum(map(ord, body)) % len(SPARE)]
+def colour(column: str) -> str:
+    """The colour of a `Run.column` in every picture."""
+    return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
 
 
-def marker(body: str) -> str:
-    """The marker of a body in every picture."""
-    return {"none": "o", "paper-sheet": "s"}.get(body, "^")
+def marker(column: str) -> str:
+    """The marker of a `Run.column` in every picture."""
+    return MARKERS.get(column, "^")
 
 
-def label(body: str) -> str:
-    """The name of a body in every legend."""
-    return LABELS.get(body, body)
+def label(column: str) -> str:
+    """The name of a `Run.column` in every legend."""
+    return LABELS.get(column, column)
 
 
 def answered(run: Run) -> str:
     """The name of a body and of the model that answered for it."""
-    return label(run.body) if run.body == "none" else f"{label(run.body)} ({run.model})"
+    return label(run.column) if run.body == "none" else f"{label(run.body)} ({run.model})"
 
 
 def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     """One entry a model, with what 1 on the waveform axis stands for if that is one number."""
     handles, labels = [], []
     for run in runs:
-        style: dict[str, Any] = {"color": colour(run.body), "marker": marker(run.body), "lw": 2}
+        style: dict[str, Any] = {"color": colour(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
         labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
     figure.legend(
@@ -139,7 +146,7 @@ def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
         centred = _centred(run)[:, p] / _largest(run)
         times = 1e3 * run.response.times[_shown(run)]
-        ax.plot(times, centred, color=colour(run.body), lw=_width(run), zorder=_depth(run))
+        ax.plot(times, centred, color=colour(run.column), lw=_width(run), zorder=_depth(run))
     ax.margins(x=0)
     ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
     ax.set_ylim(-1.1, 1.1)
@@ -152,13 +159,13 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
         moving = f > 8.0  # the mean and its leakage are no vibration
         top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
-        style: dict[str, Any] = {"color": colour(run.body), "zorder": _depth(run)}
+        style: dict[str, Any] = {"color": colour(run.column), "zorder": _depth(run)}
         ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
         lines = np.array([[run.frequencies[n], run.lines[n][p]] for n in run.frequencies])
         lines = lines.reshape(-1, 2)  # a constant pressure has none
         height = 20 * np.log10(np.maximum(lines[:, 1] / top, 1e-12))
         seen = height > FLOOR
-        ax.plot(lines[seen, 0], height[seen], ls="", marker=marker(run.body), ms=4, **style)
+        ax.plot(lines[seen, 0], height[seen], ls="", marker=marker(run.column), ms=4, **style)
     ax.set_xlim(0, HIGHEST)
     ax.set_ylim(FLOOR, 14)
     ax.set_yticks(np.arange(FLOOR, 1, 20))
@@ -178,7 +185,12 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
         radius = 1e3 * np.hypot(*run.response.probes.T)
         decibel = 20 * np.log10(np.maximum(level / max(level.max(), 1e-300), 1e-12))
         ax.plot(
-            radius, decibel, color=colour(run.body), marker=marker(run.body), lw=_width(run), ms=5
+            radius,
+            decibel,
+            color=colour(run.column),
+            marker=marker(run.column),
+            lw=_width(run),
+            ms=5,
         )
     for drop in (-6, -20):
         ax.axhline(drop, color="0.6", lw=0.8, ls="--", zorder=0)

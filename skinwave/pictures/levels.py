@@ -59,8 +59,8 @@ def _draw(ax: Axes, run: Run, probe: int) -> None:
     shown = {n: level for n, level in felt_lines(run, probe).items() if level > LOWEST_LEVEL}
     frequencies = np.array([run.frequencies[n] for n in shown])
     heights = np.array([1e6 * run.lines[n][probe] for n in shown])
-    ax.vlines(frequencies, 1e-4, heights, color=colour(run.body), lw=1.2)
-    ax.plot(frequencies, heights, ls="none", marker=marker(run.body), color=colour(run.body))
+    ax.vlines(frequencies, 1e-4, heights, color=colour(run.column), lw=1.2)
+    ax.plot(frequencies, heights, ls="none", marker=marker(run.column), color=colour(run.column))
     for name in _named(run, shown):
         ax.annotate(
             written(name), (run.frequencies[name], 1e6 * run.lines[name][probe]), rotation=90,

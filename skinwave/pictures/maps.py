@@ -122,7 +122,7 @@ def difference_figure(reference: View, views: Sequence[View], style: Style) -> F
             image = ax.imshow(more, cmap=SIGNED, vmin=DEEPEST, vmax=-DEEPEST, extent=raster.frame,
                               origin="lower")  # fmt: skip
             _draw_path(ax, view, "black")
-            _title(ax, view, f"minus {label(reference.body)}")
+            _title(ax, view, f"minus {label(reference.column)}")
         figure.colorbar(image, ax=list(axes), label="difference of RMS levels, dB")
     return figure
 
@@ -145,7 +145,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 )  # fmt: skip
                 _draw_path(ax, view, "black")
                 _draw_focus(ax, view, float(view.times[frame]))
-            row[0].set_ylabel(f"{label(view.body)}\n±1 = {peak_text(view)}\ny, mm",
+            row[0].set_ylabel(f"{label(view.column)}\n±1 = {peak_text(view)}\ny, mm",
                               color=_readable(view, style))  # fmt: skip
         for k, ax in enumerate(axes[0]):
             ax.set_title(f"{1e3 * views[0].times[k * len(views[0].times) // count]:.2f} ms")
@@ -166,7 +166,7 @@ def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, An
     for view in views:
         angle = view.speed and mach_angle(view.speed, view.scene.tacton.trajectory.speed)
         if angle and not view.scene.tacton.trajectory.is_static:
-            angles.append(f"{label(view.body)} {np.rad2deg(angle):.0f}°")
+            angles.append(f"{label(view.column)} {np.rad2deg(angle):.0f}°")
     if angles:
         entries[f"Mach angle of a straight path: {', '.join(angles)}"] = {"color": style.ink}
     return entries
@@ -184,7 +184,7 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
             for ax, view in zip(row, views, strict=True):
                 image = _draw_trace(ax, getattr(view, name), name)
                 ax.set_xlabel(x_label)
-                ax.set_title(label(view.body), color=_readable(view, style))
+                ax.set_title(label(view.column), color=_readable(view, style))
                 _draw_world_lines(ax, view, name)
             row[0].set_ylabel("time, ms")
         bar = figure.colorbar(
@@ -215,12 +215,12 @@ def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
 
 
 def _title(ax: Axes, view: View, below: str) -> None:
-    ax.set_title(f"{label(view.body)}\n{below}", fontsize="medium")
+    ax.set_title(f"{label(view.column)}\n{below}", fontsize="medium")
 
 
 def _readable(view: View, style: Style) -> str:
     """The colour of a model, but for black on a dark page."""
-    own = colour(view.body)
+    own = colour(view.column)
     return style.ink if own == "#000000" else own
 
 

@@ -85,6 +85,11 @@ class View:
     effort: Effort = field(default_factory=Effort)
 
     @property
+    def column(self) -> str:
+        """What tables and figures know it by, as `Run.column`."""
+        return self.model if self.body == "none" else self.body
+
+    @property
     def places(self) -> Floats:
         """Where the upper surface is, (s, 2) in metre."""
         return self.points[self.surface, :2]

@@ -24,6 +24,7 @@ from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
 UNREDUCED = ("fem-transient", "fem-harmonic", "fem-nonlinear-transient")
+KERNELS = ("point-kernel", "point-kernel-published")
 KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
 
 
@@ -81,12 +82,13 @@ def plan(
     if dt is not None:
         step_count(float(sample_times(scene)[-1]), dt)
     if scene.body.kind == "none":
-        if model not in (None, "point-kernel"):
+        if model not in (None, *KERNELS):
             raise ValueError(f"a scene without a body has no {model} answer; use --model auto")
-        row = Row(what="model", value="point-kernel", reason="there is no body to move")
-        return Plan(model="point-kernel", body=scene.body, rows=(row,))
-    if model == "point-kernel":
-        return _kernel(scene, tolerance)
+        kernel = model or "point-kernel"
+        row = Row(what="model", value=kernel, reason="there is no body to move")
+        return Plan(model=kernel, body=scene.body, rows=(row,))
+    if model in KERNELS:
+        return _kernel(scene, tolerance, model)
     if model in ("fem-nonlinear", "fem-nonlinear-transient"):
         return _nonlinear(scene, tolerance, model, h)
     if model in EXACT:
@@ -133,12 +135,10 @@ def plan(
     )  # fmt: skip
 
 
-def _kernel(scene: Scene, tolerance: float) -> Plan:
-    row = Row(what="model", value="point-kernel", reason="as asked; nothing propagates in it")
+def _kernel(scene: Scene, tolerance: float, model: str) -> Plan:
+    row = Row(what="model", value=model, reason="as asked; nothing propagates in it")
     warning = exceeds("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
-    return Plan(
-        model="point-kernel", body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning
-    )
+    return Plan(model=model, body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning)
 
 
 def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> Plan:

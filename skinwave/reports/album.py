@@ -199,7 +199,7 @@ def _run(path: Path) -> Run:
     effort = _json(path.parent / "effort.json")
     response = Response(
         model=model, times=times, probes=probes, displacement=motion,
-        unit="Pa" if model == "point-kernel" else "m",
+        unit="Pa" if model.startswith("point-kernel") else "m",
         effort=Effort(**effort) if effort else Effort(),
     )  # fmt: skip
     known = (name for name, body in BODIES.items() if body == scene.body)

@@ -85,7 +85,7 @@ def _spatial(
         progress("draw cut open", 0.0)
         cut = render.picture([own], style, frame, camera="front", cut=True)
         caption = (
-            f"{label(own.body)} cut open along y = 0, the section below the black line: "
+            f"{label(own.column)} cut open along y = 0, the section below the black line: "
             f"{render.shown_scale(own)}. {MARKS}"
         )
         parts.append(gallery.image("cut-open", cut, caption))
@@ -98,8 +98,8 @@ def _spatial(
         parts.append(document.paragraph(f"The view that can be turned is left out: {EXTRA}."))
     else:
         caption = (
-            f"To be turned with the mouse: {label(own.body)}, {render.shown_scale(own)}; red into "
-            f"the body, blue out of it, both by up to {maps.peak_text(own)}."
+            f"To be turned with the mouse: {label(own.column)}, {render.shown_scale(own)}; red "
+            f"into the body, blue out of it, both by up to {maps.peak_text(own)}."
         )
         parts.append(document.inner_page(page, caption))
     return parts
@@ -146,8 +146,8 @@ def _own(album: Album, views: Sequence[View]) -> View:
 
 
 def _drawn(views: Sequence[View]) -> str:
-    scales = (f"{label(view.body)}: {render.shown_scale(view)}" for view in views)
-    peaks = (f"{label(view.body)} {maps.peak_text(view)}" for view in views)
+    scales = (f"{label(view.column)}: {render.shown_scale(view)}" for view in views)
+    peaks = (f"{label(view.column)} {maps.peak_text(view)}" for view in views)
     return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
 
 

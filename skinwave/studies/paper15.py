@@ -1,9 +1,10 @@
 """The 15 Tactons that Lim, Seifi and Park measured (CHI EA '24, section 3.1)."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
-from simple_model import MovingPressure, Tacton, Trajectory
-from skinwave.scene import BODIES, Body, Scene
+from simple_model import MovingPressure, Tacton, Trajectory, published
+from skinwave.scene import BODIES, Body, Scene, with_body
 
 AM_FREQUENCIES = (0.0, 80.0, 140.0, 210.0)  # Hz
 MEASURED_ON = ("paper-sheet", "skin-slab")  # the sheet they had, and what they wished to
@@ -22,10 +23,19 @@ def tactons() -> Iterator[tuple[str, Tacton]]:
 
 
 def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) -> dict[str, Scene]:
-    """One Tacton as published (no body) and on bodies by name: the paper sheet and skin."""
-    published = MovingPressure(tacton=tacton, focus="main_lobe", drive="linear")
-    physical = MovingPressure(tacton=tacton)
-    found = {"none": Scene(name=name, pressure=published, body=BODIES["none"])}
-    for label, body in (bodies or {key: BODIES[key] for key in MEASURED_ON}).items():
-        found[label] = Scene(name=name, pressure=physical, body=body)
-    return found
+    """One Tacton by both point kernels and on bodies by name, the paper sheet and skin if none are
+    given, which all receive the same load.
+    """
+    bodies = bodies or {key: BODIES[key] for key in MEASURED_ON}
+    scene = Scene(name=name, pressure=MovingPressure(tacton=tacton), body=BODIES["none"])
+    return beside_kernels(scene) | {key: with_body(scene, body) for key, body in bodies.items()}
+
+
+def beside_kernels(scene: Scene) -> dict[str, Scene]:
+    """The scene without its body by model: under the published load, and under its own."""
+    return {
+        "point-kernel-published": replace(
+            with_body(scene, BODIES["none"]), pressure=published(scene.pressure)
+        ),
+        "point-kernel": with_body(scene, BODIES["none"]),
+    }

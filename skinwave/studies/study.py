@@ -37,19 +37,20 @@ class Outcome:
 
 
 def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str, Scene]]:
-    """Tacton -> body -> scene of the paper's 15 Tactons, on bodies by name or on paper and skin."""
+    """Tacton -> column -> scene of the paper's 15 Tactons: both point kernels, and bodies by name,
+    or paper and skin.
+    """
     return {name: paper15.scenes(name, tacton, bodies) for name, tacton in paper15.tactons()}
 
 
 def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
-    """The same for one scene: as published, and on its own body or, if it has none, on both."""
-    published = with_body(scene, BODIES["none"], drive="linear", focus="main_lobe")
+    """The same for one scene: on its own body or, if it has none, on paper and skin."""
     if scene.body.kind != "none":
         known = (label for label, body in BODIES.items() if body == scene.body)
-        return {name: {"none": published, next(known, scene.body.kind): scene}}
-    physical = {"drive": "pressure_squared", "focus": "gaussian"}
-    bodies = {k: with_body(scene, BODIES[k], **physical) for k in paper15.MEASURED_ON}
-    return {name: {"none": published, **bodies}}
+        bodies = {next(known, scene.body.kind): scene}
+    else:
+        bodies = {key: with_body(scene, BODIES[key]) for key in paper15.MEASURED_ON}
+    return {name: paper15.beside_kernels(scene) | bodies}
 
 
 def run_study(
@@ -77,12 +78,12 @@ def run_study(
     prepared: dict[str, Prepared] = {}
     planned = sum(map(len, scenes.values()))
     try:
-        for body in dict.fromkeys(body for group in scenes.values() for body in group):
+        for column in dict.fromkeys(column for group in scenes.values() for column in group):
             for name, group in scenes.items():
-                if body in group:
-                    runs.append(_answer(name, body, group[body], prepared, progress, h, solver))
-                    write_run(folder / name / body, runs[-1])
-                    progress(f"answer {name} on {body}", len(runs) / planned)
+                if column in group:
+                    runs.append(_answer(name, column, group[column], prepared, progress, h, solver))
+                    write_run(folder / name / column, runs[-1])
+                    progress(f"answer {name} by {column}", len(runs) / planned)
     except KeyboardInterrupt:
         if not runs:
             raise
@@ -127,7 +128,7 @@ def _answer(
 ) -> Run:
     """One run; a body is prepared when it is first met."""
     if scene.body.kind == "none":
-        return Run(tacton=name, body=body, scene=scene, response=simulate(scene, "point-kernel"))
+        return Run(tacton=name, body="none", scene=scene, response=simulate(scene, body))
     if body not in prepared:
 
         def named(phase: str, fraction: float) -> None:

@@ -30,7 +30,7 @@ def agreement_table(runs: dict[str, list[Run]]) -> str:
             for candidate in group[i + 1 :]:
                 a = compare(reference.response, candidate.response)
                 rows.append(
-                    [name, label(reference.body), label(candidate.body)]
+                    [name, label(reference.column), label(candidate.column)]
                     + [f"{min(a.relative_l2):.2f} to {max(a.relative_l2):.2f}"]
                     + [f"{1e3 * a.lag[0]:+.1f}"]
                     + [_spread(s) for s in (a.spread_reference, a.spread_candidate)]
