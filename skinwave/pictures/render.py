@@ -205,7 +205,8 @@ def _add(plotter: Any, panel: Panel, style: Style, limit: float, small: float, *
     add_marks(plotter, panel, "black")
     own = colour(view.column)
     plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
-                     font_size=1.25 * small, color=style.ink if own == "#000000" else own)  # fmt: skip
+                     font_size=1.25 * small,
+                     color=style.ink if own == "#000000" else own)  # fmt: skip
     plotter.add_text(shown_scale(view), position=(0.04, 0.86), viewport=True,
                      font_size=0.9 * small, color=style.ink)  # fmt: skip
     _add_scale_bar(plotter, view, style, small)
