@@ -5,7 +5,15 @@ from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.joined import evenly, joined
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
-from simple_model.response import Effort, Response, lines, spectrum, tacton_lines, told_apart
+from simple_model.response import (
+    Effort,
+    Response,
+    lines,
+    phasors,
+    spectrum,
+    tacton_lines,
+    told_apart,
+)
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
 from simple_model.threshold import sensation_level, threshold
@@ -29,6 +37,7 @@ __all__ = [
     "joined",
     "lines",
     "modulation",
+    "phasors",
     "point_kernel",
     "point_kernel_published",
     "published",

@@ -19,6 +19,7 @@ below it for any loss; and below those of waves that run backwards, which lie ab
 """
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +46,7 @@ WRAPPED = 1e-5
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
 AT_ONCE = 2**19  # pairs of frequency and wavenumber: some hundred megabytes
+FEW_DISTANCES = 40  # are answered one by one, without a spline
 UNRESOLVED = "the wavenumber integral does not converge; add some loss"
 CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
@@ -96,7 +98,7 @@ def steady_lines(
     """Frequencies (f,) in Hz >= 0 and complex amplitudes (f, p) in metre of the steady state.
 
     Only the lines that the load contains above `threshold` of its strongest are answered.
-    Amplitude a stands for Re a exp(2 pi i f t).
+    Amplitude a stands for Re a exp(2 pi i f t). Probes may be a whole map.
 
     Raises
     ------
@@ -109,9 +111,14 @@ def steady_lines(
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     lines = load_lines(pressure, threshold)
     f, which = np.unique(lines.frequencies, return_inverse=True)
-    h = along_path(_on_path(compliance, pressure, probes, 2 * np.pi * f))
-    amplitudes = h[which, :, lines.harmonics] * lines.coefficients[:, None]
-    return summed(lines.frequencies, amplitudes)
+    distance = _distances(pressure, probes)
+    respond = _response_at(compliance, pressure, distance, 2 * np.pi * f)
+    blocks = max(1, distance.size * len(f) // AT_ONCE)
+    amplitudes = [
+        along_path(respond(part))[which, :, lines.harmonics] * lines.coefficients[:, None]
+        for part in np.array_split(distance, min(blocks, len(distance)))
+    ]
+    return summed(lines.frequencies, np.hstack(amplitudes))
 
 
 def steady_state(
@@ -295,12 +302,24 @@ def _on_path(
 ) -> Complex:
     """g (f, p, k) from knots of the path to the probes."""
     distance = _distances(pressure, probes)
+    return _response_at(compliance, pressure, distance, w, negligible)(distance)
+
+
+def _response_at(
+    compliance: Compliance,
+    pressure: MovingPressure,
+    distance: Floats,
+    w: ArrayLike,
+    negligible: float = 0.0,
+) -> Callable[[Floats], Complex]:
+    """g (f, ...) at any of these distances in metre: itself at few, splined between for many."""
     width = spot_width(pressure.height)
-    if distance.size <= 2 * len(probes):
-        unique, which = np.unique(distance, return_inverse=True)
-        return point_response(compliance, unique, w, width, negligible=negligible)[
-            :, which.reshape(distance.shape)
-        ]
+    unique = np.unique(distance)
+    if len(unique) <= FEW_DISTANCES:
+        g = point_response(compliance, unique, w, width, negligible=negligible)
+        return lambda some: g[:, np.searchsorted(unique, some)]
     table = _table(distance.max(), width)
-    g = point_response(compliance, table, w, width, negligible=negligible)
-    return np.asarray(_spline(table, g, axis=1)(distance))
+    spline = _spline(
+        table, point_response(compliance, table, w, width, negligible=negligible), axis=1
+    )
+    return lambda some: np.asarray(spline(some))

@@ -83,7 +83,15 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Amplitudes (f, p) at exactly these frequencies (f,) in Hz, by weighted least squares.
+    """Amplitudes (f, p) at exactly these frequencies (f,) in Hz: the moduli of `phasors`."""
+    return np.abs(phasors(response, frequencies, settle=settle))
+
+
+def phasors(
+    response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
+) -> NDArray[np.complex128]:
+    """Complex amplitudes a (f, p) of Re a exp(2 pi i f t) at exactly these frequencies (f,) in Hz,
+    by weighted least squares.
 
     All lines and the mean are fitted together after the first part `settle` of the response,
     under a Kaiser window, so that neither the position of a line between two bins nor a line
@@ -107,7 +115,7 @@ def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE)
     weighted = basis * get_window(LINE_WINDOW, len(t), fftbins=False)[:, None]
     fitted = np.linalg.lstsq(weighted.T @ basis, weighted.T @ x, rcond=1e-13)[0]
     cosine, sine = np.split(fitted[1:], 2)
-    return np.vstack([np.abs(fitted[:1]), np.hypot(cosine, sine)])[which]
+    return np.asarray(np.vstack([fitted[:1], cosine - 1j * sine])[which])
 
 
 def told_apart(

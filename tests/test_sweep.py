@@ -95,7 +95,7 @@ def test_rows_say_what_was_commanded_and_what_came_out(scene):
     assert len(waves["f_AM_um"]) == len(waves["level_db"]) == 2
     assert waves["peak_um"][0] > waves["f_AM_um"][0] > 0
     assert {waves["kernel_spread_6db_mm"], waves["spread_6db_mm"]} <= {0, 10}
-    assert max(map(abs, waves["kernel_lag_ms"])) < 50
+    assert max(map(abs, waves["kernel_delay_ms"])) < 50
     assert waves["drawing_frequency_hz"] == pytest.approx(waves["tacton.speed_m_per_s"] / 0.0314159)
     (scene.parent / "again.toml").write_text(waves["scene"])
     assert read("again.toml").tacton.trajectory.speed == waves["tacton.speed_m_per_s"]

@@ -66,7 +66,7 @@ def tacton_figure(title: str, runs: list[Run]) -> Figure:
 
 def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     """A few Tactons side by side: waveform, spectrum at one probe, and spread over all."""
-    figure = Figure(figsize=(4.0 * len(columns) + 0.5, 8.2), layout="constrained")
+    figure = Figure(figsize=(max(7.0, 4.0 * len(columns) + 0.5), 8.2), layout="constrained")
     axes = figure.subplots(3, len(columns), sharey="row", squeeze=False)
     for k, (title, runs) in enumerate(columns.items()):
         where = 1e3 * np.hypot(*runs[0].response.probes[probe])

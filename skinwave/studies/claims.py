@@ -11,6 +11,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
+from skinwave.numbers import decibel
 from skinwave.run import Run
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
@@ -30,6 +31,11 @@ class Verdict:
     value: float
     bar: float
     sentence: str
+
+    @property
+    def column(self) -> str:
+        """As `Run.column`."""
+        return self.model if self.body == "none" else self.body
 
 
 def evaluate(runs: Iterable[Run]) -> list[Verdict]:
@@ -77,17 +83,23 @@ def _is_told(run: Run, claim: str) -> bool:
 
 def _single_line(runs: list[Run]) -> Judgement:
     worst = max(_others(run).max() for run in runs)
-    return worst < ABSENT, worst, ABSENT, f"the strongest line beside f_AM is at {worst:.1f} dB"
+    return (
+        worst < ABSENT,
+        worst,
+        ABSENT,
+        f"the strongest line beside f_AM is at {decibel(worst)} dB",
+    )
 
 
 def _am_harmonics(runs: list[Run]) -> Judgement:
     second = min(_strongest(run, ["2f_AM"]) for run in runs)
-    third = max(_strongest(run, ["3f_AM"]) for run in runs)
+    third = min(_strongest(run, ["3f_AM"]) for run in runs)
+    weakest = min(second, third)
     return (
-        second > PRESENT,
-        second,
+        weakest > PRESENT,
+        weakest,
         PRESENT,
-        f"2 f_AM is at {second:.1f} dB or above, 3 f_AM at {third:.1f} dB or below, re f_AM",
+        f"at the least 2 f_AM is at {decibel(second)} dB and 3 f_AM at {decibel(third)} dB re f_AM",
     )
 
 
@@ -126,8 +138,8 @@ def _pairs_only(runs: list[Run]) -> Judgement:
         drawn < ABSENT and weakest > PRESENT,
         drawn,
         ABSENT,
-        f"the strongest line at n f_d is at {drawn:.1f} dB re f_AM, the weakest of the pairs "
-        f"n f_d +- f_AM (n = 1, 2) at {weakest:.1f} dB",
+        f"the strongest line at n f_d is at {decibel(drawn)} dB re f_AM, the weakest of the pairs "
+        f"n f_d +- f_AM (n = 1, 2) at {decibel(weakest)} dB",
     )
 
 
@@ -138,8 +150,8 @@ def _both_multiples(runs: list[Run]) -> Judgement:
         drawn > PRESENT,
         drawn,
         PRESENT,
-        f"f_d is at {drawn:.1f} dB re f_AM or above in every Tacton, 2 f_AM at {double:.1f} dB "
-        "or above",
+        f"f_d is at {decibel(drawn)} dB re f_AM or above in every Tacton, 2 f_AM at "
+        f"{decibel(double)} dB or above",
     )
 
 
@@ -148,7 +160,7 @@ def _am_highest(runs: list[Run]) -> Judgement:
     value = _others(worst).max()
     name, probe = _rival(worst)
     sentence = (
-        f"the strongest rival of f_AM is {name} at {value:+.1f} dB "
+        f"the strongest rival of f_AM is {name} at {decibel(value, signed=True)} dB "
         f"({worst.tacton}, probe at {probe:g} mm)"
     )
     return value < 0, value, 0.0, sentence
@@ -161,7 +173,7 @@ def _am_highest_measured(runs: list[Run]) -> Judgement:
         sentence += f"; f_AM is beaten in {', '.join(beaten)}"
     if runs[0].response.unit == "m":  # a vibrometer reads velocity; the point kernel has none
         velocity = max(_others(run, velocity=True).max() for run in runs)
-        sentence += f"; as velocity the strongest rival is at {velocity:+.1f} dB"
+        sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
         value = max(value, velocity)
     return holds and value < 0, value, bar, sentence
 
@@ -173,8 +185,8 @@ def _much_lower(runs: list[Run]) -> Judgement:
         value < MUCH_LOWER,
         value,
         MUCH_LOWER,
-        f"the strongest other line is at {value:+.1f} dB re f_AM; in {lower} of {len(runs)} "
-        f"Tactons all are below {MUCH_LOWER:g} dB at every probe",
+        f"the strongest other line is at {decibel(value, signed=True)} dB re f_AM; in {lower} of "
+        f"{len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe",
     )
 
 

@@ -2,8 +2,10 @@
 
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from html import escape
+from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -13,12 +15,13 @@ from skinwave.effort import Progress, peak_memory
 from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
-from skinwave.pictures.figures import overview_figure, png, tacton_figure
+from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.simulation import check_knobs, simulate
-from skinwave.studies import paper15, tables
+from skinwave.studies import paper15, summary, tables
+from skinwave.studies.changes import Shown, all_maps, beside_kernels, changes, quick_maps, shown
 from skinwave.studies.claims import Verdict, evaluate
 from skinwave.studies.description import levels_of, modelled, path_of, tones_of, untold
 
@@ -87,6 +90,13 @@ def run_study(
     except KeyboardInterrupt:
         if not runs:
             raise
+    groups: dict[str, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(run.tacton, []).append(run)
+    first = None
+    with suppress(KeyboardInterrupt):
+        maps = partial(all_maps, progress=progress, solver=solver)
+        first = shown(groups, maps) if len(runs) == planned else None
     outcome = Outcome(
         verdicts=evaluate(runs),
         runs=len(runs),
@@ -98,7 +108,7 @@ def run_study(
     write_claims(folder / "claims.csv", outcome.verdicts)
     write_lines(folder / "lines.csv", runs)
     write_responses(folder / "responses.npz", {f"{r.tacton}/{r.body}/{r.model}": r for r in runs})
-    _write_page(folder, runs, outcome, prepared, progress, title, command)
+    _write_page(folder, groups, first, outcome, prepared, progress, title, command)
     return replace(outcome, seconds=time.perf_counter() - started, peak_memory=peak_memory())
 
 
@@ -106,7 +116,10 @@ def write_single(folder: Path, run: Run) -> None:
     """The folder of one run, with its page."""
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
+    group = beside_kernels(run) if run.response.unit == "m" else []
+    first = shown({run.tacton: group}, quick_maps)
     parts = [
+        *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *map(document.paragraph, untold([run])),
         *(document.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
@@ -140,7 +153,8 @@ def _answer(
 
 def _write_page(
     folder: Path,
-    runs: list[Run],
+    groups: Mapping[str, list[Run]],
+    first: Shown | None,
     outcome: Outcome,
     prepared: dict[str, Prepared],
     progress: Progress,
@@ -148,18 +162,15 @@ def _write_page(
     command: str,
 ) -> None:
     """index.html, and a PNG of each figure in it."""
-    groups: dict[str, list[Run]] = {}
-    for run in runs:
-        groups.setdefault(run.tacton, []).append(run)
+    runs = [run for group in groups.values() for run in group]
     (folder / "figures").mkdir()
     pictures = []
     for k, (name, group) in enumerate(groups.items()):
         progress("draw", k / len(groups))
         figure = tacton_figure(name, group)
         pictures.append(_picture(folder, name, figure, caption(name, group)))
-    shown = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
-    overview = overview_figure(shown, min(2, len(runs[0].scene.probes) - 1))
-    shown_first = _picture(folder, "overview", overview, OVERVIEW_CAPTION)
+    few = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
+    overview = overview_figure(few, min(2, len(runs[0].scene.probes) - 1))
     efforts = {
         body: replace(
             p.effort,
@@ -170,12 +181,15 @@ def _write_page(
         )
         for body, p in prepared.items()
     }
+    drawn = partial(_picture, folder, "propagation")
     parts = [
+        *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         *_introduction(outcome, groups),
         *map(document.paragraph, untold(runs)),
-        shown_first,
+        _picture(folder, "overview", overview, OVERVIEW_CAPTION),
+        document.section("What propagation changes", summary.per_tacton(changes(groups))),
         document.section(
-            "Which of the paper's statements hold where",
+            "Which of the paper's claims hold where",
             tables.claims_table(outcome.verdicts),
             *map(document.paragraph, _disagreements(outcome.verdicts)),
         ),
@@ -197,29 +211,38 @@ def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
     return document.picture(drawn, caption, name)
 
 
-def _introduction(outcome: Outcome, groups: dict[str, list[Run]]) -> list[str]:
+def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str]:
     if outcome.runs == outcome.planned:
-        state = f"{len(groups)} Tactons, {outcome.runs} runs."
+        state = f"{len(groups)} Tacton{'s' * (len(groups) != 1)}, {outcome.runs} runs."
     else:
         state = f"Interrupted: {outcome.runs} of {outcome.planned} runs are finished and shown."
     return [
         document.paragraph(
             f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
-            "doi 10.1145/3613905.3650981) beside finite elements of the bodies that the same "
-            "Tactons drive. Amplitudes of every line are in lines.csv, waveforms in "
-            "responses.npz; each run's folder has the scene that reproduces it."
+            "doi 10.1145/3613905.3650981), as published and under the load that the bodies "
+            "receive, beside finite elements of these bodies. Amplitudes of every line are in "
+            "lines.csv, waveforms in responses.npz; each run's folder has its scene."
         )
     ]
 
 
 def _disagreements(verdicts: list[Verdict]) -> list[str]:
-    """Where the linear physics of a body contradicts what was measured on paper, in words."""
+    """Where a body contradicts what was measured on paper, and whether propagation is the cause."""
+    of_kernel = {v.claim: v.holds for v in verdicts if v.model == "point-kernel"}
     texts = []
     for verdict in verdicts:
         if verdict.body != "none" and verdict.claim.startswith("M") and not verdict.holds:
+            alone = of_kernel.get(verdict.claim, False)
             texts.append(
-                f"Linear waves on the {verdict.body} contradict {verdict.claim}, which was "
-                f"measured on paper: {verdict.sentence}."
+                f"The {label(verdict.body)} contradicts {verdict.claim}, which was measured on "
+                f"paper: {verdict.sentence}. "
+                + (
+                    "The point kernel under the same load does not, so that propagation is the "
+                    "cause."
+                    if alone
+                    else "So does the point kernel under the same load: propagation is not the "
+                    "cause."
+                )
             )
     return texts
 

@@ -1,43 +1,78 @@
-"""Tables of a run for its page: statements, agreement, cost."""
+"""Tables of a run for its page: claims, agreement, cost."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
+import numpy as np
+
+from meshes.tetmesh import Floats
 from simple_model import Effort
 from skinwave.comparison import compare
 from skinwave.document import paragraph, table
+from skinwave.numbers import significant
 from skinwave.pictures.figures import label
+from skinwave.propagation import strongest_component
 from skinwave.run import Run
 from skinwave.studies.claims import TEXTS, Verdict
 
 
 def claims_table(verdicts: list[Verdict]) -> str:
-    """Statements that were judged down, bodies across: holds or fails, and what decides."""
-    bodies = list(dict.fromkeys(v.body for v in verdicts))
-    found = {(v.claim, v.body): v for v in verdicts}
+    """Claims down, kernels and bodies across: holds or fails, and what decides."""
+    columns = list(dict.fromkeys(v.column for v in verdicts))
+    found = {(v.claim, v.column): v for v in verdicts}
     rows = [
-        [f"{claim}: {TEXTS[claim]}", *(_verdict(found.get((claim, body))) for body in bodies)]
+        [f"{claim}: {TEXTS[claim]}", *(_verdict(found.get((claim, c))) for c in columns)]
         for claim in TEXTS
         if any(claim == verdict.claim for verdict in verdicts)
     ]
-    return table(["statement", *map(label, bodies)], rows)
+    return table(["claim", *map(label, columns)], rows)
 
 
-def agreement_table(runs: dict[str, list[Run]]) -> str:
-    """How each pair of models agrees on each Tacton, over all probes."""
-    rows = []
-    for name, group in runs.items():
-        for i, reference in enumerate(group):
-            for candidate in group[i + 1 :]:
-                a = compare(reference.response, candidate.response)
-                rows.append(
-                    [name, label(reference.column), label(candidate.column)]
-                    + [f"{min(a.relative_l2):.2f} to {max(a.relative_l2):.2f}"]
-                    + [f"{1e3 * a.lag[0]:+.1f}"]
-                    + [_spread(s) for s in (a.spread_reference, a.spread_candidate)]
-                )  # fmt: skip
-    header = ["Tacton", "reference", "candidate", "waveform misfit (best scale if units differ)"]
-    header += ["lag at first probe, ms", "spread of reference, mm at -6 / -20 dB"]
-    return table([*header, "of candidate"], rows)
+def agreement_table(runs: Mapping[str, Sequence[Run]]) -> str:
+    """Each Tacton's answers, a pair at a time between which one thing changes: drive law and focus
+    from the published kernel to that under the same load, propagation from this to a body.
+    """
+    rows = [
+        [name, changed, f"{label(a.column)} to {label(b.column)}", *_agreement(a, b)]
+        for name, group in runs.items()
+        for changed, a, b in pairs(group)
+    ]
+    header = ["Tacton", "what changes", "from, to", "waveform misfit at the best scale"]
+    header += ["misfit at the best gain and delay", "delay over the probes, ms"]
+    header += ["phase delay of the strongest component, ms"]
+    return table([*header, "spread over the probes at -6 / -20 dB, mm"], rows)
+
+
+def pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
+    """What changes, and the two answers between which it does."""
+    found = {run.column: run for run in group}
+    kernel, published = found.get("point-kernel"), found.get("point-kernel-published")
+    if kernel is None:
+        return []
+    bodies = [run for run in found.values() if run.response.unit == "m"]
+    first = [("drive law and focus", published, kernel)] if published else []
+    return first + [("propagation", kernel, run) for run in bodies]
+
+
+def _agreement(a: Run, b: Run) -> list[str]:
+    strongest = strongest_component(b)
+    found = compare(a.response, b.response, (strongest.frequency,) if strongest else ())
+    delays = found.phase_delay[0] if strongest else np.array([np.nan])
+    return [
+        _between(found.relative_l2),
+        _between(found.shape_misfit),
+        _between(1e3 * found.delay),
+        _between(1e3 * delays[np.isfinite(delays)]),
+        f"{_spread(found.spread_reference)} to {_spread(found.spread_candidate)}",
+    ]
+
+
+def _between(values: Floats) -> str:
+    """The least and the largest."""
+    if not len(values):
+        return "-"
+    low, high = (significant(float(v) + 0.0, 2) for v in (values.min(), values.max()))
+    return low if low == high else f"{low} to {high}"
 
 
 def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None = None) -> str:

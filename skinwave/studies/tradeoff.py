@@ -58,13 +58,13 @@ class Measured:
     """A candidate's errors against the reference and its cost.
 
     `errors` relative L2 per probe, `line_errors` dB per line at the probe where it is strongest,
-    `lag` in s at the worst probe; `cold` and `warm` wall s; `memory` peak bytes; unknowns `dofs`.
+    `delay` in s at the worst probe; `cold` and `warm` wall s; `memory` peak bytes; unknowns `dofs`.
     """
 
     candidate: Candidate
     errors: tuple[float, ...]
     line_errors: dict[str, float]
-    lag: float
+    delay: float
     cold: float
     warm: float
     memory: int
@@ -157,13 +157,13 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
         [
             m.candidate.name + (" *" if m.candidate.name in front else ""),
             f"{100 * m.error:.3g}", f"{max(map(abs, m.line_errors.values()), default=0):.2f}",
-            f"{1e3 * m.lag:+.2f}", f"{m.cold:.2g}", f"{m.warm:.2g}",
+            f"{1e3 * m.delay:+.2f}", f"{m.cold:.2g}", f"{m.warm:.2g}",
             f"{m.memory / 2**20:.0f}", f"{m.dofs:,}",
         ]
         for m in found.measured
     ]  # fmt: skip
     header = ["candidate (* on the front)", "waveform error, %", "largest line error, dB"]
-    header += ["lag, ms", "cold, s", "warm, s", "peak memory, MiB", "unknowns"]
+    header += ["delay, ms", "cold, s", "warm, s", "peak memory, MiB", "unknowns"]
     (folder / "index.html").write_text(
         document.page(
             f"Speed against accuracy: {scene.name}",
@@ -286,7 +286,7 @@ def _measure(
         candidate=candidate,
         errors=tuple(map(float, found.relative_l2)),
         line_errors=decibel,
-        lag=float(found.lag[np.argmax(np.abs(found.lag))]),
+        delay=float(found.delay[np.argmax(np.abs(found.delay))]),
         cold=cold,
         warm=warm,
         memory=memory,

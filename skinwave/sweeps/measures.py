@@ -27,7 +27,7 @@ NUMBERS = (
 )  # fmt: skip
 AT_PROBES = (
     "probe_x_mm", "probe_y_mm", "peak_um", "rms_um", "level_db", "kernel_peak_pa", "kernel_rms_pa",
-    "kernel_misfit", "kernel_lag_ms",
+    "kernel_misfit", "kernel_shape_misfit", "kernel_delay_ms",
 )  # fmt: skip
 COSTS = ("seconds", "peak_memory_gib")  # which differ from run to run
 
@@ -97,7 +97,8 @@ def _kernel(kernel: Response, agreement: Agreement) -> dict[str, Any]:
         "kernel_peak_pa": _peak(kernel),
         "kernel_rms_pa": moving_rms(kernel),
         "kernel_misfit": agreement.relative_l2,
-        "kernel_lag_ms": 1e3 * agreement.lag,
+        "kernel_shape_misfit": agreement.shape_misfit,
+        "kernel_delay_ms": 1e3 * agreement.delay,
         "kernel_spread_6db_mm": 1e3 * agreement.spread_reference[-6],
         "kernel_spread_20db_mm": 1e3 * agreement.spread_reference[-20],
     }

@@ -27,7 +27,8 @@ NAMES = {
     "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
     "body.depth_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
     "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
-    "kernel_lag_ms": "lag behind the point kernel", "expected_error": "expected error of the mesh",
+    "kernel_delay_ms": "delay behind the point kernel",
+    "expected_error": "expected error of the mesh",
 }  # fmt: skip
 
 

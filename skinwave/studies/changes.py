@@ -1,0 +1,141 @@
+"""What propagation changes of every Tacton of a study, with maps of the one that is shown first."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from meshes import cache
+from simple_model.response import SETTLE
+from skinwave.effort import Progress, versions
+from skinwave.propagation import Propagation, propagation, share_outside
+from skinwave.run import Run
+from skinwave.scene import Scene
+from skinwave.simulation import simulate
+from skinwave.studies import paper15
+from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
+
+MATERIALS = ("forearm", "palm", "palm-stiff")  # presets of soft tissue, softest first
+Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's
+Maps = Callable[[Run], Drawn]
+FIRST = ("am140-stm20",)  # of the paper's Tactons, the one with both modulations in the middle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """The Tacton of a page's first screen: its kernel as `published` and under the same load, what
+    propagation changes by body, the maps by column, the expected relative error of the answer and
+    the shares of motion outside the kernel's region over the range of materials, where known.
+    """
+
+    kernel: Run
+    published: Run
+    bodies: Sequence[Run]
+    changes: Mapping[str, Propagation]
+    surfaces: Mapping[str, SurfaceMap] = field(default_factory=dict)
+    error: float = np.nan
+    shares: tuple[float, float] | None = None
+
+    @property
+    def body(self) -> Run:
+        """The one that sentences are about: skin, if there is any."""
+        skin = [run for run in self.bodies if run.scene.body.kind != "sheet"]
+        return (skin or list(self.bodies))[-1]
+
+
+def changes(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagation]]:
+    """Tacton -> body -> what propagation changes, with maps where they cost next to nothing."""
+    found: dict[str, dict[str, Propagation]] = {}
+    for name, group in groups.items():
+        kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
+        for run in bodies:
+            if kernel is not None:
+                found.setdefault(name, {})[run.column] = propagation(run, kernel, *quick_maps(run))
+    return found
+
+
+def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
+    """The Tacton of the first screen; None where no body was answered beside both kernels."""
+    name = next((n for n in (*FIRST, *groups) if n in groups), "")
+    group = groups.get(name, [])
+    kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
+    published = next((r for r in group if r.model == "point-kernel-published"), None)
+    if kernel is None or published is None or not bodies:
+        return None
+    surfaces: dict[str, SurfaceMap] = {}
+    found: dict[str, Propagation] = {}
+    for run in bodies:
+        drawn = maps(run)
+        if drawn:
+            surfaces |= {kernel.column: drawn[1], run.column: drawn[0]}
+        found[run.column] = propagation(run, kernel, *drawn)
+    first = Shown(
+        kernel=kernel, published=published, bodies=bodies, changes=found, surfaces=surfaces
+    )
+    return replace(first, error=_error(first.body), shares=_shares(first.body.scene))
+
+
+def beside_kernels(run: Run) -> list[Run]:
+    """A body's run after those of both point kernels for the same scene."""
+    bare = {"tacton": run.tacton, "body": "none"}
+    kernels = [
+        Run(**bare, scene=scene, response=simulate(scene, model))
+        for model, scene in paper15.beside_kernels(run.scene).items()
+    ]
+    return [*kernels, run]
+
+
+def quick_maps(run: Run) -> Drawn:
+    """A body's map and the kernel's, where the body's costs next to nothing."""
+    if not has_wavenumber_integral(run.scene):
+        return ()
+    x, y = grid(run.scene)
+    return body_map(run.scene, x, y), kernel_map(run.scene.pressure, x, y)
+
+
+def all_maps(run: Run, progress: Progress, solver: str) -> Drawn:
+    """A body's map, cached where elements answer, and the kernel's."""
+    if quick := quick_maps(run):
+        return quick
+    x, y = grid(run.scene)
+    below = kernel_map(run.scene.pressure, x, y)
+    physics = run.scene.body, run.scene.pressure
+    name, names = (
+        cache.key("surface", *physics, x, y, solver, versions()),
+        ("x", "y", "rms", "level"),
+    )
+    if (entry := cache.load(name)) is not None:
+        return SurfaceMap(**{n: entry[n] for n in names}, unit="m", h=entry["meta"]["h"]), below
+    progress(f"map of {run.column}", 0.0)
+    surface = body_map(run.scene, x, y, progress, solver=solver)
+    cache.store(name, {"h": surface.h}, **{n: getattr(surface, n) for n in names})
+    return surface, below
+
+
+def _kernel(group: Sequence[Run]) -> Run | None:
+    return next((run for run in group if run.model == "point-kernel"), None)
+
+
+def _error(run: Run) -> float:
+    """Relative difference of the steady waveform from the wavenumber integral's, worst probe."""
+    if not has_wavenumber_integral(run.scene):
+        return np.nan
+    first = int(SETTLE * len(run.response.times))
+    exact = simulate(run.scene, "flat-body-harmonic").displacement[first:]
+    size = np.linalg.norm(exact - exact.mean(axis=0), axis=0)
+    away = run.response.displacement[first:] - exact
+    wrong = np.linalg.norm(away - away.mean(axis=0), axis=0) / np.where(size > 0, size, np.inf)
+    return float(wrong.max())
+
+
+def _shares(scene: Scene) -> tuple[float, float] | None:
+    """Least and largest share outside the kernel's region over the presets of soft tissue."""
+    if scene.body.material not in MATERIALS or not has_wavenumber_integral(scene):
+        return None
+    x, y = grid(scene)
+    kernel = kernel_map(scene.pressure, x, y).rms
+    found = []
+    for material in MATERIALS:
+        softer = replace(scene, body=replace(scene.body, material=material))
+        found.append(share_outside(kernel, body_map(softer, x, y).rms))
+    return min(found), max(found)

@@ -1,0 +1,210 @@
+"""The first screen of a page: three sentences, one picture, one small table."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from skinwave.document import paragraph, table
+from skinwave.numbers import decibel, significant
+from skinwave.pictures.figures import label
+from skinwave.pictures.surfaces import SURFACES, surfaces_figure
+from skinwave.propagation import Component, Propagation, Reach, added_lines
+from skinwave.run import Run
+from skinwave.scene import Body
+from skinwave.studies.changes import Shown
+
+NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
+NAMED = 3  # lines that a sentence names
+
+
+def top(shown: Shown, draw: Callable[[Figure, str], str], name: str = "") -> list[str]:
+    """Parts of a page: what a reader of ten seconds reads of the Tacton that is shown first.
+
+    Parameters
+    ----------
+    draw : makes a part of the page of a figure and its caption
+    name : of the Tacton, on a page of several
+    """
+    parts = [paragraph(text) for text in sentences(shown)]
+    if name:
+        parts[0] = paragraph(f"{name}, one of the Tactons below: {sentences(shown)[0]}")
+    if shown.surfaces and shown.changes[shown.body.column].strongest:
+        parts.append(draw(surfaces_figure(shown.kernel.scene, shown.surfaces), SURFACES))
+    return [
+        *parts,
+        small_table(list(shown.changes.values()), shown.kernel.tacton),
+        beside_published(shown.kernel, shown.published),
+    ]
+
+
+def sentences(shown: Shown) -> list[str]:
+    """What propagation does to a Tacton; what the drive law does; how far it is felt, how sure."""
+    found = shown.changes[shown.body.column]
+    return [
+        _propagated(found),
+        _driven(shown.kernel, shown.published),
+        " ".join([_felt(found), _sure(shown)]),
+    ]
+
+
+def small_table(columns: Sequence[Propagation], name: str) -> str:
+    """Kernel and bodies under the same load, a column each."""
+    if not columns:
+        return ""
+    first = columns[0]
+    rows = [
+        ["share of motion outside the kernel's -20 dB region"]
+        + ["0 %" if first.share is not None else "-", *(_percent(c.share) for c in columns)],
+        ["spread from the path at -6 dB, mm"]
+        + [_reach(first.kernel_spread), *(_reach(c.spread) for c in columns)],
+        ["phase delay of the strongest component at the path, ms"]
+        + ["0", *("-" if c.delay is None else significant(1e3 * c.delay, 2) for c in columns)],
+        ["strongest component"]
+        + [_component(first.kernel_strongest, "Pa"), *(_component(c.strongest) for c in columns)],
+        ["its sensation level, dB SL"] + ["-", *(_sensation(c.strongest) for c in columns)],
+    ]
+    return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
+
+
+def beside_published(kernel: Run, published: Run) -> str:
+    """What the drive law and the focus change: the kernel as published beside the same load."""
+    names = [n for n in kernel.frequencies if n in published.frequencies]
+    levels = [
+        [20 * np.log10(max(float(r.lines[n].max()), 1e-300) / top) if top else -np.inf
+         for n in names]
+        for r in (published, kernel)
+        for top in [max((float(x.max()) for x in r.lines.values()), default=0.0)]
+    ]  # fmt: skip
+    shown = sorted(range(len(names)), key=lambda k: -max(levels[0][k], levels[1][k]))[:8]
+    rows = [
+        [names[k], f"{kernel.frequencies[names[k]]:.1f}", *(decibel(x[k]) for x in levels)]
+        for k in shown
+    ]
+    header = ["component", "frequency, Hz", "as published, dB re its strongest"]
+    folded = table([*header, "same load, dB re its strongest"], rows)
+    drives = " against ".join(
+        f"{r.scene.pressure.drive}, {r.scene.pressure.focus}" for r in (kernel, published)
+    )
+    return (
+        "<details><summary>Kernel as published beside the same load: what the drive law and the "
+        f"focus change</summary>{paragraph(drives + '; largest at any probe.')}{folded}</details>"
+    )
+
+
+def _propagated(found: Propagation) -> str:
+    if found.strongest is None:
+        return NOTHING
+    lag = _lag(found)
+    if found.share is None:
+        return (
+            f"On the {label(found.column)} motion lags the point kernel under the same load{lag}."
+        )
+    spread, before = _reach(found.spread), _reach(found.kernel_spread)
+    more = f"; it spreads {spread} mm from the path at -6 dB where the kernel has {before} mm"
+    return (
+        f"Waves carry {_percent(found.share)} of the motion of the {label(found.column)} to where "
+        f"the point kernel, under the same load, predicts next to none{more}"
+        + (f", and lags it{lag}." if lag else ".")
+    )
+
+
+def _lag(found: Propagation) -> str:
+    if found.delay is None or found.strongest is None:
+        return ""
+    return f" by {significant(1e3 * found.delay, 2)} ms at {found.strongest.frequency:.0f} Hz"
+
+
+def _driven(kernel: Run, published: Run) -> str:
+    names = added_lines(kernel, published)
+    drive = kernel.scene.pressure.drive
+    if kernel.scene.pressure == published.scene.pressure:
+        return "The load is the published one, so that nothing else differs from the paper's model."
+    if not names:
+        return (
+            f"The drive law ({drive}) and the focus, beside the published ones, change strengths "
+            "and add no component."
+        )
+    said = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
+    return (
+        f"The drive law ({drive}), not propagation, adds the component{'s' * (len(names) > 1)} "
+        f"{said}: the kernel has {'them' if len(names) > 1 else 'it'} under the same load, and not "
+        "as published."
+    )
+
+
+def _felt(found: Propagation) -> str:
+    peak = found.strongest
+    if peak is None:
+        return ""
+    if peak.level is None:
+        return (
+            f"The strongest component is {peak.name} at {peak.frequency:.0f} Hz; detection "
+            "thresholds are of skin and say nothing of paper."
+        )
+    most = f"most at {peak.name} ({peak.frequency:.0f} Hz, {peak.level:+.0f} dB SL)"
+    if not found.felt:
+        return f"Felt {most}." if peak.level >= 0 else f"Below threshold, by least at {most[8:]}."
+    half, now, twice = found.felt
+    if now is None:
+        return f"Below the threshold of detection everywhere, {most}."
+    less = "not at all" if half is None else f"{_reach(half)} mm"
+    return (
+        f"Felt out to {_reach(now)} mm from the path, {most}; with half or twice the pressure, "
+        f"which is known no better, {less} or {_reach(twice)} mm."
+    )
+
+
+def _sure(shown: Shown) -> str:
+    body = shown.body.scene.body
+    if np.isfinite(shown.error):
+        error = f"Numerical error {_percent(shown.error)}, against the wavenumber integral"
+    else:
+        error = "The numerical error is not estimated here (skinwave plan does)"
+    return f"{error}; {_material(body, shown.shares)}."
+
+
+def _material(body: Body, shares: tuple[float, float] | None) -> str:
+    if body.kind == "sheet":
+        return "grammage, stiffness and support of the sheet that was measured are not published"
+    text = "skin's stiffness is known to a factor of 2, its loss to one of 5"
+    if shares is None:
+        return text
+    least, most = (significant(100 * share, 2) for share in shares)
+    return f"{text}: over the presets of soft tissue the share is {least} to {most} %"
+
+
+def _component(found: Component | None, unit: str = "m") -> str:
+    if found is None:
+        return "none"
+    size = 1e6 * found.amplitude if unit == "m" else found.amplitude
+    said = f"{significant(size, 2)} {'µm' if unit == 'm' else unit}"
+    return f"{found.name}, {found.frequency:.0f} Hz, {said}"
+
+
+def _sensation(found: Component | None) -> str:
+    return "-" if found is None or found.level is None else f"{found.level:+.0f}"
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{significant(100 * share, 2)} %"
+
+
+def _reach(found: Reach | None) -> str:
+    if found is None:
+        return "-"
+    return f"{'> ' * found.beyond}{1e3 * found.metre:.0f}"
+
+
+def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> str:
+    """Tacton -> body -> what propagation changes, a row each."""
+    rows = [
+        [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
+         "-" if c.delay is None else significant(1e3 * c.delay, 2),
+         _component(c.kernel_strongest, "Pa"), _component(c.strongest), _sensation(c.strongest)]
+        for name, columns in found.items()
+        for c in columns.values()
+    ]  # fmt: skip
+    header = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
+    header += ["phase delay, ms", "strongest in kernel", "in body", "dB SL"]
+    return table(header, rows)

@@ -1,0 +1,160 @@
+"""Steady vibration of a whole surface, line by line: the point kernel's pressure and a body's
+motion under the same load, on one grid.
+
+Where a body has a wavenumber integral it answers, else finite elements in reduced coordinates.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline, LinearNDInterpolator
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure, sensation_level
+from simple_model.flat_body import steady_lines
+from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from skinwave.effort import Progress
+from skinwave.models.bodies import default_size, exact_waves, has_exact_waves
+from skinwave.pictures.motion import Waves, line_amplitudes, waves
+from skinwave.scene import Scene
+
+REACH, STEP = 0.044, 0.001  # m of a map either way from the middle, and between its places
+FAINT = 1e-4  # of the load's strongest line: lines that no map shows
+SILENT = -200.0  # dB, finite so that it can be interpolated
+RADIAL = 0.5e-3  # m between the radii that stand for a map where it is a figure of revolution
+# Than the default element size, of solids and sheets: a map is not looked at as closely as a probe.
+COARSER = (1.5, 2.0)
+REDUCED = 0.1  # relative error of the reduced coordinates of a map
+
+Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SurfaceMap:
+    """Steady vibration of a surface about its mean, on a grid.
+
+    Parameters
+    ----------
+    x, y : (nx,), (ny,) float, metre, equally spaced
+    rms : (ny, nx) float, in `unit`, "m" or "Pa"; not a number off the body
+    level : (ny, nx) float, dB, of the component that is above the threshold of detection by most,
+        were the body skin; minus infinity of a pressure
+    h : float, metre, element size, 0 where there are no elements
+    """
+
+    x: Floats
+    y: Floats
+    rms: Floats
+    level: Floats
+    unit: str
+    h: float = 0.0
+
+    @property
+    def places(self) -> Floats:
+        """Positions (ny, nx, 2) in metre."""
+        return np.stack(np.meshgrid(self.x, self.y), axis=-1)
+
+
+def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats, Floats]:
+    """Coordinates (nx,) and (ny,) in metre of a map about the origin, within the scene's body."""
+    flat = scene.body.kind not in ("none", "mesh")
+    sides = (scene.body.width, scene.body.height) if flat else (np.inf, np.inf)
+    counts = [int(min(reach, side / 2) / step * (1 + 1e-9)) for side in sides]
+    x, y = (np.asarray(step * np.arange(-n, n + 1), np.float64) for n in counts)
+    return x, y
+
+
+def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceMap:
+    """The pressure itself, in Pa, at places x (nx,) and y (ny,) in metre."""
+
+    def answer(places: Floats) -> Lines:
+        lines = load_lines(pressure, FAINT)
+        spots = pressure.spot(places, path_knots(pressure)) * path_weights(pressure)[:, None]
+        frequencies, amplitudes = lines.gather(along_path(spots.T).T)
+        return np.asarray(frequencies, np.float64), amplitudes
+
+    return _mapped(pressure, answer, x, y, "Pa")
+
+
+def body_map(
+    scene: Scene, x: Floats, y: Floats, progress: Progress | None = None, *, solver: str = "auto"
+) -> SurfaceMap:
+    """The body's motion, in m; x (nx,) and y (ny,) in metre.
+
+    Raises
+    ------
+    ValueError
+        If there is no body, or none that can be meshed.
+    """
+    if not has_wavenumber_integral(scene):
+        h = COARSER[scene.body.kind == "sheet"] * default_size(scene.body)
+        moved = waves(scene, REDUCED, progress, h=h, solver=solver)
+        return replace(element_map(moved, x, y), h=h)
+    compliance = exact_waves(scene.body, "flat-body-harmonic")
+
+    def answer(places: Floats) -> Lines:
+        return steady_lines(compliance, scene.pressure, places, threshold=FAINT)
+
+    return _mapped(scene.pressure, answer, x, y, "m")
+
+
+def has_wavenumber_integral(scene: Scene) -> bool:
+    """Whether a wavenumber integral stands for the scene, its sides being absorbing or far."""
+    plain = scene.pressure.focus == "gaussian" and scene.tacton.trajectory.shape != "recorded"
+    return plain and scene.body.sides == "absorbing" and has_exact_waves(scene.body)
+
+
+def element_map(moved: Waves, x: Floats, y: Floats) -> SurfaceMap:
+    """The same of motion that finite elements have given."""
+    top = moved.mesh.points[np.unique(moved.mesh.facets["top"])]
+    frequencies, amplitudes = line_amplitudes(moved, fem.probe_operator(moved.mesh, top))
+    lines = frequencies, amplitudes
+    between = LinearNDInterpolator(top[:, :2], np.column_stack(_rms_and_level(lines, "m")))
+    rms, level = np.moveaxis(between(*np.meshgrid(x, y)), -1, 0)  # not a number off the body
+    return SurfaceMap(x=x, y=y, rms=rms, level=level, unit="m")
+
+
+def _mapped(
+    pressure: MovingPressure, answer: Callable[[Floats], Lines], x: Floats, y: Floats, unit: str
+) -> SurfaceMap:
+    """What answers places (p, 2) with frequencies (f,) and amplitudes (f, p), on a grid."""
+    X, Y = np.meshgrid(x, y)
+    radius = np.hypot(X, Y)
+    if _is_round(pressure):
+        radii = np.arange(0, radius.max() + 2 * RADIAL, RADIAL)
+        frequencies, along = answer(np.column_stack([radii, 0 * radii]))
+        amplitudes = np.abs(CubicSpline(radii, np.abs(along), axis=1)(radius.ravel()))
+    else:
+        frequencies, found = answer(np.column_stack([X.ravel(), Y.ravel()]))
+        amplitudes = np.abs(found)
+    rms, level = (
+        values.reshape(X.shape) for values in _rms_and_level((frequencies, amplitudes), unit)
+    )
+    return SurfaceMap(x=x, y=y, rms=rms, level=level, unit=unit)
+
+
+def _rms_and_level(lines: tuple[Floats, Floats], unit: str) -> tuple[Floats, Floats]:
+    """RMS (p,) about the mean and the highest sensation level (p,) in dB of lines of amplitudes
+    (f, p).
+    """
+    moving = lines[0] > 1e-9
+    frequencies, amplitudes = (each[moving] for each in lines)
+    rms = np.sqrt((amplitudes**2).sum(axis=0) / 2)
+    if unit == "Pa":
+        return rms, np.full_like(rms, -np.inf)
+    levels = sensation_level(amplitudes, frequencies[:, None])
+    return rms, np.maximum(levels.max(axis=0, initial=-np.inf), SILENT)
+
+
+def _is_round(pressure: MovingPressure) -> bool:
+    """Whether each line is as strong all around the origin: one harmonic of a circle, or a focus at
+    rest there.
+    """
+    path = pressure.tacton.trajectory
+    if path.shape not in ("point", "circle") or any(path.centre):
+        return False
+    lines = load_lines(pressure, FAINT)
+    pairs = {(round(f, 6), n) for f, n in zip(lines.frequencies, lines.harmonics, strict=True)}
+    return len(pairs) == len({f for f, _ in pairs})
