@@ -72,6 +72,8 @@ def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
     first = Shown(
         kernel=kernel, published=published, bodies=bodies, changes=found, surfaces=surfaces
     )
+    if found[first.body.column].strongest is None:
+        return first
     return replace(first, error=_error(first.body), shares=_shares(first.body.scene))
 
 

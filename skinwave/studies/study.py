@@ -4,8 +4,8 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from html import escape
 from functools import partial
+from html import escape
 from pathlib import Path
 
 from matplotlib.figure import Figure
