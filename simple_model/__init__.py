@@ -7,7 +7,7 @@ from simple_model.point_kernel import point_kernel
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, lines, spectrum, tacton_lines, told_apart
 from simple_model.rhythm import Rhythm, Signal
-from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
+from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
 from simple_model.threshold import sensation_level, threshold
 from simple_model.trajectory import SHAPES, Trajectory
 
@@ -29,6 +29,7 @@ __all__ = [
     "joined",
     "lines",
     "modulation",
+    "pattern_period",
     "point_kernel",
     "relative_intensity",
     "sensation_level",
