@@ -3,19 +3,13 @@
 from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.joined import evenly, joined
+from simple_model.line_names import named_lines
+from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
-from simple_model.response import (
-    Effort,
-    Response,
-    lines,
-    phasors,
-    spectrum,
-    tacton_lines,
-    told_apart,
-)
+from simple_model.response import Effort, Response, lines, phasors, spectrum, told_apart
 from simple_model.rhythm import Rhythm, Signal
-from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation
+from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
 from simple_model.threshold import sensation_level, threshold
 from simple_model.trajectory import SHAPES, Trajectory
 
@@ -23,29 +17,34 @@ __all__ = [
     "SHAPES",
     "SUPERPOSITIONS",
     "Effort",
+    "LineTable",
     "MovingPressure",
     "Response",
     "Rhythm",
     "Signal",
     "Tacton",
     "Trajectory",
+    "Unnamed",
     "array_field",
     "commanded",
     "evenly",
     "flat_body",
     "focal_spot",
     "joined",
+    "line_table",
     "lines",
     "modulation",
+    "named_lines",
+    "pattern_period",
     "phasors",
     "point_kernel",
     "point_kernel_published",
     "published",
     "relative_intensity",
+    "resolved_lines",
     "sensation_level",
     "spectrum",
     "steady_state",
-    "tacton_lines",
     "threshold",
     "told_apart",
 ]

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import get_window
 
-from simple_model.tacton import Tacton
 from simple_model.trajectory import Floats
 
 # Side lobes of the Kaiser window below -140 dB: lines as weak as that stay apart from strong ones.
 LINE_WINDOW = ("kaiser", 19.0)
+LINE_BETA, LINE_BINS = LINE_WINDOW[1], 2.5  # it keeps lines apart that are so many bins apart
 SETTLE = 0.25  # of a response, before which no line is fitted
 ALIKE = 1e-3  # of what can be told apart: lines as close as that are one, and its amplitude is
+MINOR = 0.05  # of a line: what others that it is not resolved from may have together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +96,8 @@ def phasors(
 
     All lines and the mean are fitted together after the first part `settle` of the response,
     under a Kaiser window, so that neither the position of a line between two bins nor a line
-    left out nor a dying transient leaks into another. Lines closer than one over the fitted
+    left out nor a dying transient leaks into another; a lower window, as far as needed, where
+    lines lie closer than 2.5 over the fitted time. Lines closer than one over the fitted
     time cannot be told apart and share one amplitude: see `told_apart`. 0 Hz gives the mean.
 
     Raises
@@ -103,81 +105,68 @@ def phasors(
     ValueError
         If a frequency is not below half the sampling rate.
     """
+    return fit_lines(response, frequencies, settle=settle)[0]
+
+
+def resolution(response: Response, *, settle: float = SETTLE) -> float:
+    """One over the fitted time, in Hz: how far apart lines must be to be told apart."""
+    return 1 / float((1 - settle) * np.ptp(response.times))
+
+
+def told_apart(
+    response: Response,
+    frequencies: ArrayLike,
+    *,
+    settle: float = SETTLE,
+    strengths: ArrayLike | None = None,
+) -> NDArray[np.bool_]:
+    """Whether `lines` tells each of these frequencies (f,) in Hz from 0 Hz and from the others.
+
+    Frequencies that are the same, or as good as, are one line and need not be told apart; nor does
+    a line from others that have, by their `strengths` (f,) if given, at most 5 % of it together.
+    """
+    frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
+    strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)
+    least = resolution(response, settle=settle)
+    away = np.abs(frequencies[:, None] - frequencies)
+    near, alike = away < least, away <= ALIKE * least
+    mixed = (near & ~alike) @ strengths > MINOR * (alike @ strengths)
+    return ~mixed & ((frequencies < 1e-9) | (frequencies >= least))
+
+
+def fit_lines(
+    response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
+) -> tuple[NDArray[np.complex128], Floats]:
+    """Complex amplitudes (f, p) as of `phasors`, and the remainder (t, p) of the whole response
+    without these lines and the mean; raises what `phasors` does.
+    """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     nyquist = 0.5 / step(response.times)
     if not ((frequencies >= 0) & (frequencies < nyquist)).all():
         raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
     kept = response.times >= response.times[0] + settle * np.ptp(response.times)
-    t, x = response.times[kept], response.displacement[kept]
-    distinct, which = _distinct(frequencies, 1 / np.ptp(t))
-    angle = 2 * np.pi * t[:, None] * distinct[1:]
-    basis = np.hstack([np.ones((len(t), 1)), np.cos(angle), np.sin(angle)])
-    weighted = basis * get_window(LINE_WINDOW, len(t), fftbins=False)[:, None]
-    fitted = np.linalg.lstsq(weighted.T @ basis, weighted.T @ x, rcond=1e-13)[0]
+    t, x = response.times[:, None], response.displacement
+    span = float(np.ptp(t[kept]))
+    distinct, which = _distinct(frequencies, 1 / span)
+    angle = 2 * np.pi * t * distinct[1:]
+    basis = np.hstack([np.ones_like(t), np.cos(angle), np.sin(angle)])
+    window = _window(float(np.diff(distinct).min(initial=np.inf) * span))
+    weighted = (basis[kept] * get_window(window, int(kept.sum()), fftbins=False)[:, None]).T
+    fitted = np.linalg.lstsq(weighted @ basis[kept], weighted @ x[kept], rcond=1e-13)[0]
     cosine, sine = np.split(fitted[1:], 2)
-    return np.asarray(np.vstack([fitted[:1], cosine - 1j * sine])[which])
+    amplitudes = np.vstack([fitted[:1], cosine - 1j * sine])[which]
+    return amplitudes, x - basis @ fitted
 
 
-def told_apart(
-    response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
-) -> NDArray[np.bool_]:
-    """Whether `lines` tells each of these frequencies (f,) in Hz from 0 Hz and from the others.
-
-    Frequencies that are the same, or as good as, are one line and need not be told apart.
-    """
-    frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
-    resolution = 1 / ((1 - settle) * np.ptp(response.times))
-    away = np.abs(frequencies[:, None] - frequencies)
-    mixed = ((away < resolution) & (away > ALIKE * resolution)).any(axis=1)
-    return ~mixed & ((frequencies < 1e-9) | (frequencies >= resolution))
-
-
-def tacton_lines(tacton: Tacton, harmonics: int = 5) -> dict[str, float]:
-    """Names and frequencies in Hz of the lines that a Tacton can make.
-
-    f_AM, n f_AM, f_d, n f_d, n f_d-f_AM and n f_d+f_AM (as a positive frequency); also with the
-    second AM frequency f_AM2, the envelope f_e and the rhythm's f_r, one over its period, where
-    they are used. Harmonics of f_d that several foci cancel are left out, and those of a recording
-    that is run through once. Foci on paths of their own have one f_d, that of each path.
-    """
-    f_d = tacton.drawing_frequency
-    if tacton.trajectory.shape == "recorded" and f_d * tacton.duration < 1.5:
-        f_d = 0.0  # run through once
-    w1, w2 = tacton.superposition
-    tones = {
-        "f_AM": tacton.am_frequency * (w1 > 0),
-        "f_AM2": tacton.second_am_frequency * (w2 > 0),
-        "f_e": tacton.envelope_frequency,
-        "f_r": 1 / tacton.rhythm.period if tacton.rhythm else 0.0,
-    }
-    tones = {name: f for name, f in tones.items() if f > 0}
-    on_path = tacton.foci if tacton.n_paths == 1 else (0.0,)
-    drawn = {f"{_times(n)}f_d": n * f_d for n in _drawn(on_path, harmonics) if f_d > 0}
-    found = {
-        f"{_times(n)}{name}": n * f for name, f in tones.items() for n in range(1, harmonics + 1)
-    }
-    found |= drawn
-    for name, f in tones.items():
-        for drawn_name, drawn_f in drawn.items():
-            found[f"{drawn_name}-{name}"] = abs(drawn_f - f)
-            found[f"{drawn_name}+{name}"] = drawn_f + f
-    return found
+def _window(bins: float) -> tuple[str, float]:
+    """The window for lines that are so many bins apart, whose main lobe is in proportion."""
+    lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
+    return LINE_WINDOW[0], float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
 
 
 def step(times: Floats) -> float:
     """Sampling interval in s of equally spaced times (t,)."""
     return float((times[-1] - times[0]) / (len(times) - 1))
-
-
-def _drawn(foci: tuple[float, ...], harmonics: int) -> list[int]:
-    """Orders of the first harmonics of the path that the foci do not cancel."""
-    n = np.arange(1, harmonics * len(foci) + 1)
-    together = np.abs(np.exp(2j * np.pi * n[:, None] * foci).sum(axis=1))
-    return n[together > 1e-9 * len(foci)][:harmonics].tolist()
-
-
-def _times(n: int) -> str:
-    return "" if n == 1 else str(n)
 
 
 def _distinct(frequencies: Floats, resolution: float) -> tuple[Floats, np.ndarray]:

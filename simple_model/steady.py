@@ -62,16 +62,11 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
     """The lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
     that is silent, the mean alone.
     """
-    of_spot = np.abs(along_path(_swept(pressure))).max(axis=0)
-    n = harmonics(len(of_spot))
-    of_foci = foci_harmonics(pressure, n)
-    share = np.abs(of_foci) * of_spot[n]
-    heard = (share > threshold * share.max()) | (n == 0)
-    n, of_foci, share = n[heard], of_foci[heard], share[heard]
+    n, of_spot = path_strengths(pressure, threshold)
     f, c = (_sampled_lines if pressure.tacton.is_sampled else _sinusoid_lines)(pressure, n)
     order = np.repeat(n, f.shape[1])
-    c = (c * of_foci[:, None]).ravel() * np.where((f := f.ravel()) > 1e-9, 2, 1)
-    strength = np.abs(c) * of_spot[order]
+    c = (c * foci_harmonics(pressure, n)[:, None]).ravel() * np.where((f := f.ravel()) > 1e-9, 2, 1)
+    strength = np.abs(c) * np.repeat(of_spot, f.size // len(n))
     kept = (f > -1e-9) & (strength > threshold * strength.max())
     if pressure.tacton.trajectory.shape == "recorded":
         kept &= f <= HIGHEST
@@ -83,6 +78,17 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
         coefficients=c[kept],
         strengths=strength[kept],
     )
+
+
+def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:
+    """Orders (n,) of the harmonics of one focus along the path that, with all foci, exceed a
+    fraction of the strongest, and 0; and their largest amplitude (n,) at about eight points of it.
+    """
+    of_spot = np.abs(along_path(_swept(pressure))).max(axis=0)
+    n = harmonics(len(of_spot))
+    share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
+    heard = (share > threshold * share.max()) | (n == 0)
+    return n[heard], of_spot[n[heard]]
 
 
 def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
@@ -211,15 +217,19 @@ def _sinusoid_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floa
 
 def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:
     """Frequencies (m,) in Hz of either sign and coefficients (m,) in Pa of the gain."""
-    tacton = pressure.tacton
-    angles = [
-        2 * np.pi * np.arange(PHASES if f else 1) / (PHASES if f else 1) for f in tones(tacton)
-    ]
-    grid = np.meshgrid(*angles, indexing="ij")
-    c = np.fft.fftn(pressure.driven(modulation_at_phases(tacton, *grid))) / grid[0].size
-    orders = [np.fft.fftfreq(len(a), 1 / len(a)) for a in angles]
-    f = sum(
-        o * tone for o, tone in zip(np.meshgrid(*orders, indexing="ij"), tones(tacton), strict=True)
-    )
+    orders, c = gain_orders(pressure)
     kept = np.abs(c) >= 1e-12 * np.abs(c).max()
-    return np.asarray(f)[kept], c[kept]
+    return orders[kept] @ np.array(tones(pressure.tacton)), c[kept]
+
+
+def gain_orders(pressure: MovingPressure, factor: float = 1.0) -> tuple[NDArray[np.int_], Complex]:
+    """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, and its coefficients (m,) in Pa, where the
+    modulation is multiplied by a factor; of either sign, all that the drive laws can make.
+    """
+    tacton = pressure.tacton
+    counts = [PHASES if f else 1 for f in tones(tacton)]
+    grid = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in counts), indexing="ij")
+    driven = pressure.driven(factor * modulation_at_phases(tacton, *grid))
+    of_each = np.meshgrid(*(np.fft.fftfreq(n, 1 / n) for n in counts), indexing="ij")
+    orders = np.stack([np.round(each).astype(int).ravel() for each in of_each], axis=1)
+    return orders, (np.fft.fftn(driven) / driven.size).ravel()

@@ -22,6 +22,9 @@ LONGEST = 10.0  # s
 MOST_FOCI = 8  # what devices make at a time
 SHARINGS = ("simultaneous", "time_multiplexed")
 SAME = 1e-9  # of a drawing period, within which phases are the same
+COMMENSURATE = 1e-6  # relative: frequencies as near to whole multiples of a common one are these
+RETURNED = 0.01  # of a turn: phases as near to where they began have returned
+PATH_ORDERS, TONE_ORDERS = 5, 2  # of what is repeated, whose differences are slow beats
 SUPERPOSITIONS = ((1.0, 0.0), (0.75, 0.25), (0.5, 0.5), (0.25, 0.75), (0.0, 1.0))
 
 
@@ -167,3 +170,78 @@ def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
     """
     carrier = np.sin(2 * np.pi * CARRIER * np.asarray(t, np.float64))
     return tacton.amplitude * level(tacton, t) * carrier * modulation(tacton, t)
+
+
+def repeated(tacton: Tacton) -> dict[str, float]:
+    """Names and frequencies in Hz of all that a Tacton repeats: f_AM, f_AM2, f_e, f_d of the foci
+    together (n f_d of n evenly spaced ones), f_r of the rhythm and f_s of a signal.
+    """
+    w1, w2 = tacton.superposition
+    signal = tacton.signal
+    found = {
+        "f_AM": tacton.am_frequency * (w1 > 0),
+        "f_AM2": tacton.second_am_frequency * (w2 > 0),
+        "f_e": tacton.envelope_frequency,
+        "f_d": _symmetry(tacton.foci) * tacton.trajectory.drawing_frequency,
+        "f_r": 1 / tacton.rhythm.period if tacton.rhythm else 0.0,
+        "f_s": signal.rate / len(signal.samples) if signal else 0.0,
+    }
+    return {name: f for name, f in found.items() if f > 0}
+
+
+def pattern_period(tacton: Tacton) -> float:
+    """Period in s of the whole pattern: the shortest time, at most the duration, after which both
+    AM sinusoids, the envelope, all foci, the rhythm and the signal repeat together.
+
+    Incommensurate frequencies (f_d = 190.986 Hz with f_AM = 140 Hz) have no such time. Returned is
+    then the shortest near-return: a time within the duration, no shorter than the slowest beat
+    between them (1 / (f_d - f_AM) here), after which every phase is back within 1 % of a turn
+    (here 11 periods of AM and 15 of the path, 78.5 ms) or, if there is none, the time when the
+    worst phase comes nearest. The duration is returned if nothing repeats within it, or nothing
+    varies.
+    """
+    found = repeated(tacton)
+    f = np.array(list(found.values()))
+    if not len(f) or f.min() * tacton.duration < 1 - COMMENSURATE:
+        return tacton.duration
+    turns = np.outer(np.arange(1, int(f.min() * tacton.duration + COMMENSURATE) + 1), f / f.min())
+    exact = (np.abs(turns - np.round(turns)) <= COMMENSURATE * turns).all(axis=1)
+    if exact.any():
+        return min(float((np.argmax(exact) + 1) / f.min()), tacton.duration)
+    return _near_return(f, _slowest_beat(found, tacton.duration), tacton.duration)
+
+
+def _symmetry(foci: tuple[float, ...]) -> int:
+    """The largest n for which foci a period's n-th part later are the same foci."""
+    phases = np.mod(foci, 1.0)
+
+    def same(n: int) -> bool:
+        away = (phases[:, None] + 1 / n - phases + 0.5) % 1 - 0.5
+        return bool((np.abs(away) < SAME).any(axis=1).all())
+
+    return next((n for n in range(len(foci), 1, -1) if same(n)), 1)
+
+
+def _slowest_beat(found: dict[str, float], duration: float) -> float:
+    """Period in s, at most the duration, of the slowest difference of low multiples that turns
+    within the duration at all.
+    """
+    orders = {name: PATH_ORDERS if name in ("f_d", "f_r", "f_s") else TONE_ORDERS for name in found}
+    multiples = [f * np.arange(1, orders[name] + 1) for name, f in found.items()]
+    beats = [np.abs(a[:, None] - b).ravel() for k, a in enumerate(multiples) for b in multiples[:k]]
+    each = np.concatenate([*multiples, *beats])
+    return min(float(1 / each[each * duration > RETURNED].min()), duration)
+
+
+def _near_return(f: Floats, shortest: float, longest: float) -> float:
+    """The time in s between two at which the phases of frequencies (k,) in Hz are back best."""
+    t = np.unique(np.concatenate([np.arange(1, int(longest * each) + 1) / each for each in f]))
+    counts = np.round(np.outer(t, f))
+    t = counts @ f / (f @ f)  # the errors shared out
+    error = np.abs(np.outer(t, f) - counts).max(axis=1)
+    possible = (t >= shortest * (1 - RETURNED)) & (t <= longest)
+    if not possible.any():
+        return longest
+    t, error = t[possible], error[possible]
+    returned = error <= RETURNED
+    return float(t[returned].min() if returned.any() else t[np.argmin(error)])

@@ -164,9 +164,13 @@ def write_lines(path: Path, runs: Iterable[Run]) -> None:
 
 
 def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
-    """Rows of lines.csv; the point kernel has a pressure where bodies have a displacement."""
-    for name, frequency in run.frequencies.items():
-        for (x, y), amplitude in zip(run.response.probes, run.lines[name], strict=True):
+    """Rows of lines.csv; the point kernel has a pressure where bodies have a displacement. Peaks
+    that are no single line of the load have their kind for a name, such as "free vibration".
+    """
+    found = [(name, f, run.table.amplitudes[name]) for name, f in run.listed.items()]
+    found += [(peak.kind, peak.frequency, peak.amplitudes) for peak in run.unnamed]
+    for name, frequency, amplitudes in found:
+        for (x, y), amplitude in zip(run.response.probes, amplitudes, strict=True):
             where = (run.tacton, run.body, run.model, _short(1e3 * x), _short(1e3 * y), name)
             if run.response.unit == "Pa":
                 yield (*where, _short(frequency), "", "", _short(amplitude))

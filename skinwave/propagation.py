@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import sensation_level
 from skinwave.comparison import compare
 from skinwave.pictures.views import path_points
-from skinwave.run import Run
+from skinwave.run import Run, is_skin
 from skinwave.scene import Scene
 from skinwave.surface import SurfaceMap
 
@@ -108,7 +108,7 @@ def propagation(
             "share": share_outside(kernel_surface.rms, surface.rms),
             "spread": reach_of(surface.rms >= _level(surface.rms, NEAR), away),
             "kernel_spread": reach_of(kernel_surface.rms >= _level(kernel_surface.rms, NEAR), away),
-            "felt": _felt(surface, away) if is_skin(run.scene) else (),
+            "felt": _felt(surface, away) if is_skin(run.scene.body) else (),
         }
     )
 
@@ -141,7 +141,7 @@ def strongest_component(run: Run) -> Component | None:
     amplitudes = np.array([run.lines[name] for name in names])
     if not amplitudes.any():
         return None
-    skin = run.response.unit == "m" and is_skin(run.scene)
+    skin = run.is_skin
     frequencies = np.array([run.frequencies[name] for name in names])
     heard = sensation_level(amplitudes, frequencies[:, None]) if skin else amplitudes
     line, probe = np.unravel_index(int(np.argmax(heard)), heard.shape)
@@ -161,11 +161,6 @@ def added_lines(kernel: Run, published: Run) -> list[str]:
     there, before = _levels(kernel), _levels(published)
     found = [n for n in there if there[n] > PRESENT and before.get(n, -np.inf) < ABSENT]
     return sorted(found, key=lambda name: -there[name])
-
-
-def is_skin(scene: Scene) -> bool:
-    """Whether a detection threshold says anything of the body."""
-    return scene.body.kind not in ("none", "sheet")
 
 
 def _levels(run: Run) -> dict[str, float]:

@@ -4,13 +4,27 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from meshes.tetmesh import Floats
-from simple_model import Response, lines, tacton_lines, told_apart
-from skinwave.scene import Scene
+from simple_model import LineTable, Response, Unnamed, line_table
+from simple_model.line_names import SAME, line_frequency
+from skinwave.scene import Body, Scene
+
+# Lines that are judged whether or not the load has them, of one focus.
+JUDGED = (
+    "f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM", "f_d", "2f_d", "3f_d",
+    "f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM",
+)  # fmt: skip
+
+
+def is_skin(body: Body) -> bool:
+    """Whether a body feels: a sheet is paper."""
+    return body.kind not in ("none", "sheet")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One Tacton on one body, answered by one model."""
+    """One Tacton on one body, answered by one model; the lines of its response are those of the
+    load of its scene.
+    """
 
     tacton: str
     body: str
@@ -28,29 +42,51 @@ class Run:
         return self.model if self.body == "none" else self.body
 
     @cached_property
+    def table(self) -> LineTable:
+        """All lines of the response, each once."""
+        candidates = JUDGED if len(self.scene.tacton.foci) == 1 else ()
+        return line_table(self.scene.pressure, self.response, candidates=candidates)
+
+    @property
+    def listed(self) -> dict[str, float]:
+        """Names and frequencies in Hz of the lines of the load, each once, but for `untold`."""
+        return self.table.frequencies
+
+    @property
+    def unnamed(self) -> tuple[Unnamed, ...]:
+        """What else the spectrum shows above -40 dB, such as a free vibration."""
+        return self.table.unnamed
+
+    @cached_property
     def frequencies(self) -> dict[str, float]:
-        """Names and frequencies in Hz of the Tacton's lines, but for those of `untold`."""
-        return {n: f for n, f in self.possible.items() if n not in self.untold}
-
-    @cached_property
-    def untold(self) -> tuple[str, ...]:
-        """Names of lines that the response is too short to tell from 0 Hz or from each other."""
-        told = told_apart(self.response, list(self.possible.values()))
-        return tuple(n for n, is_told in zip(self.possible, told, strict=True) if not is_told)
-
-    @cached_property
-    def possible(self) -> dict[str, float]:
-        """Names and frequencies in Hz of all lines below half the sampling rate."""
-        nyquist = 0.5 / self.response.times[1]
-        return {n: f for n, f in tacton_lines(self.scene.tacton).items() if f < nyquist}
+        """Frequencies in Hz by name, of lines that coincide by each name that is judged."""
+        return {name: self.listed[own] for name, own in self._own.items()}
 
     @cached_property
     def lines(self) -> dict[str, Floats]:
-        """Amplitudes (p,) of the Tacton's lines, in the unit of the response."""
-        # Those that cannot be told are fitted too, so that they do not leak into the others.
-        fitted = lines(self.response, list(self.possible.values()))
-        found = dict(zip(self.possible, fitted, strict=True))
-        return {name: found[name] for name in self.frequencies}
+        """Amplitudes (p,) by the names of `frequencies`, in the unit of the response."""
+        return {name: self.table.amplitudes[own] for name, own in self._own.items()}
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Names of lines that the response is too short to tell from 0 Hz or from each other."""
+        return tuple(self.table.unresolved)
+
+    @cached_property
+    def _own(self) -> dict[str, str]:
+        """The listed name of each name."""
+        tacton, same = self.scene.tacton, SAME / self.scene.tacton.duration
+        own = {name: name for name in self.listed}
+        for name in JUDGED:
+            f = line_frequency(tacton, name)
+            near = [] if f is None else [n for n, g in self.listed.items() if abs(f - g) <= same]
+            own |= {name: near[0]} if near else {}
+        return own
+
+    @property
+    def is_skin(self) -> bool:
+        """Whether it is skin that moves, of which alone thresholds of detection are known."""
+        return self.response.unit == "m" and is_skin(self.scene.body)
 
     @property
     def is_am(self) -> bool:

@@ -111,11 +111,15 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         style: dict[str, Any] = {"color": colour(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
         labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
+    for kind in dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+        style = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
+        handles.append(figure.axes[0].plot([], [], **style)[0])
+        labels.append(f"open: {kind}")
     figure.legend(
         handles,
         labels,
         loc="outside upper center" if figure.get_layout_engine() else "upper center",
-        ncols=len(runs),
+        ncols=len(labels),
         frameon=False,
     )
 
@@ -161,11 +165,15 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
         style: dict[str, Any] = {"color": colour(run.column), "zorder": _depth(run)}
         ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
-        lines = np.array([[run.frequencies[n], run.lines[n][p]] for n in run.frequencies])
-        lines = lines.reshape(-1, 2)  # a constant pressure has none
-        height = 20 * np.log10(np.maximum(lines[:, 1] / top, 1e-12))
-        seen = height > FLOOR
-        ax.plot(lines[seen, 0], height[seen], ls="", marker=marker(run.column), ms=4, **style)
+        lines = [(f, run.table.amplitudes[name][p]) for name, f in run.listed.items()]
+        peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
+        for found, mfc in ((lines, colour(run.column)), (peaks, "none")):
+            at, size = np.array(found).reshape(-1, 2).T  # a constant pressure has none
+            height = 20 * np.log10(np.maximum(size / top, 1e-12))
+            seen = height > FLOOR
+            ax.plot(
+                at[seen], height[seen], ls="", marker=marker(run.column), ms=4, mfc=mfc, **style
+            )
     ax.set_xlim(0, HIGHEST)
     ax.set_ylim(FLOOR, 14)
     ax.set_yticks(np.arange(FLOOR, 1, 20))

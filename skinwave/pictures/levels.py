@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -21,7 +22,7 @@ APART = 0.13  # of the frequency, within which two names would be drawn over eac
 
 def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     """Amplitudes of the lines at one probe, named, over the threshold of detection by frequency;
-    a panel for each run that moves a body.
+    a panel for each run that moves a body; without the threshold where that is no skin.
     """
     runs = [run for run in runs if run.response.unit == "m"]
     with mpl.rc_context(style.rc):
@@ -41,29 +42,33 @@ def strongest_probe(runs: Sequence[Run]) -> int:
 
 
 def felt_lines(run: Run, probe: int) -> dict[str, float]:
-    """Names of lines and their levels in dB above threshold at a probe, the highest first."""
+    """Names of lines and their levels in dB above threshold at a probe, the highest first; none
+    of what is no skin.
+    """
+    if not run.is_skin:
+        return {}
     levels = {
-        name: float(sensation_level(run.lines[name][probe], frequency))
-        for name, frequency in run.frequencies.items()
+        name: float(sensation_level(run.table.amplitudes[name][probe], frequency))
+        for name, frequency in run.listed.items()
     }
     return dict(sorted(levels.items(), key=lambda item: -item[1]))
 
 
 def _draw(ax: Axes, run: Run, probe: int) -> None:
-    f = np.geomspace(LOWEST, HIGHEST, 300)
-    curve = 1e6 * threshold(f)
-    ax.plot(f, curve, color="0.45", lw=1.5, label="threshold for a focal spot")
-    factor = 10 ** (BAND / 20)
-    ax.fill_between(f, curve / factor, curve * factor, color="0.5", alpha=0.25, lw=0,
-                    label=f"±{BAND:g} dB between people")  # fmt: skip
-    shown = {n: level for n, level in felt_lines(run, probe).items() if level > LOWEST_LEVEL}
-    frequencies = np.array([run.frequencies[n] for n in shown])
-    heights = np.array([1e6 * run.lines[n][probe] for n in shown])
+    if run.is_skin:
+        _draw_threshold(ax)
+    shown = _shown(run, probe)
+    style: dict[str, Any] = {"color": colour(run.column), "marker": marker(run.column)}
+    frequencies = np.array([run.listed[n] for n in shown])
+    heights = np.array([1e6 * run.table.amplitudes[n][probe] for n in shown])
     ax.vlines(frequencies, 1e-4, heights, color=colour(run.column), lw=1.2)
-    ax.plot(frequencies, heights, ls="none", marker=marker(run.column), color=colour(run.column))
+    ax.plot(frequencies, heights, ls="none", **style)
+    for kind in dict.fromkeys(peak.kind for peak in run.unnamed):
+        peaks = [(x.frequency, 1e6 * x.amplitudes[probe]) for x in run.unnamed if x.kind == kind]
+        ax.plot(*np.transpose(peaks), ls="none", mfc="none", label=kind, **style)
     for name in _named(run, shown):
         ax.annotate(
-            written(name), (run.frequencies[name], 1e6 * run.lines[name][probe]), rotation=90,
+            written(name), (run.listed[name], 1e6 * run.table.amplitudes[name][probe]), rotation=90,
             xytext=(0, 7), textcoords="offset points", ha="center", va="bottom", fontsize="small",
         )  # fmt: skip
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
@@ -71,14 +76,31 @@ def _draw(ax: Axes, run: Run, probe: int) -> None:
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
     ax.set_title(answered(run))
     ax.grid(alpha=0.25)
-    ax.legend(loc="upper left", fontsize="small", frameon=False)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="upper left", fontsize="small", frameon=False)
 
 
-def _named(run: Run, shown: dict[str, float]) -> list[str]:
+def _draw_threshold(ax: Axes) -> None:
+    f = np.geomspace(LOWEST, HIGHEST, 300)
+    curve = 1e6 * threshold(f)
+    ax.plot(f, curve, color="0.45", lw=1.5, label="threshold for a focal spot")
+    factor = 10 ** (BAND / 20)
+    ax.fill_between(f, curve / factor, curve * factor, color="0.5", alpha=0.25, lw=0,
+                    label=f"±{BAND:g} dB between people")  # fmt: skip
+
+
+def _shown(run: Run, probe: int) -> list[str]:
+    """Lines that are drawn, those that are felt most first, or else those that move most."""
+    if run.is_skin:
+        return [n for n, level in felt_lines(run, probe).items() if level > LOWEST_LEVEL]
+    return sorted(run.listed, key=lambda name: -run.table.amplitudes[name][probe])
+
+
+def _named(run: Run, shown: Sequence[str]) -> list[str]:
     """The highest lines whose names have room."""
     chosen: list[str] = []
     for name in shown:
-        near = (abs(np.log(run.frequencies[name] / run.frequencies[other])) for other in chosen)
+        near = (abs(np.log(run.listed[name] / run.listed[other])) for other in chosen)
         if len(chosen) < MOST_NAMED and all(distance > APART for distance in near):
             chosen.append(name)
     return chosen

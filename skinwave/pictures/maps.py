@@ -101,13 +101,14 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
             radii = " / ".join(f"{1e3 * spread_radius(view, d):.0f}" for d in DROPS)
             _title(ax, view, f"spread {radii} mm at -6 / -20 dB")
         figure.colorbar(image, ax=list(axes), label="RMS motion, dB re the model's largest")
-        felt = f"just felt (and ±{BAND:g} dB)"
-        _legend(figure, {
+        entries: dict[str, dict[str, Any]] = {
             "-6 dB": {"color": "0.55", "ls": "solid"},
             "-20 dB": {"color": "0.55", "ls": "dashed"},
             "path of the focus": {"color": style.ink, "ls": "dotted"},
-            felt: {"color": FELT, "ls": "solid"},
-        })  # fmt: skip
+        }
+        if any((view.sensation > 0).any() for view in views):
+            entries[f"just felt (and ±{BAND:g} dB)"] = {"color": FELT, "ls": "solid"}
+        _legend(figure, entries)
     return figure
 
 

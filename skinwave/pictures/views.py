@@ -14,19 +14,18 @@ from numpy.typing import NDArray
 
 import fem
 from meshes.tetmesh import Floats, Ints
-from simple_model import Effort, MovingPressure, Response, sensation_level
+from simple_model import Effort, Response, sensation_level
 from simple_model.steady import along_path, load_lines, path_knots, summed
-from simple_model.threshold import PRESSURE
 from skinwave.models.prepared import sample_times
 from skinwave.models.speeds import shown_period, strongest_tone, surface_speed
 from skinwave.pictures.motion import Waves, from_rest, line_amplitudes, vibration
+from skinwave.run import is_skin
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
 
 FRAMES = 40  # through a period
 GRID = 121  # points along a side of the point kernel's surface
 ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
-KERNEL_BATCH = 64  # times
 TYPICAL = 140.0  # Hz, where nothing vibrates
 ROOM = 5e-3  # m beside the path that waves can be watched in
 
@@ -58,8 +57,8 @@ class View:
     times : (f,) float, s, through one period `period` of the steady state
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
     rms, sensation : (s,) float, motion into the body about its mean in the unit, and the level in
-        dB of its strongest line above the threshold of detection; of the point kernel that of the
-        peak pressure above the pressure that is just felt
+        dB of its strongest line above the threshold of detection, of the point kernel above that
+        of a pressure; minus infinity where nothing vibrates, and on a sheet, which is no skin
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
     ray : outwards along x from the path's outermost point; track : along the path, None if the
         focus rests; both in the steady state, about the mean
@@ -113,7 +112,9 @@ def body_view(scene: Scene, body: str, moved: Waves, frames: int = FRAMES) -> Vi
     motion = vibration(moved, times) @ moved.basis.T
     read = fem.probe_operator(mesh, mesh.points[surface])
     frequencies, amplitudes = line_amplitudes(moved, read)
-    levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
+    levels = np.full(len(surface), -np.inf)
+    if is_skin(scene.body):
+        levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
     tone = strongest_tone(frequencies, amplitudes)
 
     def trace(places: Floats, t: Floats) -> Floats:
@@ -146,14 +147,13 @@ def kernel_view(scene: Scene, reach: Floats, frames: int = FRAMES) -> View:
     amplitudes = np.abs(patterns[~still])
     motion = np.zeros((frames, len(points), 3), np.float32)
     motion[:, :, 2] = mean - pressure(points, times)
-
-    with np.errstate(divide="ignore"):
-        sensation = 20 * np.log10(_highest(pressure, points, scene.tacton.duration) / PRESSURE)
+    levels = sensation_level(amplitudes, frequencies[~still][:, None], unit="Pa")
     return View(
         body="none", model="point-kernel", unit="Pa", scene=scene, points=points,
         tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
         period=period, times=times, motion=motion,
-        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2), sensation=sensation,
+        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
+        sensation=levels.max(axis=0, initial=-np.inf),
         tone=strongest_tone(frequencies[~still], amplitudes),
         speed=None, ray=_ray(scene, reach, pressure), track=_track(scene, pressure),
     )  # fmt: skip
@@ -254,16 +254,6 @@ def _grid(reach: Floats) -> tuple[Floats, Ints]:
     b = a + GRID
     triangles = np.vstack([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
     return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
-
-
-def _highest(pressure: MovingPressure, points: Floats, duration: float) -> Floats:
-    """The highest pressure (n,) in Pa at points, in a part of the Tacton that has all of it."""
-    times = np.linspace(0, min(duration, 0.1), 32 * KERNEL_BATCH)
-    highest = np.zeros(len(points))
-    for start in range(0, len(times), KERNEL_BATCH):
-        part = pressure(points, times[start : start + KERNEL_BATCH])
-        np.maximum(highest, np.abs(part).max(axis=0), out=highest)
-    return highest
 
 
 def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:

@@ -130,40 +130,56 @@ def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
     said = "".join(map(document.paragraph, untold(runs)))
-    known = [name for name in runs[0].lines if all(name in run.lines for run in runs)]
-    if not known:
+    known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
+    if not known and not any(run.unnamed for run in runs):
         return said or document.paragraph("A constant pressure on a focus at rest has no line.")
     share = {name: max(_share(run, name, probe) for run in runs) for name in known}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
-    felt = [felt_lines(run, probe) if run.response.unit == "m" else {} for run in runs]
+    felt = [felt_lines(run, probe) for run in runs]
     rows = [
-        [name, f"{runs[0].frequencies[name]:.2f}"]
+        [name, f"{runs[0].listed[name]:.2f}"]
         + [cell for run, levels in zip(runs, felt, strict=True)
            for cell in _amplitude(run, name, probe, levels)]
         for name in names
     ]  # fmt: skip
+    rows += _unnamed_rows(runs, probe)
     header = ["line", "frequency, Hz"]
     for run in runs:
-        pascal = run.response.unit == "Pa"
-        header += [f"{answered(run)}, {'Pa' if pascal else 'µm'} peak"]
-        header += [] if pascal else ["dB re threshold"]
+        header += [f"{answered(run)}, {'Pa' if run.response.unit == 'Pa' else 'µm'} peak"]
+        header += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
     return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows) + said
 
 
 def _share(run: Run, name: str, probe: int) -> float:
     """A line's amplitude over that of the strongest."""
-    strongest = max(float(x[probe]) for x in run.lines.values())
-    return float(run.lines[name][probe]) / strongest if strongest else 0.0
+    strongest = max(float(x[probe]) for x in run.table.amplitudes.values())
+    return float(run.table.amplitudes[name][probe]) / strongest if strongest else 0.0
 
 
 def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
-    """A line's amplitude and, of a body, its level above threshold; 0 if it is round-off."""
+    """A line's amplitude and, of skin, its level above threshold; 0 if it is round-off."""
     if _share(run, name, probe) < ROUND_OFF:
-        return ["0"] if run.response.unit == "Pa" else ["0", ""]
-    if run.response.unit == "Pa":
-        return [f"{run.lines[name][probe]:.3g}"]
-    return [f"{1e6 * run.lines[name][probe]:.3g}", _level(levels.get(name))]
+        return ["0", ""] if run.is_skin else ["0"]
+    size = _size(run, float(run.table.amplitudes[name][probe]))
+    return [size, _level(levels.get(name))] if run.is_skin else [size]
+
+
+def _unnamed_rows(runs: Sequence[Run], probe: int) -> list[list[str]]:
+    """A row for each peak that is no single line of the load, in the column of its run."""
+    rows = []
+    for run in runs:
+        for peak in run.unnamed[:TABLED]:
+            row = [peak.kind, f"{peak.frequency:.2f}"]
+            for other in runs:
+                size = _size(run, float(peak.amplitudes[probe])) if other is run else ""
+                row += [size, ""] if other.is_skin else [size]
+            rows.append(row)
+    return rows
+
+
+def _size(run: Run, amplitude: float) -> str:
+    return f"{amplitude if run.response.unit == 'Pa' else 1e6 * amplitude:.3g}"
 
 
 def _level(level: float | None) -> str:

@@ -16,11 +16,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, tacton_lines
+from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
 from skinwave import document
 from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
+from skinwave.run import JUDGED
 from skinwave.scene import BODIES, PROBES, Body, Scene
 from skinwave.simulation import simulate
 from skinwave.studies.paper15 import MEASURED_ON, tactons
@@ -95,12 +96,13 @@ def paper_vs_skin(
         for mechanism, (drive, ask) in _mechanisms(body, h, progress, body_name).items():
             for k, (name, tacton) in enumerate(patterns):
                 progress(f"{body_name}: {mechanism}", k / (len(patterns) + len(AMPLITUDES)))
+                scene = _scene(name, tacton, body, drive)
                 try:
-                    response = ask(_scene(name, tacton, body, drive))
+                    response = ask(scene)
                 except ArithmeticError as error:
                     failed.append(f"{name} on {body_name}, {mechanism}: {error}")
                     continue
-                found += _lines(name, body_name, mechanism, tacton, response)
+                found += _lines(name, body_name, mechanism, scene.pressure, response)
             for amplitude in AMPLITUDES:
                 quiet = replace(still, amplitude=amplitude)
                 response = ask(_scene("amplitude", quiet, body, drive))
@@ -145,10 +147,12 @@ def steady(response: Response) -> Response:
 
 
 def _lines(
-    tacton: str, body: str, mechanism: str, pattern: Tacton, response: Response
+    tacton: str, body: str, mechanism: str, pressure: MovingPressure, response: Response
 ) -> list[Line]:
-    names = {n: f for n, f in tacton_lines(pattern, 3).items() if f < 700}
-    amplitudes = lines(steady(response), list(names.values())).max(axis=1)
+    # A stretching sheet makes lines that no load has: those that are judged are looked for.
+    later = steady(response)
+    names, _ = resolved_lines(pressure, later, candidates=JUDGED, highest=700.0)
+    amplitudes = lines(later, list(names.values())).max(axis=1)
     return [
         Line(tacton=tacton, body=body, mechanism=mechanism, line=name, frequency=f,
              amplitude=float(a))

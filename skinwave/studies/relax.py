@@ -9,16 +9,17 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
-from simple_model import Response, lines, tacton_lines, told_apart
+from simple_model import Response, lines, resolved_lines
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
+from skinwave.run import JUDGED
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
 from skinwave.studies.assumptions import (
@@ -195,21 +196,27 @@ def effect(
     )
 
 
+def followed_lines(scene: Scene, response: Response) -> dict[str, float]:
+    """Names and frequencies in Hz of the lines that are followed, as far as a response resolves
+    them: those of a drive that is not linear, which has all that a linear one has.
+    """
+    drive = scene.pressure.drive if scene.pressure.drive != "linear" else "pressure_squared"
+    pressure = replace(scene.pressure, drive=drive)
+    return resolved_lines(pressure, response, candidates=JUDGED, highest=HIGHEST)[0]
+
+
 def line_changes(
     scene: Scene, before: Response, after: Response, scale: float = 1.0
 ) -> dict[str, float]:
     """By how many dB each line that counts grows, at the probe where it is strongest."""
-    names = {name: f for name, f in tacton_lines(scene.tacton, 3).items() if f < HIGHEST}
+    names = followed_lines(scene, after)
     if not names:
         return {}
     old, new = (lines(r, list(names.values())) for r in (before, after))
     old = abs(scale) * old
     least = FAINTEST * max(old.max(), new.max())
     changes = {}
-    told = told_apart(after, list(names.values()))
     for k, name in enumerate(names):
-        if not told[k]:
-            continue
         probe = int(np.argmax(np.maximum(old[k], new[k])))
         if max(old[k, probe], new[k, probe]) > least:
             floor = 1e-3 * least

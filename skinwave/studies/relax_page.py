@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model import tacton_lines, told_apart
 from skinwave import document
 from skinwave.comparison import compare
 from skinwave.pictures.figures import png
 from skinwave.studies.assumptions import ASSUMPTIONS
-from skinwave.studies.relax import HIGHEST, Effect, Ladder, Rung
+from skinwave.studies.relax import Effect, Ladder, Rung, followed_lines
 
 
 def sentence(e: Effect) -> str:
@@ -115,13 +114,14 @@ def _record(rung: Rung) -> dict[str, object]:
 
 def _write_lines(path: Path, found: Ladder) -> None:
     """Every line's change at each probe, from the rung before and from the richest."""
-    names = {n: f for n, f in tacton_lines(found.scene.tacton, 3).items() if f < HIGHEST}
     answered = [r for r in found.rungs if r.response]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz",
                          "from_rung_before_db", "from_richest_db"])  # fmt: skip
         for before, rung in found.pairs():
+            assert rung.response
+            names = followed_lines(found.scene, rung.response)
             ratios = [_ratios(rung, other, names) for other in (before, answered[-1])]
             for k, (name, f) in enumerate(names.items()):
                 for p, (x, y) in enumerate(found.scene.probes):
@@ -136,5 +136,4 @@ def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:
     found = compare(other.response, rung.response, tuple(names.values()))
     with np.errstate(divide="ignore", invalid="ignore"):
         decibel = 20 * np.log10(found.line_ratios)
-    decibel[~told_apart(rung.response, list(names.values()))] = np.nan
-    return decibel
+    return np.asarray(decibel)

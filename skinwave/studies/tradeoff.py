@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model import Response, lines, tacton_lines, told_apart
+from simple_model import Response, lines, resolved_lines
 from skinwave import document
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
@@ -270,13 +270,12 @@ def _measure(
     warm: float,
     memory: int,
 ) -> Measured:
-    names = {n: f for n, f in tacton_lines(scene.tacton, 3).items() if f < 600}
+    names, _ = resolved_lines(scene.pressure, reference, highest=600.0)
     found = compare(reference, response)
     truth = lines(reference, list(names.values())) if names else np.zeros((0, 1))
     given = abs(found.scale) * lines(response, list(names.values())) if names else truth
     strongest = truth.argmax(axis=1)
     matters = truth.max(axis=1) > 0.01 * truth.max(initial=0.0)
-    matters &= told_apart(reference, list(names.values()))
     decibel = {
         name: float(20 * np.log10(max(given[k, p], 1e-300) / truth[k, p]))
         for k, (name, p) in enumerate(zip(names, strongest, strict=True))

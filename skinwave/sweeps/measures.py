@@ -1,19 +1,19 @@
 """One row of a sweep: what was commanded, what came out of it, and what that cost."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
-from simple_model import Response, lines, point_kernel, sensation_level, tacton_lines
+from simple_model import Response, named_lines, point_kernel, sensation_level
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import Run
+from skinwave.run import JUDGED, Run, is_skin
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import Case
 
+WEAKEST, MOST = 1e-2, 40  # of the strongest line of a load, and lines, that have columns
 SETTLE = 0.25  # of a response, before which it is not looked at
 TEXTS = (
     "key", "status", "error", "model", "asked_model", "version", "name", "scene",
@@ -39,7 +39,7 @@ def columns(cases: Iterable[Case]) -> dict[str, str]:
     for case in cases:
         for key, value in case.keys.items():
             found.setdefault(key, "text" if isinstance(value, str) else "number")
-        for name in tacton_lines(case.scene.tacton) if case.scene else ():
+        for name in _columned(case.scene) if case.scene else ():
             of_lines[f"{name}_hz"] = "number"
             of_lines |= {f"{name}_{unit}": "numbers" for unit in ("um", "db", "kernel_pa", "ratio")}
     return (
@@ -48,6 +48,11 @@ def columns(cases: Iterable[Case]) -> dict[str, str]:
         | dict.fromkeys(AT_PROBES, "numbers")
         | dict(sorted(of_lines.items()))
     )
+
+
+def _columned(scene: Scene) -> Iterable[str]:
+    """Lines that have columns: the strongest of the load, and those that are judged."""
+    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=JUDGED)
 
 
 def commanded(case: Case) -> dict[str, Any]:
@@ -72,22 +77,20 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     if response.unit == "m":
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
     run = Run(tacton=scene.name, body=scene.body.kind, scene=scene, response=response)
-    frequencies = run.frequencies
+    frequencies, found = run.frequencies, run.lines
     agreement = compare(kernel, response)
     row: dict[str, Any] = {"status": "done", "model": response.model}
-    # Both at once: the fit of the lines costs more than what it is applied to.
-    both = replace(response, displacement=np.hstack([kernel.displacement, response.displacement]))
-    published, found = np.split(lines(both, list(run.possible.values())), 2, axis=1)
-    told = [name in frequencies for name in run.possible]
-    published, found = published[told], found[told]
-    for k, (name, frequency) in enumerate(frequencies.items()):
+    published = found if kernel is response else replace(run, response=kernel).lines
+    for name, frequency in frequencies.items():
         row[f"{name}_hz"] = frequency
-        row[f"{name}_kernel_pa"] = published[k]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            row[f"{name}_ratio"] = abs(agreement.scale) * found[k] / published[k]
+        if name in published:
+            row[f"{name}_kernel_pa"] = published[name]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                row[f"{name}_ratio"] = abs(agreement.scale) * found[name] / published[name]
     row |= _kernel(kernel, agreement) | _effort(response)
     if response.unit == "m":
-        row |= _motion(response, agreement) | _felt(frequencies, found, every=not run.untold)
+        row |= _motion(response, agreement) | {f"{n}_um": 1e6 * a for n, a in found.items()}
+        row |= _felt(run) if is_skin(scene.body) else {}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 
@@ -113,14 +116,11 @@ def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _felt(frequencies: Mapping[str, float], amplitudes: Floats, *, every: bool) -> dict[str, Any]:
-    """Lines in micrometre and above threshold and, if these are all, the one that is felt most."""
-    row: dict[str, Any] = {}
-    levels = {n: sensation_level(a, f) for (n, f), a in zip(frequencies.items(), amplitudes,
-                                                            strict=True)}  # fmt: skip
-    for (name, level), amplitude in zip(levels.items(), amplitudes, strict=True):
-        row[f"{name}_um"], row[f"{name}_db"] = 1e6 * amplitude, level
-    if levels and every:
+def _felt(run: Run) -> dict[str, Any]:
+    """Lines above threshold and, if these are all, the one that is felt most."""
+    levels = {n: sensation_level(a, run.frequencies[n]) for n, a in run.lines.items()}
+    row: dict[str, Any] = {f"{name}_db": level for name, level in levels.items()}
+    if levels and not run.untold:
         row["level_db"] = np.max(list(levels.values()), axis=0)
         row["felt_line"] = max(levels, key=lambda name: levels[name].max())
     return row

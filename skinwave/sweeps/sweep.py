@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Response, tacton_lines
+from simple_model import Response, named_lines
 from skinwave.effort import Progress, silent
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import is_flat
@@ -190,8 +190,8 @@ def _shared_meshes(
 
 
 def _highest(scene: Scene) -> float:
-    """The highest line in Hz that a Tacton makes."""
-    return max(tacton_lines(scene.tacton).values(), default=0.0)
+    """The highest line in Hz of a load that is above -40 dB of its strongest."""
+    return max(named_lines(scene.pressure, 1e-2).values(), default=0.0)
 
 
 def _mesh(knobs: Knobs, scene: Scene) -> Mesh:

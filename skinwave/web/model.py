@@ -15,28 +15,28 @@ from simple_model import (
     Trajectory,
     commanded,
     evenly,
-    lines,
+    line_table,
     modulation,
+    resolved_lines,
     sensation_level,
     spectrum,
-    tacton_lines,
-    told_apart,
 )
-from simple_model.focus import lobe_width, moved_spot
+from simple_model.focus import lobe_width
 from simple_model.joined import parted
+from simple_model.line_names import level_factor
 from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import CARRIER, level
-from simple_model.threshold import PRESSURE
+from skinwave.run import JUDGED, is_skin
 from skinwave.scene import Scene
 from skinwave.simulation import simulate
 from skinwave.web.moving import Moving
 from skinwave.web.paths import REACH
 
 SIDE = 41  # places along a side of a map
-FELT_SIDE = 81  # of the borderline of what is felt of a pressure
 FINE_SIDE = 101  # of the borderline's grid
-GAIN_RATE = 4000.0  # Hz at which the pressure at the foci is looked at
-PHASES = 120  # of a path
+LEVELS = 4096  # instants of a rhythm
+FAINTEST_LEVEL = -200.0  # dB
+MOST_LINES, MOST_PEAKS = 40, 3
 MOST_SHOWN = 1500  # points of a curve
 MOST_ENVELOPE = 600  # of the commanded Tacton without its carrier
 HIGHEST = 1000.0  # Hz of spectra
@@ -98,47 +98,29 @@ def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | Non
 
 
 def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
-    """The lines of a Tacton in its answer, the strongest first; one name for each frequency."""
-    possible, untold = possible_lines(scene, response), untold_lines(scene, response)
-    known: dict[str, float] = {}
-    for name, f in possible.items():
-        told = f > 0 and name not in untold
-        if told and all(abs(f - other) > 1 / response.times[-1] for other in known.values()):
-            known[name] = f
-    if not known:
-        return ()
-    bins, rough = spectrum(response)  # to fit what is there: a fit of all takes ten times as long
-    near = np.array([rough[np.abs(bins - each) < 2.5 * bins[1]].max(initial=0.0) for each in
-                     known.values()])  # fmt: skip
-    known = {name: known[name] for name, a in zip(known, near, strict=True)
-             if a > 0.5 * FAINTEST * near.max(initial=0.0)}  # fmt: skip
-    if not known:
-        return ()
-    amplitudes = lines(response, list(known.values()))[:, 0]
-    felt = response.unit == "m"
+    """The lines of a load in a response, the strongest first; and by their kind peaks that are no
+    single one of them, such as a free vibration.
+    """
+    table = line_table(scene.pressure, response, candidates=JUDGED, most=MOST_LINES,
+                       highest=HIGHEST, settle=UNTRUSTED)  # fmt: skip
+    felt = response.unit == "m" and is_skin(scene.body)
+    peaks = table.unnamed[:MOST_PEAKS]
+    amplitudes = [(n, f, float(table.amplitudes[n][0])) for n, f in table.frequencies.items()]
+    amplitudes += [(f"{x.kind}, {x.frequency:.0f} Hz", x.frequency, float(x.amplitudes[0]))
+                   for x in peaks]  # fmt: skip
     found = [
-        Line(
-            name=name, frequency=f, amplitude=float(a),
-            sensation=float(sensation_level(a, f)) if felt else None,
-        )
-        for (name, f), a in zip(known.items(), amplitudes, strict=True)
+        Line(name=name, frequency=f, amplitude=a,
+             sensation=float(sensation_level(a, f)) if felt else None)
+        for name, f, a in amplitudes
     ]  # fmt: skip
     found.sort(key=lambda line: -line.amplitude)
     return tuple(x for x in found if x.amplitude > FAINTEST * max(found[0].amplitude, 1e-300))
 
 
-def possible_lines(scene: Scene, response: Response) -> dict[str, float]:
-    """Names and frequencies in Hz of what is looked for, the shortest names first."""
-    highest = min(HIGHEST, 0.99 * 0.5 / (response.times[1] - response.times[0]))
-    found = {n: f for n, f in tacton_lines(scene.tacton).items() if f <= highest}
-    return dict(sorted(found.items(), key=lambda item: len(item[0])))
-
-
 def untold_lines(scene: Scene, response: Response) -> tuple[str, ...]:
     """Names of lines that the response is too short to tell from 0 Hz or from each other."""
-    possible = possible_lines(scene, response)
-    told = told_apart(response, list(possible.values()), settle=UNTRUSTED)
-    return tuple(name for name, is_told in zip(possible, told, strict=True) if not is_told)
+    return tuple(resolved_lines(scene.pressure, response, candidates=JUDGED, highest=HIGHEST,
+                                settle=UNTRUSTED)[1])  # fmt: skip
 
 
 def places(side: int = SIDE) -> Floats:
@@ -149,22 +131,30 @@ def places(side: int = SIDE) -> Floats:
 
 
 def kernel_map(pressure: MovingPressure) -> Map:
-    """Where the pressure changes, by its lines, and where it can rise above what is just felt: at
-    its largest at the foci, with these wherever on their path. Of a rhythm, while a pulse is on.
-
-    The root of a spot is all but straight where it ends, as lines between places want it.
+    """Where the pressure changes, of a rhythm while a pulse is on; and where the strongest line of
+    it, of a rhythm with its pauses, is at the threshold of skin.
     """
     tacton = replace(pressure.tacton, rhythm=None)
-    path, duration = tacton.trajectory, tacton.duration
+    path = tacton.trajectory
     found = load_lines(replace(pressure, tacton=tacton), 1e-3)
     # Of paths of their own only every n-th harmonic is left, of which `harmonics_of` knows.
     n, at_all = tacton.n_paths, at_any_speed(path)
     found = replace(found, harmonics=found.harmonics // n)
     f, amplitudes = found.gather(harmonics_of(at_all, n, pressure.height, pressure.focus))
-    rms = np.sqrt((np.abs(amplitudes[f > 1e-6]) ** 2).sum(axis=0) / 2).reshape(SIDE, SIDE)
-    gain = np.abs(pressure.gain(np.linspace(0, duration, round(duration * GAIN_RATE) + 2))).max()
-    swept = nearest_foci(at_all, n, tacton.foci, pressure.height, pressure.focus)
-    return Map(rms=rms, felt=borderline(np.sqrt(gain * swept), PRESSURE**0.5))
+    f, amplitudes = f[f > 1e-6], np.abs(amplitudes[f > 1e-6])
+    rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
+    level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
+    felt = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
+    return Map(rms=rms, felt=borderline(np.maximum(felt, FAINTEST_LEVEL), 0.0))
+
+
+def mean_level(pressure: MovingPressure) -> float:
+    """What the pauses of a rhythm leave of lines, over those while a pulse is on; 1 without."""
+    rhythm = pressure.tacton.rhythm
+    if rhythm is None:
+        return 1.0
+    level = rhythm.level((np.arange(LEVELS) + 0.5) / LEVELS * rhythm.period)
+    return float(level_factor(pressure, level).mean())
 
 
 def at_any_speed(path: Trajectory) -> Trajectory:
@@ -196,17 +186,6 @@ def harmonics_of(
     spots = pressure.spot(places(), path_knots(pressure))
     mean = spots.reshape(n_paths, -1, SIDE**2).mean(axis=0)
     return along_path(mean.T).T
-
-
-@lru_cache(maxsize=32)
-def nearest_foci(
-    path: Trajectory, n_paths: int, foci: tuple[float, ...], height: float, focus: str
-) -> Floats:
-    """The largest relative pressure (y, x) of all foci together, wherever on their path."""
-    phases = np.zeros(1) if path.is_static else np.arange(PHASES) / PHASES / n_paths
-    at = places(FELT_SIDE)
-    spots = sum(moved_spot(at, path.at_phase((phases + a) % 1), height, focus) for a in foci)
-    return np.asarray(spots).max(axis=0).reshape(FELT_SIDE, FELT_SIDE)
 
 
 def borderline(values: Floats, at: float) -> tuple[Floats, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import Tacton, threshold
 from simple_model.response import step
-from simple_model.threshold import BAND, HIGHEST, LOWEST, PRESSURE
+from simple_model.threshold import BAND, HIGHEST, LOWEST, pressure_threshold
 from skinwave.web.drawings import written
 from skinwave.web.model import Answer, commanded_curve, thinned
 
@@ -88,7 +88,7 @@ def spectrum_plot(
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
-    data.append(_just_felt(highest) if waves is None else _threshold_curve(highest))
+    data.append(_pressure_curve(highest) if waves is None else _threshold_curve(highest))
     named = waves if waves is not None and not stale else kernel
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
@@ -125,10 +125,11 @@ def _threshold_curve(highest: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _just_felt(highest: float) -> dict[str, Any]:
+def _pressure_curve(highest: float) -> dict[str, Any]:
+    f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
     return {
-        "role": "felt", "name": "just felt with AM at 200 Hz", "dash": "dash", "axis": "y",
-        "x": [0.0, float(highest)], "y": [PRESSURE, PRESSURE],
+        "role": "felt", "name": "threshold on skin, from AM at 200 Hz", "dash": "dash", "axis": "y",
+        "x": numbers(f), "y": numbers(pressure_threshold(f)),
     }  # fmt: skip
 
 

@@ -36,8 +36,19 @@ from skinwave.effort import Progress
 from skinwave.models.bodies import air, build, compliance, has_exact_waves, operators, surface_load
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
+from skinwave.run import is_skin
 from skinwave.scene import Body, Scene
-from skinwave.web.model import SIDE, Answer, Map, answer_of, at_any_speed, borderline, places
+from skinwave.web.model import (
+    FAINTEST_LEVEL,
+    SIDE,
+    Answer,
+    Map,
+    answer_of,
+    at_any_speed,
+    borderline,
+    mean_level,
+    places,
+)
 from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
@@ -149,7 +160,7 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
         upwards = np.zeros((len(f), len(shape.points)), np.complex128)
         upwards[:, : SIDE**2] = -motion
         seen = moving_of(shape, pressure, f, upwards)
-    return answer_of(scene, response, motion_map(f, motion), seen)
+    return answer_of(scene, response, motion_map(scene, f, motion), seen)
 
 
 def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Floats) -> Floats:
@@ -191,11 +202,15 @@ def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
     return f[strongest], w[strongest]
 
 
-def motion_map(frequencies: Floats, motion: fem.Complex) -> Map:
-    """The map of lines (f,) in Hz whose complex amplitudes (f, SIDE^2) in metre are known."""
+def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> Map:
+    """The map of lines (f,) in Hz whose complex amplitudes (f, SIDE^2) in metre are known, of a
+    rhythm while a pulse is on; and where the strongest line, of a rhythm with its pauses as in the
+    table of lines, is at the threshold, which a sheet has not.
+    """
     amplitudes = np.abs(motion)
-    felt = sensation_level(amplitudes, frequencies[:, None]) if len(frequencies) else -np.inf
-    level = np.broadcast_to(np.max(felt, axis=0, initial=-200.0), SIDE**2)
+    felt = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
+    shown = felt if is_skin(scene.body) else felt[:0]
+    level = shown.max(axis=0, initial=FAINTEST_LEVEL)
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = np.where(np.isnan(rms), np.nan, level.reshape(SIDE, SIDE))
     return Map(rms=rms, felt=borderline(level, 0.0))
@@ -277,4 +292,4 @@ def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
     if moving:
         upwards = motion[heard] @ body.rows[:, 2].T
         seen = moving_of(body.shape, scene.pressure, frequencies[heard], upwards)
-    return answer_of(scene, response, motion_map(frequencies[heard], area), seen)
+    return answer_of(scene, response, motion_map(scene, frequencies[heard], area), seen)

@@ -1,0 +1,256 @@
+"""Names of the lines of a load, derived from its own spectrum.
+
+Every line of a load lies at |n f_d + p f_AM + q f_AM2 + r f_e + u f_s + v f_r|, whole multiples of
+the path's drawing frequency, of the three sinusoids, and of one over the periods of a signal and a
+rhythm. The drive laws are polynomials of second degree of the modulation and a factor of the level,
+so that p, q and r are at most 2, and the strength of each line follows from products of Fourier
+coefficients.
+
+Names are the sums themselves, such as "2f_AM", "f_d+f_AM-f_e", without the bars. In one with f_d
+this comes first and positive: "2f_d-f_AM" is |2 f_d - f_AM|. In others the positive terms come
+first and the whole is positive: "f_AM2-f_AM". Lines that coincide have the name of the least sum of
+orders, sinusoids before the path: "f_AM" where f_AM = 2 f_d.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simple_model.drive import DRIVES
+from simple_model.pressure import MovingPressure
+from simple_model.steady import foci_harmonics, gain_orders, path_strengths
+from simple_model.tacton import Tacton, tones
+from simple_model.trajectory import Floats
+
+Orders = NDArray[np.int_]
+
+SYMBOLS = ("f_d", "f_AM", "f_AM2", "f_e", "f_s", "f_r")
+WEAKEST = 1e-3  # of the strongest line: -60 dB
+MOST = 200  # lines
+SAME = 1e-3  # over the duration: lines as near to each other in Hz coincide
+TWICE = 1.5  # periods: what is repeated less often makes no line of its own
+PULSED = 2**14  # samples of a period of a rhythm or signal
+MOST_HARMONICS = 400  # of a path that are combined with the others
+MOST_PRODUCTS = 4000  # orders of the gain that are combined with the path's
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LineNames:
+    """Names (f,), frequencies (f,) in Hz > 0, ascending, no two the same, and largest amplitudes on
+    the path (f,) in Pa, 0 of candidates that are not in the load.
+    """
+
+    names: tuple[str, ...]
+    frequencies: Floats
+    strengths: Floats
+
+
+def named_lines(
+    pressure: MovingPressure,
+    threshold: float = WEAKEST,
+    *,
+    most: int = MOST,
+    candidates: Iterable[str] = (),
+) -> dict[str, float]:
+    """Names and frequencies in Hz of the lines of a load: see `line_names`."""
+    found = line_names(pressure, threshold, most=most, candidates=candidates)
+    return dict(zip(found.names, found.frequencies.tolist(), strict=True))
+
+
+def line_names(
+    pressure: MovingPressure,
+    threshold: float = WEAKEST,
+    *,
+    most: int = MOST,
+    candidates: Iterable[str] = (),
+) -> LineNames:
+    """The lines above a fraction of the strongest on the path, the mean left out.
+
+    Parameters
+    ----------
+    most : the strongest of them that are kept
+    candidates : names of lines that are listed whether or not they are in the load, as far as the
+        Tacton has their tones and they do not coincide with one that is
+
+    A path that is recorded and run through once has no f_d, and a rhythm or signal that is not
+    repeated no f_r or f_s: their lines have no names.
+    """
+    return _line_names(pressure, threshold, most, tuple(candidates))
+
+
+@lru_cache(maxsize=128)  # several models answer each load
+def _line_names(
+    pressure: MovingPressure, threshold: float, most: int, candidates: tuple[str, ...]
+) -> LineNames:
+    orders, strengths = _load_orders(pressure, threshold)
+    of_tacton = symbols(pressure.tacton)
+    asked = [_orders(name) for name in candidates]
+    asked = [each for each in asked if not (each[of_tacton == 0]).any()]
+    both = np.vstack([orders, np.array(asked, int).reshape(-1, len(SYMBOLS))])
+    strengths = np.concatenate([strengths, np.zeros(len(asked))])
+    return _distinct(both, of_tacton, strengths, SAME / pressure.tacton.duration, threshold, most)
+
+
+def line_frequency(tacton: Tacton, name: str) -> float | None:
+    """Frequency in Hz of a line by its name; None if the Tacton has not all of its tones."""
+    orders, of_tacton = _orders(name), symbols(tacton)
+    return None if orders[of_tacton == 0].any() else abs(float(orders @ of_tacton))
+
+
+def symbols(tacton: Tacton) -> Floats:
+    """Frequencies (6,) in Hz of `SYMBOLS`, 0 of those that a Tacton does not repeat."""
+    w1, w2 = tacton.superposition
+    f_1, f_2, f_e = tones(tacton)
+    signal, rhythm = tacton.signal, tacton.rhythm
+    f_d = tacton.drawing_frequency
+    once = tacton.trajectory.shape == "recorded" and f_d * tacton.duration < TWICE
+    slow = (
+        signal.rate / len(signal.samples) if signal else 0.0,
+        1 / rhythm.period if rhythm else 0.0,
+    )
+    repeated = [f if f * tacton.duration >= TWICE else 0.0 for f in slow]
+    return np.array([0.0 if once else f_d, f_1 * (w1 > 0), f_2 * (w2 > 0), f_e, *repeated])
+
+
+def line_name(orders: Sequence[int], of_tacton: Floats) -> str:
+    """The name of the line of orders (6,) of `SYMBOLS`, whose frequencies (6,) are in Hz."""
+    terms = [(int(k), symbol) for k, symbol in zip(orders, SYMBOLS, strict=True) if k]
+    positive = orders[0] > 0 or (orders[0] == 0 and np.dot(orders, of_tacton) > 0)
+    terms = terms if positive else [(-k, symbol) for k, symbol in terms]
+    if not orders[0]:
+        terms.sort(key=lambda term: term[0] < 0)
+    said = "".join(f"{'-' if k < 0 else '+'}{abs(k) if abs(k) > 1 else ''}{s}" for k, s in terms)
+    return said.removeprefix("+")
+
+
+def _orders(name: str) -> Orders:
+    """Orders (6,) of `SYMBOLS` that a name says.
+
+    Raises
+    ------
+    ValueError
+        If the name is no sum of them.
+    """
+    found = np.zeros(len(SYMBOLS), int)
+    terms = re.findall(r"([+-]?)(\d*)(f_[A-Za-z0-9]+)", name)
+    if "".join(map("".join, terms)) != name or any(term[2] not in SYMBOLS for term in terms):
+        raise ValueError(f"{name!r} is no line; add multiples of {', '.join(SYMBOLS)}")
+    for sign, times, symbol in terms:
+        found[SYMBOLS.index(symbol)] += int(sign + (times or "1"))
+    return found
+
+
+def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
+    """Orders (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
+    tacton = pressure.tacton
+    n, share = path_strengths(pressure, 1e-3 * threshold)
+    share = share * np.abs(foci_harmonics(pressure, n))
+    gain, c = _gain_products(pressure, 1e-3 * threshold)
+    of_tacton = symbols(tacton)
+    if of_tacton[0]:
+        whole = n % tacton.n_paths == 0  # of paths of their own nothing else is left
+        n, share = n[whole] // tacton.n_paths, share[whole]
+    else:
+        n, share = n[n == 0], share[n == 0]
+    strongest = np.argsort(-share, kind="stable")[:MOST_HARMONICS]
+    n, share = n[strongest], share[strongest]
+    orders = np.column_stack([np.repeat(n, len(gain)), np.tile(gain, (len(n), 1))])
+    strengths = 2 * (share[:, None] * c).ravel()
+    f = orders @ of_tacton
+    kept = (f > SAME / tacton.duration) & (strengths > 0)
+    kept &= strengths > 1e-2 * threshold * strengths[kept].max(initial=0.0)
+    return orders[kept], strengths[kept]
+
+
+def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
+    """Orders (m, 5) of f_AM, f_AM2, f_e, f_s and f_r in the gain, and amplitudes (m,) in Pa."""
+    tacton, of_tacton = pressure.tacton, symbols(pressure.tacton)
+    of_signal, powers = np.ones((1, 1), np.complex128), np.ones(1, np.complex128)
+    coefficients = None
+    signal = tacton.signal
+    if signal is not None and of_tacton[4]:
+        samples = max(PULSED, 2 * len(signal.samples))
+        values = signal.at((np.arange(samples) + 0.5) / samples * len(signal.samples) / signal.rate)
+        if signal.role == "envelope":
+            of_signal = _fourier(level_factor(pressure, values))[None]
+        else:  # the drive laws are polynomials of second degree of it
+            orders, (low, none, high) = _at_factors(pressure, (-1.0, 0.0, 1.0))
+            coefficients = np.stack([none, (high - low) / 2, (high + low) / 2 - none])
+            of_signal = np.stack([_fourier(values**j) for j in range(3)])
+    if coefficients is None:
+        orders, coefficients = _at_factors(pressure, (1.0,))
+    if tacton.rhythm is not None and of_tacton[5]:
+        level = tacton.rhythm.level((np.arange(PULSED) + 0.5) / PULSED * tacton.rhythm.period)
+        powers = _fourier(level_factor(pressure, level))
+    c = np.abs(np.einsum("jm,ju->mu", coefficients, of_signal))
+    (m, u), c = _strongest(c, threshold)
+    (k, v), c = _strongest(c[:, None] * np.abs(powers), threshold)
+    return np.column_stack([orders[m[k]], _ranks(u[k], of_signal), _ranks(v, powers[None])]), c
+
+
+def _at_factors(pressure: MovingPressure, factors: Sequence[float]) -> tuple[Orders, NDArray]:
+    """Orders (m, 3) and coefficients (k, m) of the gain at factors (k,) of the modulation."""
+    plain = replace(pressure, tacton=replace(pressure.tacton, rhythm=None, signal=None))
+    found = [gain_orders(plain, factor) for factor in factors]
+    return found[0][0], np.stack([c for _, c in found])
+
+
+def level_factor(pressure: MovingPressure, level: Floats) -> Floats:
+    """What a level (k,) of the amplitude multiplies the pressure by."""
+    one = np.ones(1)
+    full = DRIVES[pressure.drive](1.0, one, pressure.depth_of_modulation)
+    return np.asarray(DRIVES[pressure.drive](level, one, pressure.depth_of_modulation) / full)
+
+
+def _fourier(values: Floats) -> NDArray[np.complex128]:
+    return np.asarray(np.fft.fft(values) / len(values))
+
+
+def _ranks(k: Orders, transform: NDArray) -> Orders:
+    """Orders of either sign of places in a transform (j, n)."""
+    n = transform.shape[1]
+    return np.where(k > n // 2, k - n, k)
+
+
+def _strongest(c: Floats, threshold: float) -> tuple[tuple[Orders, Orders], Floats]:
+    """Places of, and values (k,) of a table above a fraction of its largest, not too many."""
+    least = threshold * c.max(initial=0.0)
+    if c.size > MOST_PRODUCTS:
+        least = max(least, np.partition(c.ravel(), -MOST_PRODUCTS)[-MOST_PRODUCTS])
+    rows, columns = np.nonzero((c >= least) & (c > 0))
+    return (rows, columns), c[rows, columns]
+
+
+def _distinct(
+    orders: Orders, of_tacton: Floats, strengths: Floats, same: float, threshold: float, most: int
+) -> LineNames:
+    """One line for all that coincide within `same` Hz, by its simplest name."""
+    f = np.abs(orders @ of_tacton)
+    order = np.argsort(f, kind="stable")
+    order = order[f[order] > same]
+    f, orders, strengths = f[order], orders[order], strengths[order]
+    first = np.flatnonzero(np.diff(f, prepend=-np.inf) > same)
+    group = np.cumsum(np.diff(f, prepend=-np.inf) > same) - 1
+    # Sinusoids before the path, where sums of orders are the same.
+    effort = np.abs(orders).sum(axis=1) + 0.1 * (orders[:, 0] != 0) + 0.01 * np.count_nonzero(
+        orders, axis=1)  # fmt: skip
+    simplest = np.lexsort((-strengths, effort, group))[first]
+    power = np.bincount(group, strengths**2).astype(np.float64)
+    wanted = np.bincount(group, strengths == 0) > 0
+    kept = wanted | _strong(power, threshold, most)
+    names = tuple(line_name(orders[k].tolist(), of_tacton) for k in simplest[kept])
+    return LineNames(
+        names=names, frequencies=f[simplest[kept]], strengths=np.sqrt(power[kept])
+    )  # fmt: skip
+
+
+def _strong(power: Floats, threshold: float, most: int) -> NDArray[np.bool_]:
+    """The strongest, at most so many, above a fraction of the strongest's amplitude."""
+    kept = np.zeros(len(power), bool)
+    order = np.argsort(-power, kind="stable")[:most]
+    kept[order] = power[order] > threshold**2 * power.max(initial=0.0)
+    return kept
