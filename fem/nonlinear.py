@@ -28,6 +28,7 @@ from meshes.tetmesh import Floats
 MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step
 SLOW = 0.3  # of a correction, beyond which the next one calls for another tangent
+ROUND_OFF = 1e-5  # of the load: a residual below it is judged by the correction that it calls for
 STANDSTILL = 1e-6  # of the displacement: a step below it is as good as none
 
 
@@ -49,7 +50,8 @@ def static(
     ----------
     force : (3 n,) in N; or displacement (3 n,) -> such forces, for those that follow the body
     start : (3 n,) in metre, where to look first; at rest without load if not given
-    tolerance : residual relative to the force
+    tolerance : residual relative to the force; or, of a residual below `ROUND_OFF`, the
+        correction that it calls for, relative to the displacement
 
     Raises
     ------
@@ -102,6 +104,10 @@ def _newton(
             step = factorise(body.tangent(u), backend=solver).solve(r)
         except ValueError:  # no longer positive definite: too far from the solution
             break
+        # What thin bodies are left with is round-off of forces that cancel: it moves nothing.
+        size = float(np.linalg.norm(u))
+        if left <= ROUND_OFF and float(np.linalg.norm(step)) <= tolerance * size:
+            return u + step
         u = u + _line_search(unbalanced, u, step) * step
     raise _Stuck(left)
 

@@ -20,6 +20,7 @@ below it for any loss; and below those of waves that run backwards, which lie ab
 
 import time
 from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +31,7 @@ from simple_model.compliance import Complex, Compliance
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, step
+from simple_model.sampling import finer, highest, highest_passing, shown, transform
 from simple_model.steady import (
     along_path,
     foci_harmonics,
@@ -124,7 +126,8 @@ def steady_lines(
 def steady_state(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Motion of probes (p, 2) in metre at times (t,) in s, as if the load had always been there.
+    """Motion of probes (p, 2) in metre at equally spaced times (t,) in s, as if the load had
+    always been there: all its lines below half the sampling rate.
 
     That is `flat_body` without what its start leaves ringing, for a twentieth of the time.
 
@@ -137,6 +140,8 @@ def steady_state(
     probes = np.atleast_2d(np.array(probes, np.float64))
     f, a = steady_lines(compliance, pressure, probes)
     times = np.array(times)
+    below = shown(pressure, f, times)
+    f, a = f[below], a[below]
     effort = {"steps": len(f), "dofs": len(f)}
     return _timed("flat-body-harmonic", started, times, probes, played(f, a, times), **effort)
 
@@ -147,8 +152,8 @@ def flat_body(
     """Motion of probes (p, 2) in metre from rest, at equally spaced times (t,) in s.
 
     By FFT over twice the duration with exponential damping, which takes what wraps round to
-    1e-5. The rest position is that before the load: a pressure that never stops pushes an
-    endless sheet ever further.
+    1e-5. What is above half the sampling rate is left out. The rest position is that before the
+    load: a pressure that never stops pushes an infinite sheet ever further.
 
     Raises
     ------
@@ -163,10 +168,9 @@ def flat_body(
     damping = -np.log(WRAPPED) / (padded * dt)
     t = np.asarray(np.arange(padded) * dt, np.float64)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
-    gain = pressure.gain(t, over=dt) * (np.arange(padded) < n) * np.exp(-damping * t)
-    gain[0] /= 2  # the trapezoidal rule's end point: the load begins in the middle of a sample
+    window = (np.arange(padded) < n) * np.exp(-damping * t)
     answered = _recorded if pressure.tacton.trajectory.shape == "recorded" else _circling
-    u = answered(compliance, pressure, probes, w, gain, t)
+    u = answered(compliance, pressure, probes, w, window, dt)
     displacement = np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None])
     effort = {"steps": n, "dofs": len(w)}
     return _timed("flat-body", started, np.array(times), probes, displacement, **effort)
@@ -191,8 +195,8 @@ def _circling(
     pressure: MovingPressure,
     probes: Floats,
     w: Complex,
-    gain: Floats,
-    t: Floats,
+    window: Floats,
+    dt: float,
 ) -> Complex:
     """Transform (f, p) of the probes' motion under foci that run a closed path."""
     f_d = pressure.tacton.trajectory.drawing_frequency
@@ -201,11 +205,30 @@ def _circling(
     orders = harmonics(h.shape[2])
     h[:, :, orders] *= foci_harmonics(pressure, orders)
     largest = np.abs(h).max()
+    gain = cache(partial(_gain, pressure, window, dt))
     for m in orders:
         if np.abs(h[:, :, m]).max() > 1e-7 * largest:
-            driven = np.fft.fft(gain * np.exp(2j * np.pi * m * f_d * t))[: len(w)]
-            u += h[:, :, m] * driven[:, None]
+            parts = finer(highest(pressure, abs(m) * f_d), dt)
+
+            def turned(late: float, m: int = m, parts: int = parts) -> Complex:
+                t, gained = gain(late, parts)
+                return gained * np.exp(2j * np.pi * m * f_d * t)
+
+            u += h[:, :, m] * transform(turned, w, dt, parts)[:, None]
     return u
+
+
+def _gain(
+    pressure: MovingPressure, window: Floats, dt: float, late: float, parts: int
+) -> tuple[Floats, Floats]:
+    """Times (t,) in s from `late` on, and the windowed pressure (t,) in Pa at the focus, averaged
+    over the `parts` part of dt.
+    """
+    t = np.asarray(late + np.arange(len(window)) * dt, np.float64)
+    gain = pressure.gain(t, over=dt / parts) * window
+    if late == 0:
+        gain[0] /= 2  # the trapezoidal rule's end point: the load begins in the middle of a sample
+    return t, gain
 
 
 def _recorded(
@@ -213,22 +236,26 @@ def _recorded(
     pressure: MovingPressure,
     probes: Floats,
     w: Complex,
-    gain: Floats,
-    t: Floats,
+    window: Floats,
+    dt: float,
 ) -> Complex:
     """Transform (f, p) of the probes' motion under foci that run any path."""
-    path = pressure.tacton.trajectory
-    phases = [np.mod(path.phase(t) + ahead, 1.0) for ahead in pressure.tacton.foci]
-    away = np.stack([np.linalg.norm(probes[:, None] - path.at_phase(a), axis=2) for a in phases])
-    table = _table(away.max(), spot_width(pressure.height))
-    g = point_response(compliance, table, w, spot_width(pressure.height), negligible=NEGLIGIBLE)
+    path, width = pressure.tacton.trajectory, spot_width(pressure.height)
+    furthest = np.linalg.norm(probes[:, None] - path.outline, axis=2).max()
+    table = _table(furthest, width)
+    g = point_response(compliance, table, w, width, negligible=NEGLIGIBLE)
     carriers = _spline(table, np.eye(len(table)))
-    gains = [gain * pressure.weight(phase) for phase in phases]
-    u = np.empty((len(w), len(probes)), np.complex128)
-    for p in range(len(probes)):
-        load = sum(q[:, None] * carriers(r[p]) for q, r in zip(gains, away, strict=True))
-        u[:, p] = (g * np.fft.rfft(load, axis=0)).sum(axis=1)
-    return u
+    parts = finer(highest(pressure, highest_passing(pressure)), dt)
+
+    def load(late: float, probe: Floats) -> Floats:
+        t, gain = _gain(pressure, window, dt, late, parts)
+        phases = [np.mod(path.phase(t) + ahead, 1.0) for ahead in pressure.tacton.foci]
+        away = [np.linalg.norm(probe - path.at_phase(phase), axis=1) for phase in phases]
+        gains = [gain * pressure.weight(phase) for phase in phases]
+        return sum(q[:, None] * carriers(r) for q, r in zip(gains, away, strict=True))
+
+    loads = [transform(partial(load, probe=probe), w, dt, parts) for probe in probes]
+    return np.stack([(g * each).sum(axis=1) for each in loads], axis=1)
 
 
 def _table(furthest: float, width: float) -> Floats:

@@ -8,12 +8,14 @@ lobes ("main_lobe"); under any other load it is the same model.
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response
+from simple_model.sampling import fold_parts, low_passed
 from simple_model.trajectory import Floats
 
 
@@ -31,7 +33,11 @@ def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: F
 
 
 def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation in Pa at probes (p, 2) in metre and times (t,) in s, under the load as given.
+    """Stimulation in Pa at probes (p, 2) in metre and equally spaced times (t,) in s, under the
+    load as given.
+
+    Where the focus is so fast, or modulated so fast, that samples would show its lines elsewhere,
+    those above half the sampling rate are left out.
 
     Raises
     ------
@@ -42,7 +48,7 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     if probes.ndim != 2 or probes.shape[1] != 2:
         raise ValueError(f"probes have shape {probes.shape}; give (p, 2) positions in metre")
     started = time.perf_counter()
-    stimulation = pressure(probes, times)
+    stimulation = low_passed(partial(pressure, probes), times, fold_parts(pressure, times))
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model="point-kernel",

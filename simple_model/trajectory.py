@@ -104,6 +104,12 @@ class Trajectory:
         return self.drawing_frequency == 0
 
     @property
+    def is_eased(self) -> bool:
+        """Whether the speed goes as a sine, and is pi/2 times the mean at its greatest."""
+        open_ended = self.shape == "line" or (self.shape == "polyline" and not self._runs_on)
+        return self.sweep == "sinusoidal" and open_ended
+
+    @property
     def outline(self) -> Floats:
         """Positions (k, 2) in metre that the path stays within the convex hull of."""
         if self.shape in BY_POINTS:

@@ -5,6 +5,8 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import fem
 import meshes
@@ -121,6 +123,53 @@ def test_states_before_a_failure_are_kept(sheet):
     with pytest.raises(fem.Diverged, match=r"step 3 of dt = 0.0001 s.*residual.*shorten dt"):
         next(states)
     assert [s.time for s in kept] == pytest.approx([0, 1e-4, 2e-4])
+
+
+def elastica(load):
+    """Deflection and shortening over length of a clamped rod: angle'' = -load cos(angle)."""
+
+    def shot(curvature):
+        return solve_ivp(
+            lambda s, y: [y[1], -load * np.cos(y[0]), np.sin(y[0]), np.cos(y[0])],
+            (0, 1), [0, curvature, 0, 0], rtol=1e-10, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+
+    _, _, down, along = shot(brentq(lambda k: shot(k)[1], 0, load))
+    return down, 1 - along
+
+
+def thin_strip(cells):
+    """A strip of 1 : 100, and nodal forces of 1 N, shared by its free end, that point down."""
+    mesh = meshes.extrude(np.linspace(0, 1, cells + 1), [0, 0.05], [-0.01, 0])
+    material = fem.from_young(density=1, young=1e9, poisson=0.0)
+    end = np.isin(np.arange(len(mesh.points)), mesh.facets["right"][:, 3:])
+    share = np.zeros_like(mesh.points)
+    share[end, 2] = [-1 / end.sum()] * end.sum()
+    return fem.finite_strain(mesh, material, fixed={"left": "xyz"}), share, 1e9 * 0.05 * 1e-6 / 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("load", [2.0, 5.0, 10.0])
+def test_a_thin_strip_bends_as_the_elastica(load):
+    body, share, stiffness = thin_strip(40)
+    u = nonlinear.static(body, load * stiffness * share.ravel()).reshape(-1, 3)
+    tip = u[share[:, 2] != 0].mean(axis=0)
+    np.testing.assert_allclose((-tip[2], -tip[0]), elastica(load), rtol=1e-3)
+
+
+def test_round_off_of_a_thin_strip_is_no_lack_of_convergence():
+    body, share, stiffness = thin_strip(40)
+    u = nonlinear.static(body, 0.02 * stiffness * share.ravel()).reshape(-1, 3)
+    tip = u[share[:, 2] != 0].mean(axis=0)
+    assert -tip[2] == pytest.approx(elastica(0.02)[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("iterations", [1, 3])
+def test_a_body_that_has_not_come_to_rest_is_refused(iterations, monkeypatch):
+    monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", iterations)
+    body, share, stiffness = thin_strip(4)
+    with pytest.raises(fem.Diverged, match="found no rest at 1.56 % of its load: a residual"):
+        nonlinear.static(body, 100 * stiffness * share.ravel())
 
 
 def test_what_it_does_not_answer_is_refused():

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
+from simple_model.sampling import resolving_step, shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import Build, operators, surface_load, vacuum_only
@@ -73,7 +74,7 @@ def transient_answer(
 ) -> Response:
     """The full time stepping in steps of dt, read between steps by a cubic spline."""
     vacuum_only(scene.body, "fem-transient")
-    dt = dt or 1 / TRANSIENT_RATE
+    dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
@@ -184,7 +185,8 @@ def harmonic_answer(
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
     energy = energy_balance(total)
-    displacement = played(frequencies, amplitudes, times)
+    below = shown(scene.pressure, frequencies, times)
+    displacement = played(frequencies[below], amplitudes[below], times)
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
     return _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)

@@ -9,6 +9,7 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
+from simple_model.sampling import shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.models.bodies import Build, air, surface_load
@@ -178,6 +179,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         # The mean is not what others are weighed by: it is boundless where nothing holds a body.
         strength, mean = np.abs(lines).max(axis=1), frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
+        heard &= shown(scene.pressure, frequencies, times)
         rates = np.concatenate([2j * np.pi * frequencies[heard], prepared.poles.values])
         displacement = fem.exponential_sum(rates, np.vstack([lines[heard], start]), times)
     effort = replace(

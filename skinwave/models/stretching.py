@@ -20,6 +20,7 @@ from fem import nonlinear
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
+from simple_model.sampling import resolving_step
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import Build, air, build, surface_load, vacuum_only
@@ -126,7 +127,7 @@ def full_answer(
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
     S = fem.probe_operator(made.mesh, scene.probe_points)
-    dt = dt or 1 / TRANSIENT_RATE
+    dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     return _about_rest(
         "fem-nonlinear-transient", scene, times, report, clock,
         body=body,
@@ -176,7 +177,7 @@ def reduced_answer(
         mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
         read=lambda z: read @ z,
-        dt=dt or 1 / TRANSIENT_RATE, solver=solver,
+        dt=dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE), solver=solver,
         effort=Effort(
             dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
         ),

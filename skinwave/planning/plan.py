@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.focus import spot_width
+from simple_model.sampling import resolving_step
 from skinwave.effort import Progress
 from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
@@ -111,7 +112,7 @@ def plan(
     axes = symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
-    step = dt or 1 / TRANSIENT_RATE
+    step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     step_error, start_error = _march_errors(scene, model, step)
     return Plan(
         model=model or "fem", body=body, symmetry=axes, h=found.h, highest=highest,

@@ -1,0 +1,121 @@
+"""How finely a load must be sampled, so that nothing of it folds back to low frequencies.
+
+Samples dt apart show a line at f > 1/(2 dt) at |f - k/dt| instead. A Gaussian spot of standard
+deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2), and so a focus that
+moves further than about s/2 in a sample leaves lines above half the sampling rate.
+"""
+
+from collections.abc import Callable
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import firwin, upfirdn
+
+from simple_model.focus import spot_width
+from simple_model.pressure import MovingPressure
+from simple_model.response import step
+from simple_model.tacton import Tacton, tones
+from simple_model.trajectory import Floats
+
+PASSED = 5.7 / (2 * np.pi)  # f s / v, at which the spectrum of a spot that passes is 1e-7
+PER_PERIOD = 8  # samples of the highest frequency, so that its start is right, too
+BRIEF = 0.01  # of a recording's time, for which it may move faster: a jump has no highest line
+REACH = 128  # samples on either side that a low pass weighs: it ends within 2 % of half the rate
+STOP_BAND = ("kaiser", 10.0)  # 100 dB down
+
+Complex = NDArray[np.complex128]
+
+
+def highest(pressure: MovingPressure, passing: float) -> float:
+    """Hz of the highest line of a load whose focus, by moving, makes lines up to `passing` Hz.
+
+    Pulses have no highest line; they are averaged over a sample. A signal has half its own rate.
+    """
+    tacton = pressure.tacton
+    first, second, envelope = tones(tacton)
+    weights = np.array(tacton.superposition) > 0
+    tone = max(first * weights[0], second * weights[1]) + envelope
+    tone *= 2 if pressure.drive == "pressure_squared" else 1
+    return max(passing + tone, tacton.signal.rate / 2 if tacton.signal else 0.0)
+
+
+def highest_passing(pressure: MovingPressure) -> float:
+    """Hz of the highest line, above 1e-7 of all, that the moving focus makes at a place."""
+    return PASSED * _speed(pressure.tacton) / spot_width(pressure.height)
+
+
+def finer(highest: float, dt: float) -> int:
+    """How many times within dt in s a load up to `highest` Hz is sampled: once if none folds."""
+    return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
+
+
+def shown(pressure: MovingPressure, frequencies: Floats, times: Floats) -> NDArray[np.bool_]:
+    """Which lines (f,) in Hz of a load's answer are sampled at equally spaced times (t,) in s.
+
+    Those below half the rate; but all of a load none of which folds. What edges and corners then
+    leave above half the rate is next to nothing, and right at each sample.
+    """
+    below = frequencies < 0.5 / step(times)
+    return np.asarray(below | (fold_parts(pressure, times) == 1))
+
+
+def fold_parts(pressure: MovingPressure, times: Floats) -> int:
+    """How many times as finely as at times (t,) in s a load is sampled so that nothing folds.
+
+    Once at fewer times than a low pass weighs: they show the load at an instant, and no line.
+    """
+    if len(times) <= 2 * REACH:
+        return 1
+    return finer(highest(pressure, highest_passing(pressure)), step(times))
+
+
+def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
+    """A load (t, ...) at equally spaced times (t,) in s, without what would fold back.
+
+    Sampled `parts` times as finely, before and after those times too, and filtered by a windowed
+    sinc; as it is if `parts` is 1.
+    """
+    if parts == 1:
+        return load(times)
+    dt = step(times)
+    taps = firwin(2 * REACH * parts + 1, 1 / parts, window=STOP_BAND)
+    around = np.arange(-REACH * parts, (len(times) - 1 + REACH) * parts + 1)
+    filtered = upfirdn(taps, load(times[0] + around * (dt / parts)), down=parts, axis=0)
+    return np.asarray(filtered[2 * REACH :][: len(times)])
+
+
+def resolving_step(pressure: MovingPressure, longest: float) -> float:
+    """A time step in s, at most `longest`, at which nothing of a load folds."""
+    reached = highest(pressure, highest_passing(pressure))
+    return longest if reached < 0.5 / longest else 0.5 / reached
+
+
+def transform(
+    load: Callable[[float], Floats | Complex], w: Complex, dt: float, parts: int
+) -> Complex:
+    """Transform (f, ...) of what is sampled `parts` times within each dt in s, where `load` gives
+    every parts-th sample, from a time in 0..dt on; at frequencies w (f,) of its FFT, in rad/s.
+    """
+    found = 0.0
+    for late in np.arange(parts) * dt / parts:
+        x = load(late)
+        transformed = np.fft.fft if np.iscomplexobj(x) else np.fft.rfft
+        turned = np.exp(-1j * w * late).reshape(-1, *(1,) * (x.ndim - 1)) / parts
+        found = found + turned * transformed(x, axis=0)[: len(w)]
+    return np.asarray(found)
+
+
+def _speed(tacton: Tacton) -> float:
+    """The greatest speed of a focus in m/s; of a recording but for `BRIEF` moves."""
+    path = tacton.trajectory
+    if path.shape != "recorded":
+        return path.drawing_frequency * path.length * (np.pi / 2 if path.is_eased else 1.0)
+    steps = np.diff(path.times)
+    moves = steps > 0
+    lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
+    speeds, lasting = lengths[moves] / steps[moves], steps[moves]
+    order = np.argsort(speeds)
+    passed = np.cumsum(lasting[order])
+    at = np.searchsorted(passed, (1 - BRIEF) * passed[-1])
+    return float(speeds[order[min(at, len(order) - 1)]])
