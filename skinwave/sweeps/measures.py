@@ -76,7 +76,11 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     agreement = compare(kernel, response)
     row: dict[str, Any] = {"status": "done", "model": response.model}
     # Both at once: the fit of the lines costs more than what it is applied to.
-    both = replace(response, displacement=np.hstack([kernel.displacement, response.displacement]))
+    both = replace(
+        response,
+        probes=np.vstack([kernel.probes, response.probes]),
+        displacement=np.hstack([kernel.displacement, response.displacement]),
+    )
     published, found = np.split(lines(both, list(run.possible.values())), 2, axis=1)
     told = [name in frequencies for name in run.possible]
     published, found = published[told], found[told]
