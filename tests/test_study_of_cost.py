@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import fem
 from fem import PRESETS
 from meshes import cache
 from simple_model import Trajectory
@@ -363,6 +364,60 @@ def test_a_spoilt_cache_entry_is_rebuilt(tmp_path, monkeypatch):
         entry.write_bytes(spoilt)
         again = answer(prepare(scene.body, scene.probe_points, h=0.008), scene)
         np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda arrays: arrays.update(read=1000 * arrays["read"]),
+        lambda arrays: arrays["load"].fill(np.nan),
+        lambda arrays: arrays.update(damping=arrays["damping"][:-1]),
+        lambda arrays: arrays.update(values=arrays["values"].real),
+        lambda arrays: arrays.pop("read"),
+        lambda arrays: arrays.update(meta=np.array('{"meta": {}, "arrays": ["read"]}')),
+    ],
+)
+def test_an_altered_cache_entry_is_never_used(spoil, tmp_path, monkeypatch):
+    """A sound file, but not what was stored."""
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+    first = answer(prepare(scene.body, scene.probe_points, h=0.01), scene)
+    (entry,) = tmp_path.glob("*.npz")
+    with np.load(entry) as file:
+        arrays = {name: file[name] for name in file.files}
+    spoil(arrays)
+    np.savez(entry, **arrays)
+    again = answer(prepare(scene.body, scene.probe_points, h=0.01), scene)
+    assert "factorise and reduce" in again.effort.seconds
+    np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
+
+
+def test_an_entry_of_another_body_is_never_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    cache.store("one", {}, x=np.arange(3.0))
+    (tmp_path / "one.npz").rename(tmp_path / "two.npz")
+    assert cache.load("two") is None
+    cache.store("two", {}, x=np.arange(3.0))
+    np.testing.assert_array_equal(cache.load("two")["x"], np.arange(3.0))
+
+
+def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+
+    def made(**options):
+        before = len(list(tmp_path.glob("*.npz")))
+        prepare(scene.body, scene.probe_points, h=0.01, **options)
+        return len(list(tmp_path.glob("*.npz"))) > before
+
+    assert made()
+    assert not made(solver=fem.available()[0])  # what auto is
+    assert made(solver="superlu") == (fem.available()[0] != "superlu")
+    assert made(tolerance=5e-3)
+    assert made(symmetry="x")
+    assert not made()
+    x = np.arange(6.0)
+    assert len({cache.key(a) for a in (x, x.reshape(2, 3), x.view(np.int64))}) == 3
 
 
 def test_no_cache_is_no_error(monkeypatch, tmp_path):
