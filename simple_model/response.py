@@ -41,6 +41,9 @@ class Effort:
     versions: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warnings", tuple(self.warnings))  # files have lists
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:

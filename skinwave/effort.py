@@ -17,6 +17,10 @@ SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
 Progress = Callable[[str, float], None]  # phase and fraction of it done
 
 
+class SkinwaveWarning(UserWarning):
+    """One sentence on what is less than was asked for."""
+
+
 class Clock:
     """Wall seconds by phase: `with clock("mesh"): ...`."""
 

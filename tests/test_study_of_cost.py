@@ -20,6 +20,7 @@ from skinwave.planning.plan import plan
 from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import Body, Layer
+from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes, tactons
 from skinwave.studies.tradeoff import Candidate, sentences, study, write
 
@@ -77,7 +78,7 @@ def test_a_long_steady_pattern_needs_no_start():
             scene.tacton, trajectory=path)))  # fmt: skip
         required = plan(asked, 0.25)
         assert required.model == "flat-body-harmonic"
-        whole, steady = (simulate(asked, model) for model in ("flat-body", required.model))
+        whole, steady = (compute(asked, model) for model in ("flat-body", required.model))
         left = compare(whole, steady).relative_l2.max()
         assert 0.01 < left < required.error < 1.2 * left
         late = whole.times > 0.4
@@ -123,7 +124,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
 """.replace(",\n", ",")
     )
     returned, _ = returned_and_start(scene)
-    found = compare(simulate(scene, "fem", h=h), simulate(scene, "flat-body")).relative_l2
+    found = compare(compute(scene, "fem", h=h), compute(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
 
@@ -159,7 +160,7 @@ def test_what_is_expected_of_a_mesh_is_near_its_true_error(h):
     """Also where it has as many layers as the next coarser one, or twice as many."""
     scene = loads(SHORT)
     found = refined(scene, scene.body, 0.05, h=h)
-    true = compare(answer(found.prepared, scene), simulate(scene, "flat-body")).relative_l2.max()
+    true = compare(answer(found.prepared, scene), compute(scene, "flat-body")).relative_l2.max()
     assert 0.4 < found.error / true < 2.5
 
 
@@ -167,7 +168,7 @@ def test_a_body_that_nothing_holds_is_warned_of():
     text = SHORT.replace("width_mm = 60", 'width_mm = 30\nbase = "absorbing"')
     scene = loads(text)
     assert any("nothing holds" in said for said in plan(scene, 0.3, h=0.01).warnings)
-    steady = simulate(scene, "fem-harmonic", h=0.01).displacement
+    steady = compute(scene, "fem-harmonic", h=0.01).displacement
     assert np.abs(steady).max() < 1e-4  # and no mean, which would have no bound
 
 
@@ -335,7 +336,7 @@ def test_the_planned_sheet_is_within_the_tolerance():
     """Off resonance, against a mesh of twice the cells a side in each direction."""
     scene = scenes("am80", dict(tactons())["am80"])["paper-sheet"]
     found = simulate(scene, "auto", 0.05)
-    finer = simulate(scene, "fem", h=0.1 / 76)
+    finer = compute(scene, "fem", h=0.1 / 76)
     misfit = np.linalg.norm(found.displacement - finer.displacement, axis=0)
     assert (misfit / np.linalg.norm(finer.displacement, axis=0)).max() < 0.05
 
