@@ -20,7 +20,7 @@ from skinwave.models.bodies import default_size
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import plan
 from skinwave.scene import Body, Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 
 FINEST = 0.7  # of the default element size
 RUNGS = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
@@ -70,7 +70,7 @@ def error(candidate: Response, reference: Response) -> float:
 
 def timed(scene: Scene, model: str, **knobs: float) -> tuple[Response, float]:
     started = time.perf_counter()
-    return simulate(scene, model, **knobs), time.perf_counter() - started
+    return compute(scene, model, **knobs), time.perf_counter() - started
 
 
 def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, float]:
@@ -84,7 +84,7 @@ def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, floa
     if chosen.prepared:
         found, prepared = answer(chosen.prepared, scene), chosen.seconds
     else:
-        found, prepared = simulate(replace(scene, body=chosen.body), chosen.model, h=chosen.h), 0.0
+        found, prepared = compute(replace(scene, body=chosen.body), chosen.model, h=chosen.h), 0.0
     seconds = time.perf_counter() - started + prepared
     return chosen.model, found, seconds, planning - prepared
 
@@ -98,7 +98,7 @@ def judge(seed: int) -> tuple[bool, bool, bool]:
     far = asked
     if body.sides == "absorbing":
         far = replace(asked, body=replace(body, width=2 * body.width, height=2 * body.height))
-    reference = simulate(far, "fem", h=FINEST * h)
+    reference = compute(far, "fem", h=FINEST * h)
     model, planned, seconds, planning = followed(asked, tolerance)
     wrong = error(planned, reference)
     good = []

@@ -15,6 +15,8 @@ LINE_BETA, LINE_BINS = LINE_WINDOW[1], 2.5  # it keeps lines apart that are so m
 SETTLE = 0.25  # of a response, before which no line is fitted
 ALIKE = 1e-3  # of what can be told apart: lines as close as that are one, and its amplitude is
 MINOR = 0.05  # of a line: what others that it is not resolved from may have together
+UNITS = ("m", "Pa")
+UNEVEN = 1e-6  # of a sampling interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +42,9 @@ class Effort:
     versions: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warnings", tuple(self.warnings))  # files have lists
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
@@ -55,6 +60,15 @@ class Response:
         stimulation it predicts instead, in Pa, and `unit` says so.
     unit : "m" or "Pa"
     effort : Effort
+    expected_error : float, relative to the waveforms, as estimated beforehand; nan if unknown
+
+    The arrays are copied, and the copies cannot be written to.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a number is not finite, times are not equally spaced, or the unit is
+        neither of the two.
     """
 
     model: str
@@ -63,10 +77,46 @@ class Response:
     displacement: Floats
     unit: str = "m"
     effort: Effort = field(default_factory=Effort)
+    expected_error: float = np.nan
 
     def __post_init__(self) -> None:
-        for array in (self.times, self.probes, self.displacement):
+        for name in ("times", "probes", "displacement"):
+            array = np.array(getattr(self, name), np.float64)
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name} of a response must be finite; leave out nan and inf")
             array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if self.unit not in UNITS:
+            raise ValueError(f"unit '{self.unit}' of a response is none of {', '.join(UNITS)}")
+        _check_shapes(self.times, self.probes, self.displacement)
+        _check_spacing(self.times)
+
+
+def _check_shapes(times: Floats, probes: Floats, displacement: Floats) -> None:
+    if times.ndim != 1 or not len(times):
+        raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
+    if probes.ndim != 2 or probes.shape[1] not in (2, 3):
+        raise ValueError(
+            f"probes of a response have shape {probes.shape}; give (p, 2) or (p, 3) in metre"
+        )
+    expected = len(times), len(probes)
+    if displacement.shape != expected:
+        raise ValueError(
+            f"displacement of a response has shape {displacement.shape}, and its times and probes "
+            f"are {expected}; give (t, p)"
+        )
+
+
+def _check_spacing(times: Floats) -> None:
+    steps = np.diff(times)
+    if not len(steps):
+        return
+    mean = steps.mean()
+    if not (mean > 0 and np.abs(steps - mean).max() <= UNEVEN * mean):
+        raise ValueError(
+            f"times of a response must rise in equal steps, and theirs are {steps.min():g} to "
+            f"{steps.max():g} s; sample it evenly"
+        )
 
 
 def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:

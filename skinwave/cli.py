@@ -4,17 +4,24 @@ Only argparse is imported before a command is known, so that help answers at onc
 """
 
 import argparse
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from skinwave.commands import COMMANDS
+
+CACHE = "SKINWAVE_CACHE"
+NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
+UNCACHED = ("convert", "doctor", "plot", "tradeoff")  # which compute nothing, or always anew
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
     options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
-        return int(options.command(options))
+        with _cache_as_asked(options):
+            return int(options.command(options))
     except KeyboardInterrupt:
         print("skinwave: interrupted; nothing was finished", file=sys.stderr)
         return 1
@@ -24,6 +31,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         said = " ".join(str(error).split()) or "not enough memory; take larger elements"
         print(f"skinwave: {said}", file=sys.stderr)
         return 2
+
+
+@contextmanager
+def _cache_as_asked(options: argparse.Namespace) -> Iterator[None]:
+    """No cache for a command with --no-cache, nor for the processes that it starts."""
+    before = os.environ.get(CACHE)
+    if not getattr(options, "no_cache", False):
+        yield
+        return
+    os.environ[CACHE] = ""
+    try:
+        yield
+    finally:
+        os.environ.pop(CACHE)
+        if before is not None:
+            os.environ[CACHE] = before
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:
@@ -39,11 +62,15 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="skinwave", description="Waves in skin and paper under mid-air ultrasound haptics."
+        prog="skinwave",
+        description="Waves in skin and paper under mid-air ultrasound haptics.",
+        epilog=f"{CACHE}: folder where meshes and reduced bodies are cached; empty for none.",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, help=(module.__doc__ or "").rstrip("."))
         module.options(command)
+        if name not in UNCACHED:
+            command.add_argument("--no-cache", action="store_true", help=NO_CACHE)
         command.set_defaults(command=module.run)
     return parser

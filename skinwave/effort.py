@@ -1,17 +1,24 @@
 """What an answer cost: seconds by phase, memory, versions."""
 
+import platform
 import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
-from importlib.metadata import version
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import get_context
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
+SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
 Progress = Callable[[str, float], None]  # phase and fraction of it done
+
+
+class SkinwaveWarning(UserWarning):
+    """One sentence on what is less than was asked for."""
 
 
 class Clock:
@@ -45,9 +52,17 @@ def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, skinwave and what it computes with."""
-    names = ("skinwave", "numpy", "scipy")
-    return {"python": sys.version.split()[0], **{name: version(name) for name in names}}
+    """Versions of Python, skinwave, what it computes with, and the operating system."""
+    return dict(_versions())
+
+
+@lru_cache(maxsize=1)
+def _versions() -> tuple[tuple[str, str], ...]:
+    found = {"python": sys.version.split()[0]}
+    for name in ("skinwave", "numpy", "scipy", *SOLVERS):
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return (*found.items(), ("os", platform.platform()))
 
 
 def silent(phase: str, fraction: float) -> None:

@@ -1,5 +1,6 @@
 """From a scene to a response, for every model by one name."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -7,12 +8,13 @@ import numpy as np
 import fem
 from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.choices import choose
-from skinwave.effort import Progress, silent
+from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models.bodies import EXACT, exact_waves
 from skinwave.models.full import Map, harmonic_answer, transient_answer
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
-from skinwave.planning.plan import plan
+from skinwave.planning.cautions import beyond_linear
+from skinwave.planning.plan import Plan, plan
 from skinwave.scene import Scene
 
 MODELS = (
@@ -33,7 +35,11 @@ def simulate(
     solver: str = "auto",
     mapped: Map = map,
 ) -> Response:
-    """Motion of a scene's probes.
+    """Motion of a scene's probes, with its expected error.
+
+    What is less than was asked for is told in `effort.warnings` of the response, and each sentence
+    is a `SkinwaveWarning` once. An h or a model that is given is compared with what the plan would
+    take, which for elements costs another, coarser mesh; `compute` leaves that out.
 
     Parameters
     ----------
@@ -47,7 +53,8 @@ def simulate(
         "auto": what `plan` chooses, which is linear
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : called with the name of the phase and the fraction done
-    h : float, metre, element size; planned if not given, and with it how much of the body counts
+    h : float, metre, element size; planned if not given, and with it how much of the body counts,
+        as it is for "auto"
     dt : float, s, time step of "fem-transient" and the nonlinear models
     solver : a backend of `fem.linear_solver`
     mapped : shaped like the built-in `map`, for the lines of "fem-harmonic", which are solved one
@@ -60,28 +67,116 @@ def simulate(
     Diverged
         If a nonlinear model does not converge, or an answer does not account for its energy.
     """
+    found = answered(
+        scene, model, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped
+    )  # fmt: skip
+    for sentence in found.effort.warnings:
+        warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
+    return found
+
+
+def answered(
+    scene: Scene,
+    model: str = "auto",
+    tolerance: float = 0.05,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+    mapped: Map = map,
+) -> Response:
+    """The response of `simulate`, for those who tell its warnings themselves."""
+    required = required_plan(
+        scene, model, tolerance, progress, h=h, dt=dt, solver=solver
+    )  # fmt: skip
+    return follow(
+        scene, required, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped
+    )  # fmt: skip
+
+
+def required_plan(
+    scene: Scene,
+    model: str = "auto",
+    tolerance: float = 0.05,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+) -> Plan:
+    """The plan of what was asked for; raises what `simulate` does before any work."""
     choose("model", model, MODELS)
+    check_knobs(solver, h=h, dt=dt)
+    asked = None if model == "auto" else model
+    return plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
+
+
+def follow(
+    scene: Scene,
+    required: Plan,
+    tolerance: float = 0.05,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+    mapped: Map = map,
+) -> Response:
+    """The response that a plan leads to, with its expected error and all warnings; arguments are
+    those of the plan.
+    """
+    if required.model == "fem" and required.prepared:
+        found = answer(required.prepared, scene, progress)
+    else:
+        found = compute(
+            replace(scene, body=required.body), required.model, tolerance, progress,
+            h=required.h or h, dt=dt, solver=solver, mapped=mapped,
+        )  # fmt: skip
+    told = (*required.warnings, *beyond_linear(scene, found))
+    return warned(replace(found, expected_error=required.error), told)
+
+
+def compute(
+    scene: Scene,
+    model: str,
+    tolerance: float = 0.05,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+    mapped: Map = map,
+) -> Response:
+    """The response of one model, not planned: its expected error is unknown, and it warns of
+    nothing. Arguments are those of `simulate`, and so is what it raises.
+    """
+    choose("model", model, MODELS[1:])
     check_knobs(solver, h=h, dt=dt)
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    if model == "auto" or (model.startswith("fem") and h is None):
-        asked = None if model == "auto" else model
-        required = plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
-        if required.model == "fem" and required.prepared:
-            return warned(answer(required.prepared, scene, progress), required.warnings)
-        scene = replace(scene, body=required.body)
-        found = simulate(
-            scene, required.model, tolerance, progress,
-            h=required.h or h, dt=dt, solver=solver, mapped=mapped,
-        )  # fmt: skip
-        return warned(found, required.warnings)
+    found = _computed(scene, model, tolerance, progress or silent, h, dt, solver, mapped)
+    if found.effort.versions:
+        return found
+    return replace(found, effort=replace(found.effort, versions=versions()))
+
+
+def _computed(
+    scene: Scene,
+    model: str,
+    tolerance: float,
+    report: Progress,
+    h: float | None,
+    dt: float | None,
+    solver: str,
+    mapped: Map,
+) -> Response:
     times = sample_times(scene)
     if model in KERNELS:
         return KERNELS[model](scene.pressure, scene.probe_points, times)
     if model in EXACT:
         waves, body = EXACT[model], exact_waves(scene.body, model)
         return waves(body, scene.pressure, scene.probe_points, times)
-    report = progress or silent
     if model == "fem-transient":
         return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
     if model == "fem-harmonic":
@@ -99,9 +194,9 @@ def simulate(
     return answer(prepared, scene, report)
 
 
-def warned(response: Response, warnings: tuple[str, ...]) -> Response:
-    """A response that says what is less than was asked for."""
-    return replace(response, effort=replace(response.effort, warnings=warnings))
+def warned(response: Response, sentences: tuple[str, ...]) -> Response:
+    """A response that tells what is less than was asked for."""
+    return replace(response, effort=replace(response.effort, warnings=sentences))
 
 
 def check_knobs(solver: str, **lengths: float | None) -> None:

@@ -21,7 +21,7 @@ from skinwave.models.stretching import membrane, reduced_answer
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Placement, Scene
 from skinwave.scene_file import dumps, loads
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.studies.assumptions import relaxed
 from skinwave.studies.tradeoff import candidates
 from skinwave.verify import references
@@ -58,7 +58,7 @@ def test_only_a_sheet_has_air(kind):
 @pytest.mark.parametrize("h", [None, H])
 def test_models_without_modes_refuse_it(model, h):
     with pytest.raises(ValueError, match=f"{model} solves sparse equations, and air couples"):
-        simulate(SCENE, model, h=h)
+        compute(SCENE, model, h=h)
 
 
 def test_a_sheet_without_a_frame_is_refused_by_elements():

@@ -15,13 +15,14 @@ from meshes.palm import level_set
 from meshes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
-from skinwave import compare, simulate
+from skinwave import compare
 from skinwave.cli import main
 from skinwave.models import hands
 from skinwave.models.bodies import build, has_layer, operators, surface_load
 from skinwave.planning.plan import plan
 from skinwave.scene import Body, Layer, Placement, Relief
 from skinwave.scene_file import dumps, loads
+from skinwave.simulation import compute
 
 HAND = Path(__file__).parents[1] / "examples/hand/generic-hand-right.glb"
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -30,7 +31,7 @@ SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
 
 
 def answered(body, **knobs):
-    return simulate(replace(SKIN, body=body), "fem", h=0.006, **knobs).displacement
+    return compute(replace(SKIN, body=body), "fem", h=0.006, **knobs).displacement
 
 
 def test_two_layers_of_one_material_are_one():
@@ -99,9 +100,9 @@ def test_an_offset_moves_the_path_the_other_way():
         body=replace(SKIN.body, placement=Placement(offset=(0.01, 0.0))),
         probes=((0.0, 0.0), (0.01, 0.0)),
     )
-    moved = simulate(still, "fem", h=0.006).displacement
+    moved = compute(still, "fem", h=0.006).displacement
     # a mesh moved by 10 mm has its nodes elsewhere under the focus
-    centred = simulate(replace(still, body=SKIN.body), "fem", h=0.006).displacement
+    centred = compute(replace(still, body=SKIN.body), "fem", h=0.006).displacement
     assert compare_columns(moved, centred) < 0.1
 
 
@@ -149,7 +150,7 @@ def test_exact_waves_refuse_layers_and_tilts():
         {"layers": (Layer(thickness=1e-3, material="fat"),)}, {"placement": Placement(lift=0.01)},
     ):  # fmt: skip
         with pytest.raises(ValueError, match="use fem"):
-            simulate(replace(SKIN, body=replace(SKIN.body, **changed)), "flat-body")
+            compute(replace(SKIN, body=replace(SKIN.body, **changed)), "flat-body")
 
 
 def test_the_layer_around_a_body_damps_nothing_in_it():
@@ -169,14 +170,14 @@ def test_a_body_of_half_the_size_answers_alike():
     """What its sides send back is all that is different."""
     scene = replace(SKIN, probes=((0.0, 0.0), (0.01, 0.0), (0.015, 0.0)))
     whole, half = (
-        simulate(replace(scene, body=Body(width=side, height=side)), "fem", h=0.004)
+        compute(replace(scene, body=Body(width=side, height=side)), "fem", h=0.004)
         for side in (0.1, 0.05)
     )
     assert compare(whole, half).relative_l2.max() < 0.05
     early = whole.times < 0.03  # before a wave of 5 m/s is back from 50 mm further out
     first = half.displacement[early] - whole.displacement[early]
     assert np.linalg.norm(first) < 0.02 * np.linalg.norm(whole.displacement[early])
-    exact = simulate(replace(scene, body=Body()), "flat-body")
+    exact = compute(replace(scene, body=Body()), "flat-body")
     assert compare(exact, whole).relative_l2.max() < 0.05
 
 
@@ -211,8 +212,8 @@ def hand_in(file):
 
 @pytest.mark.slow
 def test_a_slab_from_the_mesher_answers_like_a_structured_one(slab_file):
-    structured = simulate(replace(SKIN, body=CLAMPED), "fem", h=0.0025)
-    filled = simulate(replace(SKIN, body=hand_in(slab_file)), "fem", h=0.004)
+    structured = compute(replace(SKIN, body=CLAMPED), "fem", h=0.0025)
+    filled = compute(replace(SKIN, body=hand_in(slab_file)), "fem", h=0.004)
     error = compare(structured, filled).relative_l2
     assert error[:4].max() < 0.02
     assert (
@@ -284,7 +285,7 @@ def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
     for drive in ("linear", "pressure_squared"):  # the second has a mean, and half the line
         pressure = MovingPressure(tacton=tacton, drive=drive)
         scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.005, 0.0)))
-        moved[drive] = lines(simulate(scene, "fem", h=0.005), [140.0])
+        moved[drive] = lines(compute(scene, "fem", h=0.005), [140.0])
     np.testing.assert_allclose(moved["pressure_squared"], moved["linear"] / 2, rtol=1e-3)
 
 
@@ -316,7 +317,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
         edge_radius=0.001,
     )  # fmt: skip
-    palm = simulate(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0028)
+    palm = compute(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0028)
 
     def with_ends(body, h, symmetry):
         made = build(body, h, symmetry)
@@ -324,7 +325,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
 
     monkeypatch.setattr("skinwave.models.full.build_body", with_ends)
-    slab = simulate(replace(SKIN, body=Body(kind="slab", sides="free", **size)), "fem", h=0.0022)
+    slab = compute(replace(SKIN, body=Body(kind="slab", sides="free", **size)), "fem", h=0.0022)
     assert compare(slab, palm).relative_l2.max() < 0.02
 
 

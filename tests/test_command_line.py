@@ -88,6 +88,22 @@ def refused(capsys, *arguments):
     return captured.err
 
 
+def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
+    run = ["run", str(scene), "--model", "fem", "--h", "15", "--quiet", "--overwrite"]
+    assert main([*run, "--no-cache"]) == 0
+    assert not (tmp_path / "cache").exists()
+    assert os.environ["SKINWAVE_CACHE"] == str(tmp_path / "cache")  # as before
+    assert main(run) == 0
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").iterdir()}
+    assert kept
+    assert main([*run, "--no-cache"]) == 0
+    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "cache").iterdir()} == kept
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    assert "SKINWAVE_CACHE" in capsys.readouterr().out
+
+
 def test_what_exists_is_kept(scene, capsys):
     (scene.parent / "kept").mkdir()
     (scene.parent / "kept/note.txt").write_text("mine")

@@ -24,7 +24,7 @@ from simple_model.steady import along_path, load_lines, path_knots
 from skinwave.models.speeds import period
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps, loads
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 
 FREQUENCY = 185.0
 STRAIGHT = (
@@ -100,11 +100,11 @@ def test_bodies_answer_them_by_lines_as_by_time_steps(more):
         pressure=together(small, duration=0.03, **more),
         body=Body(width=0.03, height=0.03, depth=0.006), probes=((0.0, 0.0), (0.005, 0.001)),
     )  # fmt: skip
-    x = simulate(scene, "fem", h=0.006).displacement
-    y = simulate(scene, "fem-transient", h=0.006, dt=2.5e-5).displacement
+    x = compute(scene, "fem", h=0.006).displacement
+    y = compute(scene, "fem-transient", h=0.006, dt=2.5e-5).displacement
     assert (np.linalg.norm(x - y, axis=0) < 2e-3 * np.linalg.norm(y, axis=0)).all()
     mean = np.mean([
-        simulate(replace(scene, pressure=alone(path, duration=0.03, **more)), "fem",
+        compute(replace(scene, pressure=alone(path, duration=0.03, **more)), "fem",
                  h=0.006).displacement for path in small
     ], axis=0)  # fmt: skip
     assert np.linalg.norm(x - mean) < 2e-3 * np.linalg.norm(mean)

@@ -16,7 +16,7 @@ from simple_model.focus import along_axis
 from skinwave.models.stretching import mean_pressure, membrane, meshed_sheet, stretching_body
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Placement, Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 
 PAPER = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
 CIRCLING = MovingPressure(
@@ -86,7 +86,7 @@ def test_mean_pressure_is_the_average_over_time():
 
 
 def test_the_motion_starts_from_rest_under_the_mean_pressure(sheet):
-    response = simulate(SCENE, "fem-nonlinear", h=0.01)
+    response = compute(SCENE, "fem-nonlinear", h=0.01)
     made, body = sheet
     P, points = fem.load_operator(made.mesh), fem.facet_points(made.mesh)[:, :2]
     rest = nonlinear.static(body, P @ mean_pressure(CIRCLING, points))
@@ -193,7 +193,7 @@ def test_what_it_does_not_answer_is_refused():
 def test_nonlinear_models_are_for_sheets_that_are_held(model, body, got):
     for h in (None, 0.01):
         with pytest.raises(ValueError, match=f"{got}.*--model fem"):
-            simulate(replace(SCENE, body=body), model, h=h)
+            compute(replace(SCENE, body=body), model, h=h)
 
 
 def test_the_plan_of_a_nonlinear_sheet_says_what_is_wrong_with_large_elements():
@@ -210,7 +210,7 @@ def test_a_lifted_sheet_feels_what_the_focus_has_left_there(model):
     scene = replace(SCENE, pressure=MovingPressure(tacton=still, peak_pressure=1e-3))
     lifted = replace(scene, body=replace(scene.body, placement=Placement(lift=0.02)))
     moved, level = (
-        np.ptp(simulate(one, model, h=0.0125, dt=1e-4).displacement) for one in (lifted, scene)
+        np.ptp(compute(one, model, h=0.0125, dt=1e-4).displacement) for one in (lifted, scene)
     )
     assert moved / level == pytest.approx(float(along_axis(0.02)), rel=1e-3)
 
@@ -218,4 +218,4 @@ def test_a_lifted_sheet_feels_what_the_focus_has_left_there(model):
 def test_a_tilted_sheet_is_refused():
     tilted = replace(SCENE.body, placement=Placement(tilt_x=0.1))
     with pytest.raises(ValueError, match="lies across the beam"):
-        simulate(replace(SCENE, body=tilted), "fem-nonlinear", h=0.0125)
+        compute(replace(SCENE, body=tilted), "fem-nonlinear", h=0.0125)

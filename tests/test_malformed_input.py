@@ -9,9 +9,10 @@ import corpus
 import numpy as np
 import pytest
 
-from skinwave import loads, simulate
+from skinwave import loads
 from skinwave.cli import main
 from skinwave.planning.plan import plan
+from skinwave.simulation import compute
 
 LONGEST = 10.0  # s
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
@@ -168,17 +169,17 @@ def test_overwriting_keeps_the_neighbours_and_a_link(folder):
 def test_a_probe_on_a_clamped_edge_stays_and_spoils_no_other():
     rim = corpus.GOOD.replace("[5, 0]", "[15, 0]")
     scene, alone = loads(rim), loads(rim.replace("[0, 0], ", ""))
-    motion = simulate(scene, "fem", 0.3, h=0.006).displacement
+    motion = compute(scene, "fem", 0.3, h=0.006).displacement
     assert np.abs(motion[:, 0]).max() > 0
     assert not motion[:, 1].any()
     with pytest.raises(ValueError, match="no probe can move"):
-        simulate(alone, "fem", 0.3, h=0.006)
+        compute(alone, "fem", 0.3, h=0.006)
 
 
 @pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem", "fem-harmonic"])
 def test_a_silent_tacton_moves_nothing(model):
     silent = loads(corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0"))
-    assert not simulate(silent, model, 0.3, h=0.006).displacement.any()
+    assert not compute(silent, model, 0.3, h=0.006).displacement.any()
 
 
 def test_a_silent_tacton_is_planned():

@@ -85,7 +85,7 @@ def test_a_point_moves_in_a_view_as_its_probe_does(scene):
     """Late enough for the start to be forgotten, and about the mean."""
     moved = motion.waves(scene, h=0.012)
     view = views.body_view(scene, "skin-slab", moved, 10)
-    response = views.probe_response(scene, moved)
+    response = motion.probe_response(scene, moved)
     at_probe = maps.carrier(view, scene.probe_points[2:3])
     drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.pushed])
     sampled = response.displacement[-100:, 2].reshape(10, 10)[:, 0]

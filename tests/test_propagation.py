@@ -14,7 +14,7 @@ from skinwave.comparison import compare
 from skinwave.propagation import OUTSIDE, propagation, share_outside
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
-from skinwave.simulation import simulate
+from skinwave.simulation import compute, simulate
 from skinwave.studies.changes import beside_kernels, quick_maps, shown
 from skinwave.studies.claims import evaluate
 from skinwave.studies.paper15 import tactons
@@ -63,7 +63,7 @@ def test_a_map_of_any_path_is_that_of_its_probes():
     x, y = grid(scene, reach=0.012, step=6e-3)
     drawn = body_map(scene, x, y)
     places = tuple(map(tuple, drawn.places.reshape(-1, 2).tolist()))
-    motion = simulate(replace(scene, probes=places), "flat-body-harmonic").displacement
+    motion = compute(replace(scene, probes=places), "flat-body-harmonic").displacement
     whole = motion[: int(10_000 / square.drawing_frequency) * 10]  # ten periods, 100 Hz
     assert drawn.rms.ravel() == pytest.approx(whole.std(axis=0), rel=1e-3)
 
@@ -85,11 +85,11 @@ def test_both_kernels_and_a_body_are_compared_under_two_loads():
 
 def test_one_name_means_one_kernel_through_every_door():
     scene = Scene(pressure=MovingPressure(tacton=BOTH), body=Body())
-    on_body = simulate(scene, "point-kernel").displacement
+    on_body = compute(scene, "point-kernel").displacement
     assert (on_body == scene.pressure(scene.probe_points, np.arange(5000) / 1e4)).all()
     bare = with_body(scene, BODIES["none"])
     assert (simulate(bare, "auto").displacement == on_body).all()
-    published = simulate(scene, "point-kernel-published")
+    published = compute(scene, "point-kernel-published")
     assert published.model == "point-kernel-published"
     assert published.displacement.min() < 0 <= on_body.min()
 
@@ -114,7 +114,7 @@ def test_every_steady_line_of_a_linear_body_is_in_the_kernels_load(am, drawn, si
     path = Trajectory(shape="circle", size=1e-3 * size, speed=20 * drawn * pi * 1e-3 * size)
     tacton = Tacton(am_frequency=20.0 * am, trajectory=path, duration=0.3)
     pressure = MovingPressure(tacton=tacton, drive=drive, depth_of_modulation=depth)
-    motion = simulate(
+    motion = compute(
         Scene(pressure=pressure, body=Body(), probes=((0.0, 0.0), (0.01, 0.0))), "flat-body"
     )
     kept = motion.times >= 0.15
@@ -221,7 +221,7 @@ def test_paper_has_no_sensation_level():
 def _run(scene, model, name="one"):
     known = next((k for k, body in BODIES.items() if body == scene.body), scene.body.kind)
     body = known if scene.body.kind != "sheet" else "sheet"
-    return Run(tacton=name, body=body, scene=scene, response=simulate(scene, model))
+    return Run(tacton=name, body=body, scene=scene, response=compute(scene, model))
 
 
 def _response(t, wave, unit):

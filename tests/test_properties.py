@@ -23,7 +23,7 @@ from skinwave import Body, Scene, dumps, loads
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.planning.plan import plan
 from skinwave.scene import BASES
-from skinwave.simulation import MODELS, simulate
+from skinwave.simulation import MODELS, compute, simulate
 
 
 def numbers(low, high):
@@ -165,9 +165,9 @@ def small_scene(tacton, **pressure):
 @given(tactons, numbers(0.01, 100))
 def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
     knobs = {"h": 0.006, "dt": 1e-3 if tacton.duration > 2e-3 else None}
-    once = simulate(small_scene(tacton, peak_pressure=10.0), model, 0.3, **knobs).displacement
+    once = compute(small_scene(tacton, peak_pressure=10.0), model, 0.3, **knobs).displacement
     scaled = small_scene(tacton, peak_pressure=10.0 * factor)
-    many = simulate(scaled, model, 0.3, **knobs).displacement
+    many = compute(scaled, model, 0.3, **knobs).displacement
     np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
 
 
@@ -223,7 +223,7 @@ def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
         scene = Scene(
             pressure=MovingPressure(tacton=tacton), body=body, probes=((0, 0), (distance, 0))
         )
-        x = np.abs(simulate(scene, model, 0.05, h=0.005, dt=2e-4).displacement)
+        x = np.abs(compute(scene, model, 0.05, h=0.005, dt=2e-4).displacement)
         times = np.arange(len(x)) / 1e4
         arrival = (distance - REACH) / material.pressure_speed
         assert x[times < arrival, 1].max() < 0.01 * x[:, 1].max()
@@ -239,8 +239,7 @@ def test_what_the_load_does_later_changes_nothing_before(model, tacton):
     longer = replace(tacton, duration=2 * tacton.duration)
     arguments = (model, 0.3, None)
     short, long = (
-        simulate(small_scene(t), *arguments, h=0.006, dt=1e-4).displacement
-        for t in (tacton, longer)
+        compute(small_scene(t), *arguments, h=0.006, dt=1e-4).displacement for t in (tacton, longer)
     )
     bound = 2e-3 if model == "flat-body" else 1e-9  # a transform over another period
     assert np.abs(long[: len(short)] - short).max() <= bound * np.abs(long).max()
@@ -251,7 +250,7 @@ def test_what_the_load_does_later_changes_nothing_before(model, tacton):
 @given(every_tacton, numbers(0.01, 100))
 def test_pulses_and_recordings_are_linear_in_the_pressure_too(model, tacton, factor):
     once, many = (
-        simulate(small_scene(tacton, peak_pressure=p), model, 0.3, h=0.006).displacement
+        compute(small_scene(tacton, peak_pressure=p), model, 0.3, h=0.006).displacement
         for p in (10.0, 10.0 * factor)
     )
     np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())

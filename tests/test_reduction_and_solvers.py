@@ -18,7 +18,7 @@ from skinwave.models.bodies import operators
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.pictures.motion import field
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes
 
 PROBES = np.column_stack([[0, 5, 10, 15, 20], np.zeros(5)]) * 1e-3
@@ -303,12 +303,12 @@ def test_an_unreachable_tolerance_is_said(monkeypatch):
 def test_fem_and_fem_transient_agree_on_a_scene(name):
     scene = scenes("short", Tacton(am_frequency=210, duration=0.02))[name]
     h = 0.006 if name == "skin-slab" else 0.005
-    reduced = simulate(scene, "fem", h=h)
-    full = simulate(scene, "fem-transient", h=h, dt=2.5e-5)
+    reduced = compute(scene, "fem", h=h)
+    full = compute(scene, "fem-transient", h=h, dt=2.5e-5)
     misfit = np.linalg.norm(reduced.displacement - full.displacement, axis=0)
     assert (misfit / np.linalg.norm(full.displacement, axis=0)).max() < 3e-3
     assert full.effort.steps == 4 * (len(full.times) - 1)
-    coarse = simulate(scene, "fem-transient", h=h, dt=3e-4)
+    coarse = compute(scene, "fem-transient", h=h, dt=3e-4)
     assert coarse.effort.steps < full.effort.steps / 10
     assert coarse.displacement.shape == full.displacement.shape
 
@@ -335,11 +335,11 @@ def test_every_element_answer_accounts_for_its_energy(model):
         body=skinwave.Body(width=0.04, height=0.04, depth=0.01),
         probes=((0.0, 0.0),),
     )
-    found = simulate(scene, model, h=0.008)
+    found = compute(scene, model, h=0.008)
     assert 0 < found.effort.energy_imbalance < 1e-9
     assert 0.003 < found.effort.radiated < 0.5  # through the sides; the rest in the skin
     closed = replace(scene, body=replace(scene.body, sides="clamped"))
-    assert simulate(closed, model, h=0.008).effort.radiated == 0
+    assert compute(closed, model, h=0.008).effort.radiated == 0
 
 
 def test_an_answer_that_makes_energy_is_refused():
@@ -374,5 +374,5 @@ def test_a_march_that_blows_up_stops_within_a_few_steps(monkeypatch):
 
     monkeypatch.setattr("skinwave.models.full.fem.transient", exploding)
     with pytest.raises(fem.Diverged, match=r"at t = 0.005 s, step 100, above the limit of 1 %"):
-        simulate(scene, "fem-transient", h=0.008)
+        compute(scene, "fem-transient", h=0.008)
     assert steps[-1] < 102

@@ -16,7 +16,7 @@ from skinwave import scene_file
 from skinwave.models.bodies import compliance
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.scene import BODIES, Body, Layer
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 
 ZENER = fem.PRESETS["palm-zener"]
 HERTZ = np.array([0.0, 40.0, 140.0, 400.0])
@@ -124,7 +124,7 @@ def test_a_sheet_bends_with_the_law_of_its_material():
         solid, relaxing_modulus=0.0, shear_modulus=mu.real, viscosity=mu.imag / 2 / np.pi / 140
     )
     found, expected = (
-        np.ptp(simulate(replace(scene, body=replace(sheet, material=m)), "fem-harmonic", h=0.01)
+        np.ptp(compute(replace(scene, body=replace(sheet, material=m)), "fem-harmonic", h=0.01)
                .displacement)
         for m in (solid, twin)
     )  # fmt: skip
@@ -208,7 +208,7 @@ def test_reduced_motion_from_rest_is_that_of_the_transient():
 
 @pytest.mark.parametrize("model", ["fem", "fem-harmonic", "fem-transient"])
 def test_what_is_lost_in_dashpots_of_the_law_is_accounted_for(model):
-    found = simulate(SCENE, model, h=0.008)
+    found = compute(SCENE, model, h=0.008)
     assert found.effort.energy_imbalance < 1e-6
     assert 0 < found.effort.radiated < 0.9  # all that is not radiated is lost in the law
 
@@ -249,7 +249,7 @@ def test_a_scene_has_the_law_in_its_file_with_units():
 
 def test_layers_may_relax_in_a_scene():
     body = replace(SCENE.body, layers=(Layer(thickness=0.005, material="fat"),))
-    found = simulate(replace(SCENE, body=body), "fem", h=0.01)
+    found = compute(replace(SCENE, body=body), "fem", h=0.01)
     assert found.effort.energy_imbalance < 1e-6
 
 
@@ -260,4 +260,4 @@ def test_large_displacement_is_refused(block):
     sheet = replace(BODIES["paper-sheet"], material=replace(ZENER, poisson=0.3))
     for model in ("fem-nonlinear", "fem-nonlinear-transient"):
         with pytest.raises(ValueError, match=r"relaxing_modulus is 10000 Pa; .* --model fem"):
-            simulate(replace(SCENE, body=sheet), model)
+            compute(replace(SCENE, body=sheet), model)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import fem
 from fem import PRESETS
 from meshes import cache
 from simple_model import Trajectory
@@ -19,6 +20,7 @@ from skinwave.planning.plan import plan
 from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import Body, Layer
+from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes, tactons
 from skinwave.studies.tradeoff import Candidate, sentences, study, write
 
@@ -76,7 +78,7 @@ def test_a_long_steady_pattern_needs_no_start():
             scene.tacton, trajectory=path)))  # fmt: skip
         required = plan(asked, 0.25)
         assert required.model == "flat-body-harmonic"
-        whole, steady = (simulate(asked, model) for model in ("flat-body", required.model))
+        whole, steady = (compute(asked, model) for model in ("flat-body", required.model))
         left = compare(whole, steady).relative_l2.max()
         assert 0.01 < left < required.error < 1.2 * left
         late = whole.times > 0.4
@@ -122,7 +124,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
 """.replace(",\n", ",")
     )
     returned, _ = returned_and_start(scene)
-    found = compare(simulate(scene, "fem", h=h), simulate(scene, "flat-body")).relative_l2
+    found = compare(compute(scene, "fem", h=h), compute(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
 
@@ -158,7 +160,7 @@ def test_what_is_expected_of_a_mesh_is_near_its_true_error(h):
     """Also where it has as many layers as the next coarser one, or twice as many."""
     scene = loads(SHORT)
     found = refined(scene, scene.body, 0.05, h=h)
-    true = compare(answer(found.prepared, scene), simulate(scene, "flat-body")).relative_l2.max()
+    true = compare(answer(found.prepared, scene), compute(scene, "flat-body")).relative_l2.max()
     assert 0.4 < found.error / true < 2.5
 
 
@@ -166,7 +168,7 @@ def test_a_body_that_nothing_holds_is_warned_of():
     text = SHORT.replace("width_mm = 60", 'width_mm = 30\nbase = "absorbing"')
     scene = loads(text)
     assert any("nothing holds" in said for said in plan(scene, 0.3, h=0.01).warnings)
-    steady = simulate(scene, "fem-harmonic", h=0.01).displacement
+    steady = compute(scene, "fem-harmonic", h=0.01).displacement
     assert np.abs(steady).max() < 1e-4  # and no mean, which would have no bound
 
 
@@ -334,7 +336,7 @@ def test_the_planned_sheet_is_within_the_tolerance():
     """Off resonance, against a mesh of twice the cells a side in each direction."""
     scene = scenes("am80", dict(tactons())["am80"])["paper-sheet"]
     found = simulate(scene, "auto", 0.05)
-    finer = simulate(scene, "fem", h=0.1 / 76)
+    finer = compute(scene, "fem", h=0.1 / 76)
     misfit = np.linalg.norm(found.displacement - finer.displacement, axis=0)
     assert (misfit / np.linalg.norm(finer.displacement, axis=0)).max() < 0.05
 
@@ -363,6 +365,60 @@ def test_a_spoilt_cache_entry_is_rebuilt(tmp_path, monkeypatch):
         entry.write_bytes(spoilt)
         again = answer(prepare(scene.body, scene.probe_points, h=0.008), scene)
         np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda arrays: arrays.update(read=1000 * arrays["read"]),
+        lambda arrays: arrays["load"].fill(np.nan),
+        lambda arrays: arrays.update(damping=arrays["damping"][:-1]),
+        lambda arrays: arrays.update(values=arrays["values"].real),
+        lambda arrays: arrays.pop("read"),
+        lambda arrays: arrays.update(meta=np.array('{"meta": {}, "arrays": ["read"]}')),
+    ],
+)
+def test_an_altered_cache_entry_is_never_used(spoil, tmp_path, monkeypatch):
+    """A sound file, but not what was stored."""
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+    first = answer(prepare(scene.body, scene.probe_points, h=0.01), scene)
+    (entry,) = tmp_path.glob("*.npz")
+    with np.load(entry) as file:
+        arrays = {name: file[name] for name in file.files}
+    spoil(arrays)
+    np.savez(entry, **arrays)
+    again = answer(prepare(scene.body, scene.probe_points, h=0.01), scene)
+    assert "factorise and reduce" in again.effort.seconds
+    np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
+
+
+def test_an_entry_of_another_body_is_never_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    cache.store("one", {}, x=np.arange(3.0))
+    (tmp_path / "one.npz").rename(tmp_path / "two.npz")
+    assert cache.load("two") is None
+    cache.store("two", {}, x=np.arange(3.0))
+    np.testing.assert_array_equal(cache.load("two")["x"], np.arange(3.0))
+
+
+def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+
+    def made(**options):
+        before = len(list(tmp_path.glob("*.npz")))
+        prepare(scene.body, scene.probe_points, h=0.01, **options)
+        return len(list(tmp_path.glob("*.npz"))) > before
+
+    assert made()
+    assert not made(solver=fem.available()[0])  # what auto is
+    assert made(solver="superlu") == (fem.available()[0] != "superlu")
+    assert made(tolerance=5e-3)
+    assert made(symmetry="x")
+    assert not made()
+    x = np.arange(6.0)
+    assert len({cache.key(a) for a in (x, x.reshape(2, 3), x.view(np.int64))}) == 3
 
 
 def test_no_cache_is_no_error(monkeypatch, tmp_path):

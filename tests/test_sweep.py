@@ -15,7 +15,7 @@ import pytest
 from skinwave.cli import main
 from skinwave.pictures.styles import style
 from skinwave.scene_file import read
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.sweeps import dataset, engine, sweep_figures
 from skinwave.sweeps import sweep as sweeping
 from skinwave.sweeps.measures import COSTS
@@ -304,8 +304,8 @@ def test_processes_and_a_cluster_give_the_same_table(scene, cluster, monkeypatch
     same(dataset.read(Path("here")), dataset.read(Path("there")))
     short = read(scene)
     with engine.mapped_on(cluster[0]) as mapped:
-        spread = simulate(short, "fem-harmonic", h=0.015, mapped=mapped).displacement
-    here = simulate(short, "fem-harmonic", h=0.015).displacement
+        spread = compute(short, "fem-harmonic", h=0.015, mapped=mapped).displacement
+    here = compute(short, "fem-harmonic", h=0.015).displacement
     np.testing.assert_allclose(spread, here, rtol=1e-10, atol=1e-10 * abs(here).max())
 
 

@@ -21,7 +21,7 @@ from skinwave.cli import main
 from skinwave.models.bodies import compliance
 from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.studies.paper15 import tactons
 from skinwave.web import (
     check_extra,
@@ -270,7 +270,7 @@ def test_undo_takes_a_drawn_slider_as_one_move():
 
 def test_what_is_shown_is_what_simulate_answers():
     scene = scenes.scene_of(STARTS)
-    shown, alone = model.kernel(scene), simulate(scene, "point-kernel")
+    shown, alone = model.kernel(scene), compute(scene, "point-kernel")
     f, amplitude = spectrum(alone)
     plot = plots.spectrum_plot(shown, None, (), highest=600)["data"][0]
     assert plot["x"] == pytest.approx(f[f <= 600])
@@ -339,7 +339,7 @@ def test_a_thinned_curve_keeps_its_peaks():
 
 def test_tabulated_waves_are_the_exact_ones(scene):
     shown = waves.Waves()(scene, nothing)
-    exact = simulate(scene, "flat-body").displacement[:, 0]
+    exact = compute(scene, "flat-body").displacement[:, 0]
     error = shown.response.displacement[:, 0] - exact
     assert np.linalg.norm(error) < 2e-3 * np.linalg.norm(exact)
     # RMS over the area against exact lines at some places.
@@ -353,7 +353,7 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
     tacton = scenes.scene_of(STARTS | {"pulses": "30/20", "foci": 3, "duration": 0.15}).tacton
     scene = replace(scene, pressure=replace(scene.pressure, tacton=tacton))
     shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
-    exact = simulate(scene, "flat-body").displacement[:, 0]
+    exact = compute(scene, "flat-body").displacement[:, 0]
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
 
 
@@ -362,7 +362,7 @@ def test_tabulated_waves_follow_paths_of_their_own(scene, more):
     values = STARTS | OWN | {"body": "skin-slab", "duration": 0.1} | more
     scene = scenes.scene_of(values)
     shown = waves.Waves()(scene, nothing)
-    exact = simulate(scene, "flat-body").displacement[:, 0]
+    exact = compute(scene, "flat-body").displacement[:, 0]
     error = shown.response.displacement[:, 0] - exact
     assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(exact)
 
@@ -375,7 +375,7 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
     values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
     answered, scene = waves.Waves(), scenes.scene_of(values, own)
     shown = answered(scene, nothing, moving=True)
-    alone = simulate(scene, "fem", h=5e-3).displacement[:, 0]
+    alone = compute(scene, "fem", h=5e-3).displacement[:, 0]
     assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
     said = []
     again = answered(
@@ -397,7 +397,7 @@ def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
     answered, scene = waves.Waves(), scenes.scene_of(values, own)
     shown = answered(scene, nothing)
-    alone = simulate(scene, "fem", h=5e-3).displacement[:, 0]
+    alone = compute(scene, "fem", h=5e-3).displacement[:, 0]
     assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
     said = []
     faster = answered(

@@ -13,7 +13,7 @@ import pytest
 
 from simple_model import spectrum
 from skinwave.scene_file import loads
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.web import controls, model, scenes
 from skinwave.web.controls import NUMBERS, STARTS
 from skinwave.web.history import TOGETHER
@@ -179,7 +179,7 @@ def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
     page.locator(".sw-row:has(#am-field) [role=slider]").press("ArrowRight")
     query_has(page, "am=141")
     values = controls.from_query(page.evaluate("location.search.slice(1)"))[0]
-    f, amplitude = spectrum(simulate(scenes.scene_of(values), "point-kernel"))
+    f, amplitude = spectrum(compute(scenes.scene_of(values), "point-kernel"))
     page.wait_for_function("() => true")
     shown = drawn(page, "spectrum_plot")[0]
     assert np.allclose(shown["x"], f[f <= 600], atol=1e-2)

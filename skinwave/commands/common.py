@@ -5,10 +5,12 @@ import json
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from simple_model import Response
     from skinwave.effort import Progress
     from skinwave.planning.plan import Plan
     from skinwave.scene import Scene
@@ -52,16 +54,16 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dt", type=float, metavar="S", help="time step of models that step, s")
 
 
-def required_plan(options: argparse.Namespace, scene: "Scene") -> "Plan":
+def required_plan(
+    options: argparse.Namespace, scene: "Scene", progress: "Progress | None" = None
+) -> "Plan":
     """The plan, with what the user has decided; what breaks the tolerance is warned of."""
-    from skinwave.planning.plan import plan
-    from skinwave.simulation import check_knobs
+    from skinwave.simulation import required_plan
 
-    model, h = None if options.model == "auto" else options.model, metre(options.h)
-    check_knobs(options.solver, h=h, dt=options.dt)
-    required = plan(
-        scene, options.tolerance, model=model, h=h, dt=options.dt, solver=options.solver
-    )
+    required = required_plan(
+        scene, options.model, options.tolerance, progress,
+        h=metre(options.h), dt=options.dt, solver=options.solver,
+    )  # fmt: skip
     warn(required.warnings)
     return required
 
@@ -70,6 +72,15 @@ def warn(sentences: Iterable[str]) -> None:
     """Say what is less than was asked for."""
     for sentence in sentences:
         print(f"skinwave: warning: {sentence}", file=sys.stderr)
+
+
+def told(response: "Response") -> dict[str, Any]:
+    """What a summary in JSON says of how far a response can be trusted."""
+    error = response.expected_error
+    return {
+        "expected_error": error if isfinite(error) else None,
+        "warnings": list(response.effort.warnings),
+    }
 
 
 def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:

@@ -5,7 +5,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise
+from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise, warn
 
 if TYPE_CHECKING:
     from skinwave.scene import Body
@@ -59,6 +59,7 @@ def run(options: argparse.Namespace) -> int:
             command=_again(options),
             h=metre(options.h), solver=options.solver,
         )  # fmt: skip
+    warn(outcome.warnings)
     held = sum(verdict.holds for verdict in outcome.verdicts)
     summary = {
         "out": str(out),
@@ -66,6 +67,7 @@ def run(options: argparse.Namespace) -> int:
         "planned": outcome.planned,
         "statements_held": held,
         "statements_judged": len(outcome.verdicts),
+        "warnings": outcome.warnings,
         "seconds": round(outcome.seconds, 1),
         "peak_memory_gib": round(outcome.peak_memory / 2**30, 2),
     }

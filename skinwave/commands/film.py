@@ -10,6 +10,7 @@ from skinwave.commands.common import (
     metre,
     progress_of,
     summarise,
+    warn,
 )
 
 if TYPE_CHECKING:
@@ -63,14 +64,16 @@ def run(options: argparse.Namespace) -> int:
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
+    from skinwave.document import worst_warnings
     from skinwave.reports.album import answers, open_album
     from skinwave.scene_file import read
 
     if not options.source.is_dir():
-        found = answers(
+        found = list(answers(
             read(options.source), progress, h=metre(options.h), solver=options.solver,
             frames=options.frames,
-        )  # fmt: skip
+        ))  # fmt: skip
+        warn(worst_warnings((run.body, run.response.effort) for _, run in found))
         return [view for view, _ in found]
     if views := list(open_album(options.source).views.values()):
         return views

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise
+from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise, warn
 
 STYLES, FORMATS = ("report", "talk", "print"), ("png", "svg", "pdf")
 
@@ -42,10 +42,11 @@ def run(options: argparse.Namespace) -> int:
         if scene is not None:
             from skinwave.reports.album import make
 
-            make(
+            said = make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,
                 command=f"skinwave report {source.name}",
             )  # fmt: skip
+            warn(said)
         write_report(
             folder if scene is not None else source, folder, style(options.style), progress,
             formats=options.format,

@@ -14,6 +14,7 @@ from skinwave.commands.common import (
     progress_of,
     required_plan,
     summarise,
+    told,
     warn,
 )
 
@@ -32,29 +33,23 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave.files import output_folder
-    from skinwave.models.bodies import EXACT
     from skinwave.run import Run
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
-    from skinwave.simulation import simulate, warned
+    from skinwave.simulation import follow
     from skinwave.studies.study import write_single
 
     scene = read(options.scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(out, overwrite=options.overwrite) as folder:
-        sized = options.h and options.model != "auto"
-        unplanned = sized or options.model in ("point-kernel", "point-kernel-published", *EXACT)
-        told = required_plan(options, scene).warnings if unplanned else ()
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
-            response = simulate(
-                scene, options.model, options.tolerance, progress,
+            required = required_plan(options, scene, progress)
+            response = follow(
+                scene, required, options.tolerance, progress,
                 h=metre(options.h), dt=options.dt, solver=options.solver, mapped=mapped,
             )  # fmt: skip
-        if unplanned:
-            response = warned(response, told)
-        else:
-            warn(response.effort.warnings)
+        warn(w for w in response.effort.warnings if w not in required.warnings)
         run = Run(
             tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
         )
@@ -65,6 +60,7 @@ def run(options: argparse.Namespace) -> int:
         "dofs": response.effort.dofs,
         "solver": response.effort.solver,
         "seconds": round(sum(response.effort.seconds.values()), 2),
+        **told(response),
     }
     summarise(options, summary, f"{response.model}: wrote {out}/index.html")
     return 0

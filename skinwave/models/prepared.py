@@ -1,6 +1,7 @@
 """A body reduced to its probes, ready to answer any Tacton."""
 
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from skinwave.scene import Body, Scene
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
 BAND = 1000.0  # Hz up to which the reduced model must be right
 REDUCTION_TOLERANCE = 1e-3
+FORMAT = 2  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "relaxing", "relaxation_times", "read", "load", "points")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
@@ -78,28 +80,46 @@ def prepare(
     """
     clock = Clock()
     build = meshed(body, h, clock, silent, symmetry)
-    mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
+    name = _entry_name(body, build, probes, solver, tolerance)
+    with clock("read from cache"):
+        entry = cache.load(name)
+    found = _from_cache(entry, probes, clock) if entry else None
+    if found:
+        return found
+    return _prepared_anew(body, build, probes, clock, progress or silent, solver, tolerance, name)
+
+
+def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance: float) -> str:
+    """The cache's name for everything that a reduced body depends on."""
+    mesh = build.mesh
     # A file may call other facets of the same mesh its top, or hold others.
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
-    name = cache.key(
-        mesh.points,
-        mesh.tets,
-        mesh.region,
-        *named,
-        build.material,
-        *ends,
-        body.air,
-        probes,
-        BAND,
-        tolerance,
-        versions(),
-    )
-    with clock("read from cache"):
-        entry = cache.load(name) or {}
-    if not {*POLES, *ARRAYS, "meta"} <= set(entry):  # none, or that of another version
-        report = progress or silent
-        return _prepared_anew(body, build, probes, clock, report, solver, tolerance, name)
-    effort = Effort(**entry["meta"])
+    used = fem.available()[0] if solver == "auto" else solver
+    return cache.key(
+        FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
+        build.fixed, build.absorbing, build.drag, probes, BAND, tolerance, used, versions(),
+    )  # fmt: skip
+
+
+def _from_cache(entry: dict[str, Any], probes: Floats, clock: Clock) -> Prepared | None:
+    """The reduced body of an entry; None if its arrays do not fit each other."""
+    if not {*POLES, *ARRAYS} <= set(entry):
+        return None
+    modes, unknowns = len(entry["values"]), entry["read"].shape[-1]
+    surface, branches = len(entry["points"]), len(entry["relaxation_times"])
+    square = (unknowns, unknowns)
+    expected = {
+        "values": (modes,), "inputs": (modes, unknowns), "outputs": (unknowns, modes),
+        "damping": square, "radiation": square, "relaxing": (branches, *square),
+        "relaxation_times": (branches,),
+        "read": (len(probes), unknowns), "load": (surface, unknowns), "points": (surface, 3),
+    }  # fmt: skip
+    if any(entry[field].shape != shape for field, shape in expected.items()):
+        return None
+    try:
+        effort = Effort(**entry["meta"])
+    except TypeError:  # that of another version
+        return None
     return Prepared(
         probes=probes,
         poles=fem.Poles(**{name: entry[name] for name in POLES}),

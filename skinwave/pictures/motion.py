@@ -3,6 +3,7 @@
 u(x, t) = basis [Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)]
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,24 +12,28 @@ from scipy import sparse
 import fem
 from meshes import TetMesh, part
 from meshes.tetmesh import Floats
-from simple_model import Effort
+from simple_model import Effort, Response
 from simple_model.steady import path_knots
-from skinwave.effort import Clock, Progress, peak_memory, silent, versions
+from skinwave.effort import Clock, Progress, SkinwaveWarning, peak_memory, silent, versions
 from skinwave.models.bodies import air, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
-from skinwave.models.prepared import BAND, reduced_lines
+from skinwave.models.prepared import BAND, reduced_lines, sample_times
+from skinwave.planning.assessment import told
 from skinwave.scene import Scene
 from skinwave.simulation import check_knobs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Field:
-    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s."""
+    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s, and the relative
+    error that is expected of the probes' waveforms, nan if unknown.
+    """
 
     mesh: TetMesh
     times: Floats
     displacement: Floats
     effort: Effort
+    expected_error: float = np.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,7 +65,9 @@ def field(
     """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
 
     The body is reduced to the subspace of the load along the path: what it takes grows with the
-    length of the path, and another path needs another reduction.
+    length of the path, and another path needs another reduction. What is less than was asked for,
+    by a coarser mesh beside this one, is told in `effort.warnings`, and each sentence is a
+    `SkinwaveWarning` once.
 
     Raises
     ------
@@ -69,7 +76,35 @@ def field(
     """
     moved = waves(scene, tolerance, progress, h=h, solver=solver)
     displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
-    return Field(mesh=moved.mesh, times=times, displacement=displacement, effort=moved.effort)
+    at_probes = assessed_probes(scene, moved, h, tolerance, solver)
+    for sentence in at_probes.effort.warnings:
+        warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
+    return Field(
+        mesh=moved.mesh, times=times, displacement=displacement, effort=at_probes.effort,
+        expected_error=at_probes.expected_error,
+    )  # fmt: skip
+
+
+def probe_response(scene: Scene, moved: Waves) -> Response:
+    """What the probes of a scene see of its body's motion."""
+    times, points = sample_times(scene), scene.probe_points
+    read = fem.probe_operator(moved.mesh, points) @ moved.basis
+    return Response(
+        model="fem", times=times, probes=points, displacement=from_rest(moved, times) @ read.T,
+        effort=moved.effort,
+    )  # fmt: skip
+
+
+def assessed_probes(
+    scene: Scene, moved: Waves, h: float | None, tolerance: float, solver: str
+) -> Response:
+    """`probe_response` with its expected error and all warnings, by a coarser mesh beside this."""
+    found = probe_response(scene, moved)
+    if scene.body.is_held:
+        return told(scene, found, found.displacement, h, tolerance, solver)
+    read = fem.probe_operator(moved.mesh, scene.probe_points) @ moved.basis
+    lines = moved.lines[moved.frequencies > 0] @ read.T
+    return told(scene, found, lines, h, tolerance, solver)
 
 
 def waves(

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 import fem
 from meshes.tetmesh import Floats, Ints
-from simple_model import Effort, Response, sensation_level
+from simple_model import Effort, sensation_level
 from simple_model.steady import along_path, load_lines, path_knots, summed
-from skinwave.models.prepared import sample_times
 from skinwave.models.speeds import shown_period, strongest_tone, surface_speed
-from skinwave.pictures.motion import Waves, from_rest, line_amplitudes, vibration
+from skinwave.pictures.motion import Waves, line_amplitudes, vibration
 from skinwave.run import is_skin
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
@@ -156,16 +155,6 @@ def kernel_view(scene: Scene, reach: Floats, frames: int = FRAMES) -> View:
         sensation=levels.max(axis=0, initial=-np.inf),
         tone=strongest_tone(frequencies[~still], amplitudes),
         speed=None, ray=_ray(scene, reach, pressure), track=_track(scene, pressure),
-    )  # fmt: skip
-
-
-def probe_response(scene: Scene, moved: Waves) -> Response:
-    """What the probes of a scene see of its body's motion."""
-    times, points = sample_times(scene), scene.probe_points
-    read = fem.probe_operator(moved.mesh, points) @ moved.basis
-    return Response(
-        model="fem", times=times, probes=points, displacement=from_rest(moved, times) @ read.T,
-        effort=moved.effort,
     )  # fmt: skip
 
 

@@ -5,16 +5,52 @@ import numpy as np
 from fem.assembly import LOSS_BAND
 from fem.materials import rayleigh_damping
 from meshes.tetmesh import Floats
-from skinwave.planning.estimates import mean_gain
-from skinwave.planning.refinement import Refined
+from simple_model import Response
+from simple_model.focus import spot_width
+from skinwave.planning.estimates import mean_gain, motion_lines
+from skinwave.planning.extent import mean_sag
+from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
 
+LINEAR = 0.5  # of its thickness that a sheet may deflect
 LOSS_ERROR = 0.4  # of a loss factor, of which the fit differs by 0.3 within its band
 
 
-def unknown(found: Refined) -> tuple[str, ...]:
+def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple[str, ...]:
+    """Warnings of linear elements of h in metre, whose relative `error` is expected, or nan."""
+    size = 1e3 * enough(scene.body, h, error, tolerance)
+    return (
+        *unknown(error),
+        *unheld(scene),
+        *_damping_misfit(scene, tolerance),
+        *exceeds(f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"),
+        *under_resolved(h, spot_width(scene.pressure.height)),
+    )
+
+
+def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Of a sheet that a linear model deflects by more than `LINEAR` times its thickness: at its
+    probes or, clamped, in the middle under its mean load. The rigid motion of a sheet that is not
+    held is no deflection.
+    """
+    body, u = scene.body, response.displacement
+    if body.kind != "sheet" or response.unit != "m" or response.model.startswith("fem-nonlinear"):
+        return ()
+    bent = u if body.is_held else u - u.mean(axis=1, keepdims=True)
+    clamped = body.sides == "clamped"
+    factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth
+    if factor <= LINEAR:
+        return ()
+    cure = "use --model fem-nonlinear" if clamped else "take a thicker sheet or a lower pressure"
+    return (
+        f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
+        f"of it; {cure}",
+    )
+
+
+def unknown(error: float) -> tuple[str, ...]:
     """Of a mesh beside which there is no other."""
-    if np.isfinite(found.error):
+    if np.isfinite(error):
         return ()
     return (
         "how wrong this mesh makes the answer is not known, because its file has only one; give a "
@@ -31,6 +67,12 @@ def unheld(scene: Scene) -> tuple[str, ...]:
         "nothing holds this body, and a lasting pressure pushes it ever further: only motion about "
         f"the mean counts; clamp its base or its sides{endless}",
     )
+
+
+def _damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
+    if not any(solid.loss_factor for _, solid in scene.body.strata):
+        return ()  # before the lines are computed
+    return other_loss(scene, *motion_lines(scene, tolerance), tolerance)
 
 
 def other_loss(

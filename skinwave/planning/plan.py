@@ -4,14 +4,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from simple_model.focus import spot_width
 from simple_model.sampling import resolving_step
 from skinwave.effort import Progress
 from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
-from skinwave.planning.cautions import exceeds, other_loss, under_resolved, unheld, unknown
+from skinwave.planning.cautions import exceeds, of_elements
 from skinwave.planning.estimates import (
     highest_line,
     is_flat,
@@ -19,7 +18,7 @@ from skinwave.planning.estimates import (
     returned_and_start,
 )
 from skinwave.planning.extent import Row, extent, left_out, symmetry
-from skinwave.planning.refinement import AIM, ORDER, Refined, refined
+from skinwave.planning.refinement import Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import FLAT, Body, Scene
 
@@ -67,7 +66,8 @@ def plan(
 
     Parameters
     ----------
-    model, h, dt : what is decided already: a model's name, element size in metre, time step in s
+    model, h, dt : what is decided already: a model's name, element size in metre, time step in s;
+        with both a model and h all of the body counts
     solver, progress : for the meshes that are tried where the scene needs elements
 
     Raises
@@ -107,7 +107,10 @@ def plan(
     returned, start = returned_and_start(scene) if is_flat(scene) else (1.0, 1.0)
     if model in EXACT or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
-    body, cut = extent(scene, tolerance, highest)
+    body: Body = scene.body
+    cut: list[Row] = []
+    if model is None or h is None:  # else all of it is meshed, as asked
+        body, cut = extent(scene, tolerance, highest)
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene, returned)), *cut]
     axes = symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
@@ -121,16 +124,11 @@ def plan(
         memory=found.prepared.effort.peak_memory,
         rows=(*rows, *_element_rows(scene, tolerance, axes, found, highest, h)),
         warnings=(
-            *unknown(found),
-            *unheld(scene),
-            *other_loss(scene, *spectrum, tolerance),
-            *exceeds(f"elements of {1e3 * found.h:.3g} mm", found.error, tolerance,
-                      f"about {1e3 * _enough(body, found, tolerance):.2g} mm is"),
+            *of_elements(scene, found.h, found.error, tolerance),
             *exceeds(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
                       tolerance, "fem is"),
-            *under_resolved(found.h, spot_width(scene.pressure.height)),
         ),
         prepared=found.prepared,
     )  # fmt: skip
@@ -242,12 +240,6 @@ def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, fl
     # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
     step = known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12
     return (min(1.0, step), 0.0) if model == "fem-transient" else (0.0, known.start)
-
-
-def _enough(body: Body, found: Refined, tolerance: float) -> float:
-    """A size in metre that will do; a slab's cells are never higher than it."""
-    aim, size = AIM * tolerance, min(found.h, body.depth if body.kind == "slab" else found.h)
-    return size * (aim / max(aim, found.error)) ** (1 / ORDER)
 
 
 def _why_elements(scene: Scene, returned: float) -> str:

@@ -154,3 +154,9 @@ def error_left(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
     size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
     change = np.linalg.norm(found - other, axis=0)
     return float((change / size).max() / abs(ratio**ORDER - 1))
+
+
+def enough(body: Body, h: float, error: float, tolerance: float) -> float:
+    """A size in metre that will do where h leaves an error; a slab's cells are never higher."""
+    aim, size = AIM * tolerance, min(h, body.depth if body.kind == "slab" else h)
+    return size * (aim / max(aim, error)) ** (1 / ORDER)

@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 
 from simple_model import Effort, Response, point_kernel
+from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.files import fill, write_lines
 from skinwave.models.prepared import answer, sample_times
-from skinwave.pictures.motion import waves
-from skinwave.pictures.views import FRAMES, View, body_view, kernel_view, load, probe_response, save
+from skinwave.pictures.motion import assessed_probes, waves
+from skinwave.pictures.views import FRAMES, View, body_view, kernel_view, load, save
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps, read
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.verify.suite import suite
 
 PUBLISHED = {"drive": "linear", "focus": "main_lobe"}
@@ -75,8 +76,8 @@ def make(
     solver: str = "auto",
     frames: int = FRAMES,
     command: str = "",
-) -> None:
-    """Answer a scene by every model and fill a folder with it.
+) -> list[str]:
+    """Answer a scene by every model and fill a folder with it; the warnings of all of them.
 
     Raises
     ------
@@ -92,6 +93,7 @@ def make(
         runs.append(run)
     write_lines(folder / "lines.csv", runs)
     _plan(folder, scene, runs, progress, solver, command)
+    return worst_warnings((run.body, run.response.effort) for run in runs)
 
 
 def answers(
@@ -121,7 +123,9 @@ def _answer(
         progress(f"{body}: {phase}", fraction)
 
     moved = waves(scene, progress=named, h=h, solver=solver)
-    return body_view(scene, body, moved, frames), probe_response(scene, moved)
+    named("compare with a coarser mesh", 0.0)
+    response = assessed_probes(scene, moved, h, PLANNED, solver)
+    return body_view(scene, body, moved, frames), response
 
 
 def _plan(
@@ -153,7 +157,7 @@ def _verified(progress: Progress) -> list[dict[str, Any]]:
 def _planned_answer(scene: Scene, required: Plan, solver: str) -> Response:
     if required.prepared:
         return answer(required.prepared, scene)
-    return simulate(scene, required.model, PLANNED, h=required.h, solver=solver)
+    return compute(scene, required.model, PLANNED, h=required.h, solver=solver)
 
 
 def _misfit(planned: Response, drawn: Response) -> float:

@@ -59,7 +59,11 @@ def write_report(
     progress("write data", 0.0)
     _write_data(out / "data", album)
     groups = tactons(album)
+    names = _names(album.runs)
     parts = [
+        document.warnings_banner(
+            (name, run.response.effort) for name, run in zip(names, album.runs, strict=True)
+        ),
         _asked(album),
         document.section("What was modelled, and what was left out", *_modelled(album)),
         document.section("What comes out", *shown),
@@ -70,6 +74,12 @@ def write_report(
         document.section("Do it again", *_again(album)),
     ]
     (out / "index.html").write_text(document.page(album.title, *parts), encoding="utf-8")
+
+
+def _names(runs: Sequence[Run]) -> list[str]:
+    """What runs are called where one is named: by body and, if there are several, by Tacton."""
+    several = len({run.tacton for run in runs}) > 1
+    return [f"{run.tacton} on {run.body}" if several else run.body for run in runs]
 
 
 def _write_data(folder: Path, album: Album) -> None:

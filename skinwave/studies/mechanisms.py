@@ -23,7 +23,7 @@ from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.run import JUDGED
 from skinwave.scene import BODIES, PROBES, Body, Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.studies.paper15 import MEASURED_ON, tactons
 
 DURATION = 0.5  # s of each Tacton, of which the later half is read
@@ -127,7 +127,7 @@ def _mechanisms(
     }
     if body.kind == "sheet":
         found["squared load, stretching"] = (
-            "pressure_squared", lambda scene: simulate(scene, "fem-nonlinear", h=h)
+            "pressure_squared", lambda scene: compute(scene, "fem-nonlinear", h=h)
         )  # fmt: skip
     return found
 

@@ -21,7 +21,7 @@ from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
 from skinwave.run import JUDGED
 from skinwave.scene import Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
     beside,
@@ -171,7 +171,7 @@ def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, 
     if scene.body.kind != "palm":  # a palm is meshed once per machine
         os.environ["SKINWAVE_CACHE"] = ""
     started = time.perf_counter()
-    response = simulate(scene, model, h=h)
+    response = compute(scene, model, h=h)
     return response, time.perf_counter() - started, peak_memory()
 
 

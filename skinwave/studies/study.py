@@ -10,16 +10,18 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from simple_model import Effort
 from skinwave import document
 from skinwave.effort import Progress, peak_memory
 from skinwave.files import fill, write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
+from skinwave.planning.assessment import assessed
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.scene_file import dumps
-from skinwave.simulation import check_knobs, simulate
+from skinwave.simulation import check_knobs, compute
 from skinwave.studies import paper15, summary, tables
 from skinwave.studies.changes import Shown, all_maps, beside_kernels, changes, quick_maps, shown
 from skinwave.studies.claims import Verdict, evaluate
@@ -30,9 +32,10 @@ EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figu
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a comparison left: its verdicts, what it cost, and how much of it was done."""
+    """What a comparison left: its verdicts and warnings, what it cost, how much of it was done."""
 
     verdicts: list[Verdict]
+    warnings: list[str]
     runs: int
     planned: int
     seconds: float
@@ -99,6 +102,7 @@ def run_study(
         first = shown(groups, maps) if len(runs) == planned else None
     outcome = Outcome(
         verdicts=evaluate(runs),
+        warnings=document.worst_warnings(_efforts(runs)),
         runs=len(runs),
         planned=planned,
         seconds=time.perf_counter() - started,
@@ -120,9 +124,9 @@ def write_single(folder: Path, run: Run) -> None:
     first = shown({run.tacton: group}, quick_maps)
     parts = [
         *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),
+        document.warnings_banner([("", run.response.effort)]),
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *map(document.paragraph, untold([run])),
-        *(document.paragraph(f"Take care: {w}.") for w in run.response.effort.warnings),
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
         document.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
     ]
@@ -141,14 +145,15 @@ def _answer(
 ) -> Run:
     """One run; a body is prepared when it is first met."""
     if scene.body.kind == "none":
-        return Run(tacton=name, body="none", scene=scene, response=simulate(scene, body))
+        return Run(tacton=name, body="none", scene=scene, response=compute(scene, body))
     if body not in prepared:
 
         def named(phase: str, fraction: float) -> None:
             progress(f"{body}: {phase}", fraction)
 
         prepared[body] = prepare(scene.body, scene.probe_points, named, h=h, solver=solver)
-    return Run(tacton=name, body=body, scene=scene, response=answer(prepared[body], scene))
+    response = assessed(scene, answer(prepared[body], scene), prepared[body], h, solver=solver)
+    return Run(tacton=name, body=body, scene=scene, response=response)
 
 
 def _write_page(
@@ -185,6 +190,7 @@ def _write_page(
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         *_introduction(outcome, groups),
+        document.warnings_banner(_efforts(runs)),
         *map(document.paragraph, untold(runs)),
         _picture(folder, "overview", overview, OVERVIEW_CAPTION),
         document.section("What propagation changes", summary.per_tacton(changes(groups))),
@@ -202,6 +208,11 @@ def _write_page(
             f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder.")),
     ]  # fmt: skip
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
+
+
+def _efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
+    """Efforts by what a run is called."""
+    return [(f"{run.tacton} on {run.body}", run.response.effort) for run in runs]
 
 
 def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:

@@ -158,9 +158,9 @@ def _felt(found: Propagation) -> str:
 def _sure(shown: Shown) -> str:
     body = shown.body.scene.body
     if np.isfinite(shown.error):
-        error = f"Numerical error {_percent(shown.error)}, against the wavenumber integral"
+        error = f"Numerical error about {_percent(shown.error)}"
     else:
-        error = "The numerical error is not estimated here (skinwave plan does)"
+        error = "The numerical error is not known"
     return f"{error}; {_material(body, shown.shares)}."
 
 

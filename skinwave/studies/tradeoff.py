@@ -19,7 +19,7 @@ from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import is_flat
 from skinwave.scene import Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.6, 0.5)  # of the two runs that the reference is accepted by
@@ -256,7 +256,7 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
         return response, cold, time.perf_counter() - again, peak_memory()
     if candidate.endless:
         scene = replace(scene, body=replace(scene.body, depth=inf))
-    response = simulate(scene, candidate.model, h=candidate.h, dt=candidate.dt)
+    response = compute(scene, candidate.model, h=candidate.h, dt=candidate.dt)
     cold = time.perf_counter() - started
     return response, cold, cold, peak_memory()
 

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
 from math import isfinite
@@ -14,10 +14,11 @@ import numpy as np
 from simple_model import Response, named_lines
 from skinwave.effort import Progress, silent
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.planning.assessment import assessed
 from skinwave.planning.estimates import is_flat
-from skinwave.planning.refinement import coarser_by, counted, error_left, refined
+from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Scene
-from skinwave.simulation import MODELS, check_knobs, simulate
+from skinwave.simulation import MODELS, answered, check_knobs
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import columns, commanded, measured
 from skinwave.sweeps.variation import Case
@@ -199,7 +200,9 @@ def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
     try:
         if knobs.h:
             _prepared(scene.body, scene.probes, knobs.h, knobs)
-            return Mesh(h=knobs.h)
+            coarser = compared_with(scene.body, knobs.h)
+            _prepared(scene.body, scene.probes, coarser, knobs)
+            return Mesh(h=knobs.h, coarser=coarser)
         found = refined(scene, scene.body, knobs.tolerance, solver=knobs.solver)
         return Mesh(h=found.h, coarser=found.compared)
     except Exception as error:  # any: it is that of every run on this body
@@ -250,39 +253,27 @@ def _row(case: Case, knobs: Knobs, mesh: Mesh | None) -> dict[str, Any]:
     try:
         if mesh is None:
             model = model_of(case.scene, knobs.model)
-            response = simulate(case.scene, model, knobs.tolerance, h=knobs.h, solver=knobs.solver)
+            response = answered(case.scene, model, knobs.tolerance, h=knobs.h, solver=knobs.solver)
         else:
-            response, of_mesh = _on_mesh(case.scene, knobs, mesh)
-            row |= of_mesh
+            response = _on_mesh(case.scene, knobs, mesh)
+            row["h_mm"] = 1e3 * (mesh.h or 0.0)
+        if isfinite(response.expected_error):
+            row["expected_error"] = response.expected_error
         row |= measured(case.scene, response)
     except Exception as error:  # any: one run's failure is its row, not the end of the others
         row["error"] = _said(error)
     return row | {"seconds": time.perf_counter() - started}
 
 
-def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> tuple[Response, dict[str, Any]]:
-    """An answer of the body prepared, and how wrong its mesh makes it."""
+def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> Response:
+    """An answer of the body prepared, with what it is expected to be wrong by."""
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
     prepared = _prepared(scene.body, scene.probes, mesh.h, knobs)
-    found = answer(prepared, scene)
-    row = {"h_mm": 1e3 * mesh.h}
-    if mesh.coarser is None:
-        return found, row
-    coarser = _prepared(scene.body, scene.probes, mesh.coarser, knobs)
-    if coarser.effort.dofs != prepared.effort.dofs:
-        coarse = answer(coarser, scene)
-        ratio = coarser_by(scene.body, mesh.coarser, mesh.h)
-        row["expected_error"] = error = error_left(
-            counted(coarser, scene, coarse), counted(prepared, scene, found), ratio
-        )
-        if error > knobs.tolerance:
-            said = (
-                f"elements of {1e3 * mesh.h:.3g} mm will be wrong by about {100 * error:.2g} %, "
-                f"more than the tolerance of {100 * knobs.tolerance:g} %; give a smaller --h"
-            )
-            found = replace(found, effort=replace(found.effort, warnings=(said,)))
-    return found, row
+    return assessed(
+        scene, answer(prepared, scene), prepared, mesh.h, knobs.tolerance, knobs.solver,
+        coarser=mesh.coarser,
+    )  # fmt: skip
 
 
 def _said(error: Exception) -> str:

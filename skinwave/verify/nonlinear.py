@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, lines
 from skinwave.models.stretching import meshed_sheet, stretching_body
 from skinwave.scene import BODIES, Body, Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.verify.case import Case, Check, Plot, below, described, misfit, relative
 from skinwave.verify.deflected import elastica as bent
 from skinwave.verify.deflected import karman_disc
@@ -259,7 +259,7 @@ def too_much() -> Case:
 def reduced_against_full() -> Case:
     """The bending modes against all unknowns on the same mesh, through 0.1 s of a Tacton."""
     scene, h = _scene(PAPER, 1.0, 0.1), 0.1 / 12
-    modes, full = (simulate(scene, m, h=h) for m in ("fem-nonlinear", "fem-nonlinear-transient"))
+    modes, full = (compute(scene, m, h=h) for m in ("fem-nonlinear", "fem-nonlinear-transient"))
     swing = full.displacement - full.displacement.mean(axis=0)
     error = (modes.displacement - full.displacement) / np.linalg.norm(swing, axis=0)
     checks = [
@@ -297,7 +297,7 @@ def amplitude_test() -> Case:
     """The line at 2 f over that at f, at a quarter, half and all of the amplitude."""
     amplitudes, h = (0.25, 0.5, 1.0), SMALL.width / 8
     found = {
-        model: [_second_over_first(simulate(_scene(SMALL, a, 0.3), model, h=h)) for a in amplitudes]
+        model: [_second_over_first(compute(_scene(SMALL, a, 0.3), model, h=h)) for a in amplitudes]
         for model in ("fem", "fem-nonlinear")
     }
     linear, stretching = found["fem"], found["fem-nonlinear"]

@@ -28,7 +28,7 @@ from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import CARRIER, level
 from skinwave.run import JUDGED, is_skin
 from skinwave.scene import Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 from skinwave.web.moving import Moving
 from skinwave.web.paths import REACH
 
@@ -84,7 +84,7 @@ class Answer:
 
 def kernel(scene: Scene) -> Answer:
     """The point kernel's answer to a scene of one probe."""
-    return answer_of(scene, simulate(scene, "point-kernel"), kernel_map(scene.pressure))
+    return answer_of(scene, compute(scene, "point-kernel"), kernel_map(scene.pressure))
 
 
 def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:

@@ -1,0 +1,108 @@
+"""Expected error and warnings of an answer whose mesh is decided already.
+
+The error of a mesh is that which a coarser one leaves, as in `refinement`. An element size that
+was asked for is compared with the next coarser one; a default one with one of twice the size,
+which costs a tenth of it and makes errors out up to one and a half times too large.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simple_model import Response
+from skinwave.models.bodies import check_mesh, default_size
+from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.planning.cautions import beyond_linear, of_elements
+from skinwave.planning.plan import plan
+from skinwave.planning.refinement import coarser_by, compared_with, counted, error_left
+from skinwave.scene import Body, Scene
+
+QUICKLY = 2.0  # times as coarse
+
+
+def assessed(
+    scene: Scene,
+    response: Response,
+    prepared: Prepared,
+    h: float | None = None,
+    tolerance: float = 0.05,
+    solver: str = "auto",
+    *,
+    coarser: float | None = None,
+) -> Response:
+    """The response of a reduced body with its expected error and all warnings.
+
+    Parameters
+    ----------
+    h : float, metre, element size, the default of the body if not given
+    coarser : float, metre, element size to compare with, chosen if not given
+    """
+    fine = counted(prepared, scene, response)
+    return told(scene, response, fine, h, tolerance, solver, coarser=coarser)
+
+
+def told(
+    scene: Scene,
+    response: Response,
+    fine: NDArray[Any],
+    h: float | None = None,
+    tolerance: float = 0.05,
+    solver: str = "auto",
+    *,
+    coarser: float | None = None,
+) -> Response:
+    """`assessed`, of what counts of any answer by linear elements: waveforms (t, p), or the lines
+    (f, p) of a body that is not held.
+    """
+    body, size = scene.body, h or default_size(scene.body)
+    other = coarser or (compared_with(body, size) if h else _coarser(body, size))
+    compared = _prepared(body, scene.probes, other, solver, reduction_tolerance(tolerance))
+    if compared.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
+        error = np.nan if body.kind == "mesh" else 1.0
+    else:
+        found = counted(compared, scene, answer(compared, scene))
+        error = error_left(found, fine, coarser_by(body, other, size))
+    warnings = sentences(scene, response, tolerance, h=size, error=error)
+    effort = replace(response.effort, warnings=warnings)
+    return replace(response, expected_error=error, effort=effort)
+
+
+def sentences(
+    scene: Scene,
+    response: Response,
+    tolerance: float = 0.05,
+    *,
+    h: float | None = None,
+    error: float = 0.0,
+) -> tuple[str, ...]:
+    """All warnings of a response, whichever door it goes out by; computes no mesh.
+
+    Parameters
+    ----------
+    h : float, metre, size of the elements of a linear model
+    error : float, relative, expected of these elements; nan if it is not known
+    """
+    if response.model.startswith("fem") and h:
+        known = of_elements(scene, h, error, tolerance)
+    else:
+        known = plan(scene, tolerance, model=response.model).warnings
+    return (*known, *beyond_linear(scene, response))
+
+
+def _coarser(body: Body, h: float) -> float:
+    """A size in metre to compare a default one with at little cost, if it can be meshed."""
+    try:
+        check_mesh(body, QUICKLY * h)
+    except ValueError:
+        return compared_with(body, h)
+    return QUICKLY * h
+
+
+@lru_cache(maxsize=4)  # of Tactons on the same bodies
+def _prepared(
+    body: Body, probes: tuple[tuple[float, float], ...], h: float, solver: str, tolerance: float
+) -> Prepared:
+    return prepare(body, np.array(probes), h=h, solver=solver, tolerance=tolerance)
