@@ -77,7 +77,7 @@ def _write_data(folder: Path, album: Album) -> None:
     folder.mkdir()
     for name, runs in tactons(album).items():
         for k, run in enumerate(runs):
-            stem = run.body if len(tactons(album)) == 1 else f"{name}-{run.body}"
+            stem = run.column if len(tactons(album)) == 1 else f"{name}-{run.column}"
             write_probes(folder / f"{stem}_probes", run.response)
             if k == len(runs) - 1:
                 write_sound(folder, run.response, strongest_probe([run]))

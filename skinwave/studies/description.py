@@ -14,6 +14,7 @@ from skinwave.scene import Body
 ANSWERS = {
     "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
     "propagates, and what it predicts is a stimulation in Pa",
+    "point-kernel-published": "the same under the published load, whatever the scene's is",
     "flat-body": "exact linear waves of an endless flat body, without a mesh",
     "flat-body-harmonic": "the steady state of exact linear waves of an endless flat body",
     "fem": "linear waves on 10-node tetrahedra, with few unknowns left",
@@ -68,7 +69,7 @@ def _answered(runs: list[Run]) -> str:
     pressure, model = runs[0].scene.pressure, runs[0].model
     load = f"drive law {pressure.drive}, {SPOTS[pressure.focus]}"
     text = f"{_sentence(answered(runs[0]))}: {ANSWERS[model]}; {load}."
-    return text if model == "point-kernel" else f"{text} {_sentence(_body(runs))}"
+    return text if model.startswith("point-kernel") else f"{text} {_sentence(_body(runs))}"
 
 
 def _sentence(text: str) -> str:

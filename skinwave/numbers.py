@@ -1,0 +1,28 @@
+"""Numbers as pages, tables and captions print them: by magnitude, to three significant digits."""
+
+from math import floor, isfinite, log10
+
+FAINTEST = -120.0  # dB: a level below it is round-off
+LARGEST, SMALLEST = 1e6, 1e-4  # written without an exponent between these
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits; "-" if it is none."""
+    if not isfinite(value):
+        return "-"
+    if not SMALLEST <= abs(value) < LARGEST:
+        return f"{value:.{digits}g}"
+    value = float(f"{value:.{digits - 1}e}")
+    return f"{value:,.{max(digits - 1 - floor(log10(abs(value))), 0)}f}"
+
+
+def decibel(value: float, *, signed: bool = False) -> str:
+    """A level or ratio in dB, without the unit, to 0.1 dB; "< -120" if it is below `FAINTEST`, "-"
+    if it is no number.
+    """
+    if value < FAINTEST:
+        return f"< {FAINTEST:g}"
+    if not isfinite(value):
+        return "-"
+    rounded = round(value, 1) + 0.0  # no -0.0
+    return f"{rounded:+.1f}" if signed else f"{rounded:.1f}"
