@@ -4,6 +4,7 @@ import warnings
 from io import BytesIO
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from skinwave.comparison import moving_rms
+from skinwave.pictures.styles import STYLES, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, told apart by every kind of colour vision; one model, one colour.
@@ -29,6 +31,9 @@ LABELS = {
     "skin-slab": "skin slab",
 }
 MARKERS = {"point-kernel": "o", "point-kernel-published": "x", "paper-sheet": "s"}
+# Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
+TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
+REPORT = STYLES["report"]
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
@@ -36,17 +41,28 @@ SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
 
 def png(figure: Figure, dpi: int = 110) -> bytes:
     """The figure as a PNG file in memory."""
+    return drawn(figure, "png", dpi)
+
+
+def drawn(figure: Figure, kind: str, dpi: int = 110) -> bytes:
+    """The figure as a file in memory: "png", "svg" or "pdf", whose text stays text."""
     buffer = BytesIO()
-    with warnings.catch_warnings():  # a name in letters that the font lacks is shown as boxes
+    with warnings.catch_warnings(), mpl.rc_context(TEXT):
+        # A name in letters that the font lacks is shown as boxes.
         warnings.filterwarnings("ignore", "Glyph")
-        figure.savefig(buffer, format="png", dpi=dpi)
+        figure.savefig(buffer, format=kind, dpi=dpi)
     return buffer.getvalue()
 
 
-def tacton_figure(title: str, runs: list[Run]) -> Figure:
+def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     """Waveform and spectrum at each probe, all models overlaid."""
+    with mpl.rc_context(style.rc):
+        return _tacton_figure(title, runs, style)
+
+
+def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     probes = runs[0].response.probes
-    figure = Figure(figsize=(10.5, 1.6 * len(probes) + 1.3))
+    figure = Figure(figsize=style.size(10.5, 1.6 * len(probes) + 1.3))
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
     for p, (x, y) in enumerate(probes):
         _waveforms(axes[p, 0], runs, p)

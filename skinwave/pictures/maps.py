@@ -87,7 +87,7 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
     """
     raster = common_raster(views)
     with mpl.rc_context(style.rc):
-        figure, axes = _panels(len(views))
+        figure, axes = _panels(len(views), style)
         for ax, view in zip(axes, views, strict=True):
             sampled = sampler(view, raster)
             level = sampled(decibel(view))
@@ -115,7 +115,7 @@ def difference_figure(reference: View, views: Sequence[View], style: Style) -> F
     """By how many dB each model moves more or less than the reference, each re its own largest."""
     raster = common_raster([reference, *views])
     with mpl.rc_context(style.rc):
-        figure, axes = _panels(len(views))
+        figure, axes = _panels(len(views), style)
         base = np.maximum(sampler(reference, raster)(decibel(reference)), DEEPEST)
         for ax, view in zip(axes, views, strict=True):
             more = np.maximum(sampler(view, raster)(decibel(view)), DEEPEST) - base
@@ -132,8 +132,8 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
     raster = common_raster(views)
     side = 0.8 * MAP
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(side * count + 2.0, side * len(views) + 1.0),
-                        layout="constrained")  # fmt: skip
+        size = style.size(side * count + 2.0, side * len(views) + 1.0)
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(views), count, sharex=True, sharey=True, squeeze=False)
         for row, view in zip(axes, views, strict=True):
             sampled = sampler(view, raster)
@@ -177,8 +177,8 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
     traced = [("ray", "distance outwards from the path, mm")]
     traced += [("track", "place along the path, mm")] if views[0].track else []
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3),
-                        layout="constrained")  # fmt: skip
+        size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(traced), len(views), squeeze=False)
         for row, (name, x_label) in zip(axes, traced, strict=True):
             for ax, view in zip(row, views, strict=True):
@@ -204,9 +204,9 @@ def peak_text(view: View) -> str:
     return f"{1e6 * view.peak:.3g} µm"
 
 
-def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
+def _panels(count: int, style: Style) -> tuple[Figure, Sequence[Axes]]:
     """Maps side by side, in mm."""
-    figure = Figure(figsize=(MAP * count + 1.2, MAP + 0.9), layout="constrained")
+    figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.9), layout="constrained")
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for ax in axes:
         ax.set_xlabel("x, mm")

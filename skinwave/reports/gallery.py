@@ -13,7 +13,7 @@ from PIL import features
 from skinwave import document, numbers
 from skinwave.effort import Progress
 from skinwave.pictures import maps, render
-from skinwave.pictures.figures import label, png, tacton_figure
+from skinwave.pictures.figures import drawn, label, tacton_figure
 from skinwave.pictures.films import film, lasts, seam
 from skinwave.pictures.levels import levels_figure, strongest_probe
 from skinwave.pictures.renderer import renderer
@@ -38,12 +38,11 @@ class Gallery:
 
     def figure(self, name: str, figure: Figure, caption: str) -> str:
         """A figure as files, and as a part of the page."""
-        drawn = png(figure, self.style.dpi)
-        (self.folder / f"{name}.png").write_bytes(drawn)
-        for ending in self.formats:
-            if ending != "png":
-                figure.savefig(self.folder / f"{name}.{ending}", dpi=self.style.dpi)
-        return _part(np.asarray(Pillow.open(io.BytesIO(drawn)).convert("RGB")), caption, name)
+        for ending in {"png", *self.formats}:
+            path = self.folder / f"{name}.{ending}"
+            path.write_bytes(drawn(figure, ending, self.style.dpi))
+        with Pillow.open(self.folder / f"{name}.png") as image:
+            return _part(np.asarray(image.convert("RGB")), caption, name)
 
     def image(self, name: str, image: render.Image, caption: str) -> str:
         """A view in three dimensions as a PNG, and as a part of the page."""
@@ -123,11 +122,11 @@ def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]
     parts: list[str] = []
     for name, runs in tactons(album).items():
         progress(f"draw {name}", 0.0)
-        drawn = tacton_figure(name, runs)
-        parts.append(gallery.figure(f"waveforms-{len(parts)}", drawn, _waveforms(runs)))
+        figure = tacton_figure(name, runs, gallery.style)
+        parts.append(gallery.figure(f"waveforms-{len(parts)}", figure, _waveforms(runs)))
         if any(run.response.unit == "m" for run in runs):
-            drawn = levels_figure(runs, strongest_probe(runs), gallery.style)
-            parts.append(gallery.figure(f"felt-{len(parts)}", drawn, f"{name}. {FELT}"))
+            figure = levels_figure(runs, strongest_probe(runs), gallery.style)
+            parts.append(gallery.figure(f"felt-{len(parts)}", figure, f"{name}. {FELT}"))
     return parts
 
 

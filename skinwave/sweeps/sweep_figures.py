@@ -67,7 +67,7 @@ def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style:
     """A column over one key, a curve for each value of another."""
     _check(rows, (column, x, *([by] if by else [])))
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+        figure = Figure(figsize=style.size(6.4, 4.4), layout="constrained")
         ax = figure.subplots()
         curves(ax, rows, column, x, by)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
@@ -86,7 +86,7 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
     for where, values in cells.items():
         table[where] = np.mean(values)
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+        figure = Figure(figsize=style.size(6.4, 4.8), layout="constrained")
         ax = figure.subplots()
         drawn = np.where(np.isfinite(table), table, np.nan)
         image = ax.pcolormesh(drawn, cmap="viridis", edgecolors="face", linewidth=0.3)
@@ -100,7 +100,7 @@ def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
     """Displacement and sensation level over the drawing speed, and the speed of surface waves."""
     _check(rows, (SPEED, "peak_um"))
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(6.4, 6.6), layout="constrained")
+        figure = Figure(figsize=style.size(6.4, 6.6), layout="constrained")
         axes = figure.subplots(2, 1, sharex=True)
         for ax, column in zip(axes, ("peak_um", "level_db"), strict=True):
             curves(ax, rows, column, SPEED, by)
