@@ -4,6 +4,7 @@ import gc
 import json
 import re
 import shutil
+import subprocess
 import wave
 from dataclasses import replace
 from hashlib import sha256
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fem import PRESETS
@@ -24,6 +26,8 @@ from skinwave.cli import main
 from skinwave.models import speeds
 from skinwave.models.bodies import compliance
 from skinwave.pictures import films, maps, motion, render, views
+from skinwave.pictures.figures import tacton_figure
+from skinwave.pictures.levels import levels_figure
 from skinwave.pictures.renderer import Renderer, renderer
 from skinwave.pictures.styles import style
 from skinwave.reports import album, gallery
@@ -64,7 +68,8 @@ def seen(folder):
 def page(folder, tmp_path_factory):
     """The report's folder, from the command line."""
     out = tmp_path_factory.mktemp("page") / "report"
-    assert main(["report", str(folder), "--out", str(out), "--format", "svg", "--quiet"]) == 0
+    kinds = ["--format", "svg", "--format", "pdf"]
+    assert main(["report", str(folder), "--out", str(out), *kinds, "--quiet"]) == 0
     return out
 
 
@@ -340,10 +345,41 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     np.testing.assert_allclose(grid.points, view.points)
 
 
-def test_figures_are_vector_files_too(page):
-    for name in ("rms", "difference", "snapshots", "waves"):
-        assert (page / f"pictures/{name}.png").stat().st_size > 10_000
-        assert "<svg" in (page / f"pictures/{name}.svg").read_text()[:2000]
+FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "felt-1")
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_text_of_vector_figures_is_text(page, name):
+    assert (page / f"pictures/{name}.png").stat().st_size > 10_000
+    svg = (page / f"pictures/{name}.svg").read_text()
+    assert "skin slab" in re.sub("<[^>]+>", " ", svg)
+    assert svg.count("<text") > 10
+    assert 'id="DejaVu' not in svg  # no glyph as a path
+    pdf = page / f"pictures/{name}.pdf"
+    assert b"/Type3" not in pdf.read_bytes()
+    assert b"/FontFile2" in pdf.read_bytes()  # TrueType
+    if shutil.which("pdffonts"):
+        told = subprocess.run(["pdffonts", str(pdf)], capture_output=True, text=True, check=True)
+        assert "TrueType" in told.stdout
+        assert "Type 3" not in told.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dressed", ["report", "print"])
+def test_no_text_of_a_figure_is_cut(folder, dressed):
+    kept, chosen = album.open_album(folder), style(dressed)
+    shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
+    figures = [draw() for _, draw, _ in gallery.flat(shown, chosen)]
+    figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
+    for figure in figures:
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        drawn = figure.get_tightbbox(canvas.get_renderer())  # inch
+        assert min(drawn.x0, drawn.y0) > -0.02
+        assert drawn.x1 < figure.get_figwidth() + 0.02
+        assert drawn.y1 < figure.get_figheight() + 0.02
+        if dressed == "print":
+            assert figure.get_figwidth() in (3.5, 7.0)
 
 
 def test_the_page_says_everything_and_stands_alone(page):

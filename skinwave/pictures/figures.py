@@ -34,8 +34,10 @@ MARKERS = {"point-kernel": "o", "point-kernel-published": "x", "paper-sheet": "s
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 REPORT = STYLES["report"]
+IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
+SETTLE = 0.25  # of the response, before which it is not looked at
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
 
 
@@ -69,14 +71,16 @@ def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
         _spectra(axes[p, 1], runs, p, named=p == 0)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
     axes[0, 0].set_title(
-        f"{title}: waveform about its mean, in units of the model", fontsize=10, parse_math=False
-    )
-    axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize=10)
+        f"{title}\nwaveform about its mean, over the model's largest",
+        fontsize="medium", parse_math=False,
+    )  # fmt: skip
+    axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize="medium")
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
     _legend(figure, runs, scales=True)
     inch = 1 / figure.get_figheight()  # fixed margins: a computed layout takes twice as long
-    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - 0.65 * inch, wspace=0.1, hspace=0.13)
+    top = 0.8 + 0.2 * (len(runs) > IN_A_ROW)
+    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
     return figure
 
 
@@ -131,7 +135,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         handles,
         labels,
         loc="outside upper center" if figure.get_layout_engine() else "upper center",
-        ncols=len(runs),
+        ncols=len(runs) if len(runs) <= IN_A_ROW else -(-len(runs) // 2),
         frameon=False,
     )
 
@@ -154,8 +158,9 @@ def _largest(run: Run) -> float:
 
 
 def _centred(run: Run) -> Floats:
-    shown = run.response.displacement[_shown(run)]
-    return shown - (shown.max(axis=0) + shown.min(axis=0)) / 2
+    """Motion (t, p) in the part that is shown, about its mean after the start."""
+    motion = run.response.displacement
+    return motion[_shown(run)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
 
 def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
@@ -191,7 +196,7 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
             if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize=8,
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small",
                         bbox={"fc": "white", "ec": "none", "pad": 0.5})  # fmt: skip
 
 
@@ -213,7 +218,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
     if path:
         ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
-        ax.text(path, -58, " focus path", fontsize=8, color="0.4", va="bottom")
+        ax.text(path, -58, " focus path", fontsize="small", color="0.4", va="bottom")
     ax.set_ylim(-60, 4)
     ax.grid(alpha=0.25)
 

@@ -12,8 +12,8 @@ ONE_COLUMN = 6.5  # inch on a screen: wider figures take two columns in print
 class Style:
     """Colours of `paper` and `ink`; `font` size in points of figures, `dpi`; `columns`, the widths
     in inch of one column of a printed page and of two, if figures are to have these; for views in
-    three dimensions the `panel` in pixels (width, height) of one model, and how many times finer it is
-    drawn than shown, `oversampling`.
+    three dimensions the `panel` in pixels (width, height) of one model, and how many times finer it
+    is drawn than shown, `oversampling`.
     """
 
     paper: str = "#ffffff"

@@ -25,7 +25,7 @@ from skinwave.run import Run
 
 FORMATS = ("png", "svg", "pdf")
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
-QUALITY = 88  # of pictures inside a page
+QUALITY, FILM_QUALITY = 88, 60  # of pictures inside a page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,7 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
     else:
         said = f"Views in three dimensions and the film are left out: {renderer().said}."
         parts = [document.paragraph(said)]
-    for name, draw, caption in _flat(views, gallery.style):
+    for name, draw, caption in flat(views, gallery.style):
         progress(f"draw {name}", 0.0)
         parts.append(gallery.figure(name, draw(), caption))
     return parts
@@ -79,10 +79,10 @@ def _spatial(
     parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
     path = gallery.folder / "film.gif"
     film(path, views, style, progress, panel=FILM_PANEL)
-    parts.append(document.picture(path.read_bytes(), _film(own), "film", "gif"))
+    parts.append(_film_part(path, _film(own)))
     if len(own.tets):
         progress("draw cut open", 0.0)
-        cut = render.picture([own], style, frame, camera="front", cut=True)
+        cut = render.picture([own], style, _behind(own), camera="front", cut=True)
         caption = (
             f"{label(own.column)} cut open along y = 0, the section below the black line: "
             f"{render.shown_scale(own)}. {MARKS}"
@@ -104,7 +104,7 @@ def _spatial(
     return parts
 
 
-def _flat(
+def flat(
     views: Sequence[View], style: Style
 ) -> Iterable[tuple[str, Callable[[], Figure], str]]:  # fmt: skip
     """Name, how it is drawn and caption of every map."""
@@ -159,6 +159,23 @@ def _drawn(views: Sequence[View]) -> str:
     scales = (f"{label(view.column)}: {render.shown_scale(view)}" for view in views)
     peaks = (f"{label(view.column)} {maps.peak_text(view)}" for view in views)
     return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
+
+
+def _behind(view: View) -> int:
+    """The frame of the largest motion among those whose focus is on the half that is drawn."""
+    largest = np.abs(view.pushed).max(axis=1)
+    seen = view.scene.tacton.trajectory.position(view.times)[:, 1] >= 0
+    return int(np.where(seen, largest, -1.0).argmax())
+
+
+def _film_part(path: Path, caption: str) -> str:
+    """A film as a part of the page, in a third of the bytes of its GIF where that can be done."""
+    if not features.check("webp"):
+        return document.picture(path.read_bytes(), caption, "film", "gif")
+    buffer = io.BytesIO()
+    with Pillow.open(path) as film:
+        film.save(buffer, format="webp", save_all=True, quality=FILM_QUALITY, method=2, loop=0)
+    return document.picture(buffer.getvalue(), caption, "film", "webp")
 
 
 def _film(view: View) -> str:

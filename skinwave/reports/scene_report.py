@@ -20,6 +20,7 @@ from skinwave.scene_file import dumps
 from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import (
+    SPOTS,
     above,
     extent,
     levels_of,
@@ -102,7 +103,8 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
         ["focus", path_of(tacton)],
         ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
         ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
-        ["drive", f"{pressure.drive}{of_depth}, {pressure.peak_pressure:g} Pa at full drive, "
+        ["drive", f"{pressure.drive}{of_depth}, {SPOTS[pressure.focus]}, "
+                  f"{pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
         ["body", extent(body) + above(body)],
         ["duration", f"{tacton.duration:g} s"],

@@ -14,7 +14,8 @@ from skinwave.scene import Body
 ANSWERS = {
     "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
     "propagates, and what it predicts is a stimulation in Pa",
-    "point-kernel-published": "the same under the published load, whatever the scene's is",
+    "point-kernel-published": "the pressure weighted by the distance to the focus, too, under the "
+    "load of the paper instead of the scene's",
     "flat-body": "exact linear waves of an endless flat body, without a mesh",
     "flat-body-harmonic": "the steady state of exact linear waves of an endless flat body",
     "fem": "linear waves on 10-node tetrahedra, with few unknowns left",
@@ -32,9 +33,9 @@ SPOTS = {
     "array": "the array's whole field",
 }
 SQUARED = (
-    "Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law of the bodies as much as "
-    "from waves: pressure_squared, because a device that modulates its sound pressure pushes with "
-    "the square of it."
+    "Steady lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law and not from "
+    "propagation: pressure_squared, because a device that modulates its sound pressure pushes with "
+    "the square of it. They are in the load of the kernel, too."
 )
 UNCERTAIN = (
     "The pressure at the focus is uncertain by a factor of 2, and all displacements with it."
