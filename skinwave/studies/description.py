@@ -14,8 +14,8 @@ from skinwave.scene import Body
 ANSWERS = {
     "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
     "propagates, and what it predicts is a stimulation in Pa",
-    "point-kernel-published": "the pressure weighted by the distance to the focus, too, under the "
-    "load of the paper instead of the scene's",
+    "point-kernel-published": "the same under the load of Lim, Seifi and Park: the commanded "
+    "signal itself, without a mean",
     "flat-body": "exact linear waves of an endless flat body, without a mesh",
     "flat-body-harmonic": "the steady state of exact linear waves of an endless flat body",
     "fem": "linear waves on 10-node tetrahedra, with few unknowns left",
@@ -33,9 +33,9 @@ SPOTS = {
     "array": "the array's whole field",
 }
 SQUARED = (
-    "Steady lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law and not from "
-    "propagation: pressure_squared, because a device that modulates its sound pressure pushes with "
-    "the square of it. They are in the load of the kernel, too."
+    "Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law, not from propagation: "
+    "pressure_squared, because a device that modulates its sound pressure pushes with the square "
+    "of it. The point kernel under the same load has them, too."
 )
 UNCERTAIN = (
     "The pressure at the focus is uncertain by a factor of 2, and all displacements with it."
@@ -70,7 +70,7 @@ def _answered(runs: list[Run]) -> str:
     pressure, model = runs[0].scene.pressure, runs[0].model
     load = f"drive law {pressure.drive}, {SPOTS[pressure.focus]}"
     text = f"{_sentence(answered(runs[0]))}: {ANSWERS[model]}; {load}."
-    return text if model.startswith("point-kernel") else f"{text} {_sentence(_body(runs))}"
+    return text if runs[0].response.unit == "Pa" else f"{text} {_sentence(_body(runs))}"
 
 
 def _sentence(text: str) -> str:
