@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from skinwave.comparison import moving_rms
+from skinwave.numbers import significant
 from skinwave.pictures.styles import STYLES, Style
 from skinwave.run import Run
 
@@ -143,8 +144,8 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
 def _scale_text(run: Run) -> str:
     scale = _largest(run)
     if run.response.unit == "Pa":
-        return f"{scale:.3g} Pa"
-    return f"{1e6 * scale:.3g} µm"
+        return f"{significant(scale)} Pa"
+    return f"{significant(1e6 * scale)} µm"
 
 
 def _shown(run: Run) -> slice:

@@ -15,6 +15,7 @@ from matplotlib.tri import Triangulation
 from meshes.tetmesh import Floats
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
+from skinwave.numbers import significant
 from skinwave.pictures.figures import colour, label
 from skinwave.pictures.styles import Style
 from skinwave.pictures.views import Trace, View, path_points, spread_radius, starting_time
@@ -203,8 +204,8 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
 def peak_text(view: View) -> str:
     """The largest motion of a view with its unit."""
     if view.unit == "Pa":
-        return f"{view.peak:.3g} Pa"
-    return f"{1e6 * view.peak:.3g} µm"
+        return f"{significant(view.peak)} Pa"
+    return f"{significant(1e6 * view.peak)} µm"
 
 
 def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Sequence[Axes]]:

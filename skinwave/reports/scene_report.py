@@ -8,6 +8,7 @@ from typing import Any
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
+from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
 from skinwave.pictures.renderer import renderer
@@ -164,12 +165,14 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
     if _share(run, name, probe) < ROUND_OFF:
         return ["0"] if run.response.unit == "Pa" else ["0", ""]
     if run.response.unit == "Pa":
-        return [f"{run.lines[name][probe]:.3g}"]
-    return [f"{1e6 * run.lines[name][probe]:.3g}", _level(levels.get(name))]
+        return [significant(run.lines[name][probe])]
+    return [significant(1e6 * run.lines[name][probe]), _level(levels.get(name))]
 
 
 def _level(level: float | None) -> str:
-    return "" if level is None or level < -200 else f"{round(level):+d}"
+    if level is None:
+        return ""
+    return f"{round(level):+d}" if level >= FAINTEST else decibel(level)
 
 
 def _comparison(album: Album) -> list[str]:
@@ -199,13 +202,13 @@ def _trust(album: Album) -> list[str]:
             found.append(
                 f"{label(run.body)}: the work of the load and what has become of it differ by "
                 f"{effort.energy_imbalance:.0e} of either (refused beyond 1e-2); reduction leaves "
-                f"an estimated {100 * effort.estimate:.2g} %."
+                f"an estimated {significant(100 * effort.estimate, 2)} %."
             )
     trust: Mapping[str, Any] = album.trust or {}
     if "misfit" in trust:
         found.append(
             f"The waveforms drawn here differ from those of the planned model, {trust['model']}, "
-            f"by {100 * trust['misfit']:.2g} % over all probes."
+            f"by {significant(100 * trust['misfit'], 2)} % over all probes."
         )
     found.append("The pressure of a device is uncertain by a factor of 2, and all motion with it.")
     parts = [document.paragraph(text) for text in dict.fromkeys(found)]
