@@ -60,7 +60,7 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
 
 
 def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
-    """`body`.pvd and a file of each of `count` frames through a period; the .pvd.
+    """`column`.pvd and a file of each of `count` frames through a period; the .pvd.
 
     Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean, the point kernel a
     surface with `pressure_pa` about its mean.
@@ -69,9 +69,9 @@ def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
     names = []
     for k, frame in enumerate(frames):
         ending = "vtu" if len(view.tets) else "vtp"
-        names.append(f"{view.body}_{k:03d}.{ending}")
+        names.append(f"{view.column}_{k:03d}.{ending}")
         _grid(view, int(frame)).save(folder / names[-1])
-    path = folder / f"{view.body}.pvd"
+    path = folder / f"{view.column}.pvd"
     path.write_text(_collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
     return path
 

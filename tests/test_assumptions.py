@@ -10,7 +10,15 @@ import pytest
 import fem
 import skinwave
 from fem import Material
-from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, point_kernel
+from simple_model import (
+    MovingPressure,
+    Response,
+    Tacton,
+    Trajectory,
+    lines,
+    point_kernel,
+    published,
+)
 from skinwave.cli import main
 from skinwave.scene import BODIES, Body, Layer, solid_of
 from skinwave.scene_file import dumps
@@ -38,13 +46,15 @@ PAPER = replace(SKIN, body=replace(BODIES["paper-sheet"], width=0.05, height=0.0
 
 def test_a_slab_and_a_sheet_have_their_own_ladders():
     assert ladder(SKIN) == (
-        "linear drive", "no propagation", "little loss", "endless", "main lobe only",
-        "continuous path", "one material", "flat",
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "endless",
+        "main lobe only", "continuous path", "one material", "flat",
     )  # fmt: skip
-    assert beside(SKIN) == ("linear drive", "no propagation", "little loss", "viscous loss")
+    assert beside(SKIN) == (
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
+    )  # fmt: skip
     assert beside(PAPER) == ()
     assert ladder(PAPER) == (
-        "linear drive", "no propagation", "endless", "vacuum", "main lobe only",
+        "linear drive", "sinc^2 profile", "no propagation", "endless", "vacuum", "main lobe only",
         "continuous path", "small deflection",
     )  # fmt: skip
     with pytest.raises(ValueError, match="keeps every assumption"):
@@ -63,9 +73,40 @@ def test_a_body_without_room_for_a_palm_stays_flat(depth):
 
 def test_nothing_dropped_is_the_published_model():
     scene, model = relaxed(SKIN, ())
-    assert model == "point-kernel"
+    assert model == "point-kernel-published"
     assert scene.body.kind == "none"
-    assert (scene.pressure.drive, scene.pressure.focus) == ("linear", "main_lobe")
+    assert scene.pressure == published(SKIN.pressure)
+
+
+@pytest.mark.parametrize("own", [SKIN, PAPER])
+def test_the_step_of_propagation_changes_propagation_alone(own):
+    """The load before it is the scene's own, by the name that it has everywhere."""
+    names = ladder(own)
+    k = names.index("no propagation")
+    before, kernel = relaxed(own, names[:k])
+    after, waves = relaxed(own, names[: k + 1])
+    assert (kernel, waves) == ("point-kernel", "flat-body")
+    assert before.pressure == after.pressure == own.pressure
+    assert before == replace(after, body=BODIES["none"])
+
+
+@pytest.mark.parametrize("own", [SKIN, PAPER])
+def test_each_step_of_the_load_changes_one_thing(own):
+    loads = [relaxed(own, ladder(own)[:k])[0].pressure for k in range(3)]
+    assert loads[1] == replace(loads[0], drive="pressure_squared")
+    assert loads[2] == replace(loads[1], focus="gaussian")
+    # With and without propagation the load is the same, whatever else is dropped.
+    for name in ladder(own):
+        kept = [n for n in ladder(own) if n != name]
+        still = [n for n in kept if n != "no propagation"]
+        assert relaxed(own, kept)[0].pressure == relaxed(own, still)[0].pressure
+
+
+def test_a_profile_that_no_integral_has_is_answered_by_elements():
+    names = [name for name in ladder(SKIN)[:3] if name != "sinc^2 profile"]
+    scene, model = relaxed(SKIN, names)
+    assert (scene.pressure.focus, scene.body.sides, model) == ("main_lobe", "absorbing", "fem")
+    assert not can_be_alone("sinc^2 profile", ladder(SKIN), SKIN)  # the array's field has none
 
 
 def test_an_endless_body_of_elements_has_sides_that_absorb():
@@ -172,8 +213,10 @@ def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
 
 
 def test_the_law_of_loss_is_one_rung():
-    before, _ = relaxed(SKIN, ("no propagation", "little loss"))
-    after, model = relaxed(SKIN, ("no propagation", "little loss", "viscous loss"))
+    before, _ = relaxed(SKIN, ("sinc^2 profile", "no propagation", "little loss"))
+    after, model = relaxed(
+        SKIN, ("sinc^2 profile", "no propagation", "little loss", "viscous loss")
+    )
     assert model == "flat-body"
     assert before.body.solid == SKIN.body.solid
     line = 2 * np.pi * strongest_line(SKIN)
@@ -221,15 +264,16 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
         (e["waveform"] for e in record["effects"]), reverse=True
     )
     assert set(effects) == {
-        "linear drive", "no propagation", "little loss", "viscous loss", "endless",
-        "main lobe only", "continuous path",
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
+        "endless", "main lobe only", "continuous path",
     }  # fmt: skip
     # with a mean in the load its lines at multiples of f_d come from nothing
     assert effects["linear drive"]["decibel"]["f_d"] > 40
     assert effects["continuous path"]["waveform"] < 0.1 < effects["no propagation"]["waveform"]
-    # One stands beside the ladder, and sides that absorb are endless anyway.
+    # One stands beside the ladder, sides that absorb are endless anyway, and the array's field has
+    # no profile of its own.
     told = {name for name, e in effects.items() if e["alone"] is not None}
-    assert told == set(effects) - {"viscous loss", "endless"}
+    assert told == set(effects) - {"viscous loss", "endless", "sinc^2 profile"}
     assert all(rung["seconds"] > 0 for rung in record["rungs"])
     with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
         assert {"t", "probes", "as published", "endless"} <= set(kept.files)

@@ -3,25 +3,31 @@
 import gc
 import json
 import re
+import shutil
+import subprocess
 import wave
 from dataclasses import replace
 from hashlib import sha256
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fem import PRESETS
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import MovingPressure, Tacton, Trajectory, published
 from simple_model.flat_body import steady_lines
 from skinwave import exports
 from skinwave.cli import main
 from skinwave.models import speeds
 from skinwave.models.bodies import compliance
 from skinwave.pictures import films, maps, motion, render, views
+from skinwave.pictures.figures import tacton_figure
+from skinwave.pictures.levels import levels_figure
 from skinwave.pictures.renderer import Renderer, renderer
 from skinwave.pictures.styles import style
 from skinwave.reports import album, gallery
@@ -48,7 +54,8 @@ def scene():
 def folder(scene, tmp_path_factory):
     """What the report of a scene is built from, on coarse meshes."""
     out = tmp_path_factory.mktemp("album")
-    album.make(out, scene, lambda phase, done: None, h=0.012, frames=12, command="as tested")
+    asked = {"h": 0.012, "frames": 12, "beside": ["paper-sheet"], "command": "as tested"}
+    album.make(out, scene, lambda phase, done: None, **asked)
     return out
 
 
@@ -61,14 +68,51 @@ def seen(folder):
 def page(folder, tmp_path_factory):
     """The report's folder, from the command line."""
     out = tmp_path_factory.mktemp("page") / "report"
-    assert main(["report", str(folder), "--out", str(out), "--format", "svg", "--quiet"]) == 0
+    kinds = ["--format", "svg", "--format", "pdf"]
+    assert main(["report", str(folder), "--out", str(out), *kinds, "--quiet"]) == 0
     return out
 
 
 def test_models_stand_side_by_side_with_the_scenes_own_body(scene, seen):
-    assert list(seen) == ["none", "paper-sheet", "skin-slab"]
+    assert list(seen) == ["point-kernel", "paper-sheet", "skin-slab"]
     assert seen["skin-slab"].scene == scene
     assert {view.unit for view in seen.values()} == {"Pa", "m"}
+
+
+def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
+    loads = {run.column: run.scene.pressure for run in album.open_album(folder).runs}
+    assert list(loads) == ["point-kernel-published", "point-kernel", "paper-sheet", "skin-slab"]
+    assert loads.pop("point-kernel-published") == published(scene.pressure) != scene.pressure
+    assert set(loads.values()) == {scene.pressure}
+
+
+@pytest.mark.parametrize("drive", ["linear", "pressure_squared"])
+def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene, drive):
+    own = replace(scene.pressure, drive=drive, focus="array")
+    shown = album.shown_scenes(replace(scene, pressure=own, body=Body(depth=0.02)))
+    assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
+    assert shown["point-kernel"].pressure == shown["slab"].pressure == own
+    bare = album.shown_scenes(replace(scene, pressure=own, body=Body(kind="none")))
+    assert list(bare)[2:] == ["paper-sheet", "skin-slab"]
+    assert {its.pressure for its in list(bare.values())[1:]} == {own}
+    asked = album.shown_scenes(scene, ["paper-sheet", "skin-slab"])
+    assert list(asked)[2:] == ["skin-slab", "paper-sheet"]
+    with pytest.raises(ValueError, match="body 'paper' is unknown"):
+        album.shown_scenes(scene, ["paper"])
+
+
+def test_a_folder_of_an_older_release_names_its_kernel_by_its_load(folder, tmp_path):
+    """Up to 0.2 the folder `none` held the published kernel, by the name of the scene's own."""
+    shutil.copytree(folder / "skin-slab", tmp_path / "skin-slab")
+    shutil.copytree(folder / "point-kernel", tmp_path / "none")
+    text = (folder / "point-kernel-published/scene.toml").read_text()
+    (tmp_path / "none/scene.toml").write_text(text)
+    old = album.open_album(tmp_path)
+    assert [run.column for run in old.runs] == ["point-kernel-published", "skin-slab"]
+    assert old.runs[0].response.unit == "Pa"
+    same = (folder / "point-kernel/scene.toml").read_text()
+    (tmp_path / "none/scene.toml").write_text(same)
+    assert album.open_album(tmp_path).runs[0].column == "point-kernel"
 
 
 def test_a_view_comes_back_from_its_file(seen, tmp_path):
@@ -84,7 +128,7 @@ def test_a_view_comes_back_from_its_file(seen, tmp_path):
 def test_a_point_moves_in_a_view_as_its_probe_does(scene):
     """Late enough for the start to be forgotten, and about the mean."""
     moved = motion.waves(scene, h=0.012)
-    view = views.body_view(scene, "skin-slab", moved, 10)
+    view = views.body_view(scene, "skin-slab", moved, (0.01, 10))
     response = motion.probe_response(scene, moved)
     at_probe = maps.carrier(view, scene.probe_points[2:3])
     drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.pushed])
@@ -97,14 +141,14 @@ def test_a_point_moves_in_a_view_as_its_probe_does(scene):
 def test_a_constant_pressure_at_rest_makes_still_pictures():
     still = MovingPressure(tacton=Tacton(duration=0.02))
     scene = Scene(pressure=still, body=Body(width=0.06, height=0.06))
-    view = views.body_view(scene, "slab", motion.waves(scene, h=0.015), 3)
+    view = views.body_view(scene, "slab", motion.waves(scene, h=0.015), (0.02, 3))
     assert not view.motion.any()
     assert view.tone == 0
     assert len(maps.snapshots_figure([view], style("print"), 2).axes) == 3
 
 
 def test_the_kernels_brightest_place_lies_on_the_path(seen):
-    view = seen["none"]
+    view = seen["point-kernel"]
     radius = view.scene.tacton.trajectory.size / 2
     step = np.ptp(view.places[:, 0]) / (views.GRID - 1)
     brightest = view.places[view.rms.argmax()]
@@ -117,8 +161,8 @@ def test_the_kernels_brightest_place_lies_on_the_path(seen):
 
 def test_waves_spread_further_than_the_kernel(seen):
     radii = {name: views.spread_radius(view, -20.0) for name, view in seen.items()}
-    assert radii["skin-slab"] > 1.5 * radii["none"]
-    assert radii["paper-sheet"] > 1.5 * radii["none"]
+    assert radii["skin-slab"] > 1.5 * radii["point-kernel"]
+    assert radii["paper-sheet"] > 1.5 * radii["point-kernel"]
     assert all(views.spread_radius(v, -6.0) <= views.spread_radius(v, -20.0) for v in seen.values())
 
 
@@ -127,7 +171,7 @@ def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
     """By the slope of the x-t diagram outside the path, beside Rayleigh's speed and exact waves."""
     body = Body(width=0.12, height=0.12, material=replace(PRESETS["palm"], viscosity=2.0))
     scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
-    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.1, h=0.0035), 4)
+    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.1, h=0.0035), (0.02, 4))
     outside = (view.ray.distance > 0.005) & (view.ray.distance < 0.03)
     distance, times = view.ray.distance[outside], view.ray.times
     found = speeds.apparent_speed(distance, times, view.ray.motion[:, outside], 250.0)
@@ -163,7 +207,41 @@ def test_a_load_has_the_period_of_all_its_tones():
     assert speeds.period(circling(am_frequency=100)) == pytest.approx(0.01)
     assert speeds.period(circling(200.0, am_frequency=140)) == pytest.approx(0.05)
     assert speeds.period(circling(190.986, am_frequency=140)) is None
-    assert speeds.shown_period(circling(190.986, am_frequency=140)) == pytest.approx(1 / 140)
+
+
+def test_what_is_played_returns_after_the_slowest_beat():
+    """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
+    beating = circling(190.986, am_frequency=140)
+    span = speeds.shown_period(beating)
+    assert span >= 1 / 50.986
+    assert speeds.seam(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
+    whole = circling(200.0, am_frequency=140)
+    assert speeds.shown_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
+    assert speeds.shown_part(whole, 340.0, 12) == (speeds.shown_period(whole), 12)
+    assert speeds.shown_part(circling(200.0), 200.0) == pytest.approx((0.005, speeds.FEWEST))
+
+
+def test_a_pattern_too_long_to_play_is_played_in_part_and_says_so():
+    long = replace(circling(200.0, am_frequency=100.5).tacton, duration=2.0)
+    load = MovingPressure(tacton=long)
+    assert speeds.period(load) == pytest.approx(2.0)
+    span, frames = speeds.shown_part(load, 300.0)
+    assert frames == speeds.MOST
+    assert frames / (span * 300.0) >= speeds.EACH
+    said = films.seam(SimpleNamespace(scene=Scene(pressure=load, body=Body()), period=span))
+    assert "of a pattern of 2,000 ms" in said
+    assert "phases jump by up to" in said
+
+
+def test_frames_follow_the_fastest_line_that_moves_the_body(scene):
+    moved = motion.waves(scene, h=0.012)
+    fastest = views.fastest_line(moved)
+    view = views.body_view(scene, "skin-slab", moved)
+    assert view.period == pytest.approx(0.01)
+    assert len(view.times) == max(speeds.FEWEST, round(speeds.EACH * fastest * view.period))
+    amplitude = np.abs(np.fft.rfft(view.pushed, axis=0)).max(axis=1)
+    strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
+    assert strong.max() <= 1.5 * fastest <= 1.5 * 800
 
 
 @draws
@@ -190,7 +268,7 @@ def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
     assert said
     assert factor == pytest.approx(float(said[1].replace(",", "")), rel=1e-3)
     assert 0.015 < factor * view.peak / 0.1 <= render.SHOWN
-    assert render.shown_scale(seen["none"]) == "pressure; nothing moves"
+    assert render.shown_scale(seen["point-kernel"]) == "pressure; nothing moves"
 
 
 @draws
@@ -240,7 +318,7 @@ def test_tables_have_units_and_places_in_their_headers(page):
     values = np.loadtxt(rows[1:], delimiter=",")
     kept = np.load(page / "data/skin-slab_probes.npz")
     np.testing.assert_allclose(values[:, 1:], kept["displacement"], rtol=1e-7, atol=1e-18)
-    assert '"pressure at (0, 0) mm, Pa"' in (page / "data/none_probes.csv").read_text()
+    assert '"pressure at (0, 0) mm, Pa"' in (page / "data/point-kernel_probes.csv").read_text()
 
 
 def test_a_sound_has_the_scale_in_its_name(seen, page):
@@ -267,10 +345,41 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     np.testing.assert_allclose(grid.points, view.points)
 
 
-def test_figures_are_vector_files_too(page):
-    for name in ("rms", "difference", "snapshots", "waves"):
-        assert (page / f"pictures/{name}.png").stat().st_size > 10_000
-        assert "<svg" in (page / f"pictures/{name}.svg").read_text()[:2000]
+FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "felt-1")
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_text_of_vector_figures_is_text(page, name):
+    assert (page / f"pictures/{name}.png").stat().st_size > 10_000
+    svg = (page / f"pictures/{name}.svg").read_text()
+    assert "skin slab" in re.sub("<[^>]+>", " ", svg)
+    assert svg.count("<text") > 10
+    assert 'id="DejaVu' not in svg  # no glyph as a path
+    pdf = page / f"pictures/{name}.pdf"
+    assert b"/Type3" not in pdf.read_bytes()
+    assert b"/FontFile2" in pdf.read_bytes()  # TrueType
+    if shutil.which("pdffonts"):
+        told = subprocess.run(["pdffonts", str(pdf)], capture_output=True, text=True, check=True)
+        assert "TrueType" in told.stdout
+        assert "Type 3" not in told.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dressed", ["report", "print"])
+def test_no_text_of_a_figure_is_cut(folder, dressed):
+    kept, chosen = album.open_album(folder), style(dressed)
+    shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
+    figures = [draw() for _, draw, _ in gallery.flat(shown, chosen)]
+    figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
+    for figure in figures:
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        drawn = figure.get_tightbbox(canvas.get_renderer())  # inch
+        assert min(drawn.x0, drawn.y0) > -0.02
+        assert drawn.x1 < figure.get_figwidth() + 0.02
+        assert drawn.y1 < figure.get_figheight() + 0.02
+        if dressed == "print":
+            assert figure.get_figwidth() in (3.5, 7.0)
 
 
 def test_the_page_says_everything_and_stands_alone(page):
@@ -323,7 +432,7 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
-    for name in ("waves", "plan", "simulate", "answer", "point_kernel", "kernel_view", "suite"):
+    for name in ("waves", "plan", "simulate", "answer", "kernel_view", "suite"):
         monkeypatch.setattr(album, name, run)
     monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0

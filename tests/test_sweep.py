@@ -1,5 +1,6 @@
 """Sweeps: which runs, each once, in one table, whatever runs them and whatever is killed."""
 
+import csv
 import json
 import os
 import signal
@@ -222,6 +223,73 @@ def test_plots_are_drawn_with_units(scene):
         check_plots(kind)
 
 
+def test_rows_keep_the_order_of_the_design(scene):
+    vary = ["--vary", "tacton.speed_m_per_s=8,4,70,6", "tacton.size_mm=9,8"]
+    rows = swept(*vary)
+    design = [(v, d) for v in (8, 4, 70, 6) for d in (9, 8)]
+    at = lambda row: (row["tacton.speed_m_per_s"], row["tacton.size_mm"])  # noqa: E731
+    assert [at(row) for row in rows] == design
+    assert [row["index"] for row in rows] == list(range(8))
+    for part in list(Path("short-sweep/rows").glob("*.parquet"))[::2]:
+        part.unlink()
+    assert [row["key"] for row in swept(*vary)] == [row["key"] for row in rows]  # gone on with
+    more = swept("--vary", "tacton.speed_m_per_s=5,4", "tacton.size_mm=9", "--csv")
+    assert [at(row) for row in more] == [*design, (5, 9)]
+    assert [row["index"] for row in more] == list(range(9))
+    with open("short-sweep/rows.csv", newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert [line["index"] for line in lines] == list(map(str, range(9)))
+
+
+def test_rows_of_an_older_release_have_no_index(tmp_path):
+    dataset.open_folder(tmp_path)
+    for k in (2, 1):
+        dataset.append(tmp_path, [{"key": f"row{k}"}], {"key": "text"})
+    assert [row["key"] for row in dataset.read(tmp_path)] == ["row1", "row2"]
+    assert dataset.names(tmp_path) == {"row1": None, "row2": None}
+    assert dataset.numbered(["row3", "row1"], dataset.names(tmp_path)) == {"row3": 2}
+
+
+def hypercube(samples):
+    """Rows whose column is the sum of two keys, which meet as in a Latin hypercube."""
+    keys = ("tacton.speed_m_per_s=2:12", "tacton.size_mm=5:20")
+    met = combinations(varied(*keys), "lhs", samples)
+    return [each | {"status": "done", "peak_um": sum(each.values())} for each in met]
+
+
+def test_a_latin_hypercube_is_drawn_as_points_with_the_other_key_as_colour():
+    speed, size = "tacton.speed_m_per_s", "tacton.size_mm"
+    rows = hypercube(20)
+    figure = sweep_figures.line_figure(rows, "peak_um", speed, size, style("report"))
+    ax, bar = figure.axes
+    assert bar.get_ylabel() == "size of the path, mm"
+    assert ax.get_legend() is None
+    drawn = sorted((line.get_xdata()[0], line.get_ydata()[0]) for line in ax.lines)
+    assert drawn == sorted((row[speed], row["peak_um"]) for row in rows)
+    assert max(len(line.get_xdata()) for line in ax.lines) == 1  # nothing is joined
+    rows = [row | {"level_db": 1.0, "rayleigh_speed_m_per_s": 5.0} for row in rows]
+    legend = sweep_figures.speed_figure(rows, size, style("report")).axes[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["Rayleigh speed $c_R$ without loss"]
+    heat = sweep_figures.heat_figure(rows, "peak_um", speed, size, style("report"))
+    points = heat.axes[0].collections[0]
+    np.testing.assert_allclose(points.get_offsets()[:, 0], [row[speed] for row in rows])
+    np.testing.assert_allclose(points.get_array(), [row["peak_um"] for row in rows])
+    third = [row | {"body.depth_mm": 10.0 + k} for k, row in enumerate(rows)]
+    alone = sweep_figures.line_figure(third, "peak_um", speed, None, style("report"))
+    assert [line.get_linestyle() for line in alone.axes[0].lines] == ["None"]
+
+
+def test_curves_of_many_values_have_a_colour_bar():
+    rows = [{"tacton.speed_m_per_s": float(v), "tacton.size_mm": float(d), "status": "done",
+             "peak_um": float(v + d)} for v in range(3) for d in range(12)]  # fmt: skip
+    keys = ("tacton.speed_m_per_s", "tacton.size_mm")
+    figure = sweep_figures.line_figure(rows, "peak_um", *keys, style("print"))
+    assert [len(line.get_xdata()) for line in figure.axes[0].lines] == 12 * [3]
+    assert {line.get_linestyle() for line in figure.axes[0].lines} == {"-"}
+    assert len(figure.axes) == 2
+    assert figure.get_figwidth() == 3.5
+
+
 def check_plots(kind):
     drawn = ["plot", "short-sweep", "--format", kind, "--quiet"]
     assert main([*drawn, "--column", "f_AM_um[1]", "--column", "kernel_misfit"]) == 0
@@ -230,8 +298,11 @@ def check_plots(kind):
     files = list(Path("short-sweep/figures").glob(f"*.{kind}"))
     assert len(files) == 4
     assert all(file.stat().st_size > 5000 for file in files)
+    if kind == "pdf":
+        assert not any(b"/Type3" in file.read_bytes() for file in files)
     if kind == "svg":
         text = "".join(file.read_text() for file in files)
+        assert text.count("<text") > 40
         assert "drawing speed, m/s" in text
         assert "size of the path, mm" in text
 

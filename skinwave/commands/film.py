@@ -28,7 +28,14 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     parser.add_argument("--style", choices=("report", "talk", "print"), default="report")
     parser.add_argument("--camera", choices=("tilted", "front", "top"), default="tilted")
-    parser.add_argument("--frames", type=int, default=40, help="of a scene; 40 if not given")
+    parser.add_argument(
+        "--frames", type=int, metavar="N",
+        help="of a scene; by default as many as its fastest strong component needs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
+        help="on these bodies, too: paper-sheet, skin-slab or palm, with commas between",
+    )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     add_mesh(parser)
     add_reporting(parser)
@@ -45,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     check_format(out)
     if out.exists() and not options.overwrite:
         raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
-    if not 2 <= options.frames <= 1000:
+    if options.frames is not None and not 2 <= options.frames <= 1000:
         raise ValueError(f"frames = {options.frames} is outside 2..1000; a film needs a few")
     if not renderer().found:
         raise ValueError(f"there is nothing to draw a film with: {renderer().said}")
@@ -65,16 +72,17 @@ def run(options: argparse.Namespace) -> int:
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
     from skinwave.document import worst_warnings
-    from skinwave.reports.album import answers, open_album
+    from skinwave.reports.album import answers, open_album, shown_scenes
     from skinwave.scene_file import read
 
     if not options.source.is_dir():
+        scene = read(options.source)
         found = list(answers(
-            read(options.source), progress, h=metre(options.h), solver=options.solver,
-            frames=options.frames,
+            scene, shown_scenes(scene, options.beside), progress, h=metre(options.h),
+            solver=options.solver, frames=options.frames,
         ))  # fmt: skip
         warn(worst_warnings((run.body, run.response.effort) for _, run in found))
-        return [view for view, _ in found]
+        return [view for view, _ in found if view]
     if views := list(open_album(options.source).views.values()):
         return views
     raise ValueError(

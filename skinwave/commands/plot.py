@@ -33,6 +33,7 @@ def run(options: argparse.Namespace) -> int:
 
     engine.check("threads")
     from skinwave.files import folder_name, output_file
+    from skinwave.pictures.figures import drawn
     from skinwave.pictures.styles import style
     from skinwave.sweeps.sweep_figures import (
         SPEED,
@@ -66,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     paths = [out / f"{name.replace(' ', '-')}.{options.format}" for name in figures]
     for path, figure in zip(paths, figures.values(), strict=True):
         with output_file(path, overwrite=True) as file:
-            figure.savefig(file, format=options.format, dpi=chosen.dpi)
+            file.write(drawn(figure, options.format, chosen.dpi))
     said = "\n".join(f"wrote {path}" for path in paths)
     summarise(options, {"figures": [str(path) for path in paths], "runs": len(rows)}, said)
     return 0

@@ -1,6 +1,7 @@
 """One page of a scene or of a result folder: what was asked, modelled, found and trusted."""
 
 import argparse
+import shlex
 from pathlib import Path
 
 from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise, warn
@@ -18,6 +19,10 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=FORMATS, action="append", default=["png"],
         help="of figures, beside PNG; may be given twice",
+    )  # fmt: skip
+    parser.add_argument(
+        "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
+        help="on these bodies, too: paper-sheet, skin-slab or palm, with commas between",
     )  # fmt: skip
     add_mesh(parser)
     add_output(parser)
@@ -44,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
 
             said = make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,
-                command=f"skinwave report {source.name}",
+                beside=options.beside, command=_again(options),
             )  # fmt: skip
             warn(said)
         write_report(
@@ -55,3 +60,10 @@ def run(options: argparse.Namespace) -> int:
     summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
     summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")
     return 0
+
+
+def _again(options: argparse.Namespace) -> str:
+    """The command that makes the same report."""
+    words = ["--beside", ",".join(options.beside)] if options.beside else []
+    words += ["--h", f"{options.h:g}"] if options.h else []
+    return shlex.join(["skinwave", "report", options.source.name, *words])

@@ -1,16 +1,45 @@
 """How fast waves run along the surface of a body, and what a faster focus leaves behind it."""
 
-from math import asin, pi
+from dataclasses import replace
+from math import asin, ceil, pi
 
 import numpy as np
 
 from fem.materials import Material
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure
+from simple_model import MovingPressure, Tacton
 from simple_model.compliance import AIR_DENSITY
 from skinwave.scene import Body
 
-LONGEST_PERIOD = 0.05  # s that two tones may take to meet again, and that pictures follow
+try:
+    from simple_model.tacton import pattern_period, repeated  # type: ignore[attr-defined]
+except ImportError:  # a Tacton does not know its own period yet
+
+    def repeated(tacton: Tacton) -> dict[str, float]:
+        """Names and frequencies in Hz of what a Tacton repeats, but for its rhythm and signal."""
+        w1, w2 = tacton.superposition
+        found = {
+            "f_AM": tacton.am_frequency * (w1 > 0),
+            "f_AM2": tacton.second_am_frequency * (w2 > 0),
+            "f_e": tacton.envelope_frequency,
+            "f_d": tacton.drawing_frequency,
+        }
+        return {name: f for name, f in found.items() if f > 0}
+
+    def pattern_period(tacton: Tacton) -> float:
+        """The period in s of the whole pattern; the duration if it has none within that."""
+        found = repeated(tacton).values()
+        if not found:
+            return tacton.duration
+        for turns in range(1, int(tacton.duration * min(found) + SAME) + 1):
+            whole = [f * turns / min(found) for f in found]
+            if all(abs(n - round(n)) <= SAME * n for n in whole):
+                return turns / min(found)
+        return tacton.duration
+
+
+FEWEST, MOST = 40, 256  # frames of what pictures play
+EACH = 8  # frames to a period of the fastest line that counts
 AIR_TURNS = 30  # each leaves a quarter of the error, or less
 SAME = 1e-6  # of a tone: further from a multiple of the common frequency it is none
 
@@ -77,40 +106,45 @@ def apparent_speed(distances: Floats, times: Floats, motion: Floats, frequency: 
     return float(-2 * pi * frequency / slope)
 
 
-def tones(pressure: MovingPressure) -> tuple[float, ...]:
-    """The frequencies in Hz that a load is made of, ascending."""
-    tacton = pressure.tacton
-    w1, w2 = tacton.superposition
-    found = {
-        tacton.am_frequency * (w1 > 0),
-        tacton.second_am_frequency * (w2 > 0),
-        tacton.envelope_frequency,
-        tacton.drawing_frequency,
-    }
-    return tuple(sorted(f for f in found if f > 0))
+def seam(tacton: Tacton, span: float) -> float:
+    """By how much of a turn, 0..0.5, the worst phase of what a Tacton repeats is off after a time
+    in s: the jump of pictures that play this time over and over.
+    """
+    turns = span * np.array(list(repeated(tacton).values()))
+    return float(np.abs(turns - np.round(turns)).max(initial=0.0))
 
 
 def period(pressure: MovingPressure) -> float | None:
-    """The period in s after which a load is the same again; None if that is not soon."""
-    found = tones(pressure)
-    if not found:
-        return None
-    for turns in range(1, int(LONGEST_PERIOD * found[0]) + 2):
-        common = found[0] / turns
-        whole = [f / common for f in found]
-        if all(abs(n - round(n)) <= SAME * n for n in whole):
-            return 1 / common
-    return None
+    """The period in s of a load's whole pattern; None if it has none within its duration."""
+    whole = pattern_period(pressure.tacton)
+    turns = whole * max(repeated(pressure.tacton).values(), default=0.0)
+    return whole if turns and seam(pressure.tacton, whole) <= SAME * turns else None
 
 
 def shown_period(pressure: MovingPressure) -> float:
-    """The period in s that films and snapshots show: the load's own or, if it has none, that of
-    its slowest tone that is no slower than `LONGEST_PERIOD`.
+    """The time in s that pictures play: the period of the whole pattern or, if it has none, that
+    after which it has all but returned.
     """
-    if (own := period(pressure)) is not None:
-        return own
-    found = tones(pressure) or (1 / LONGEST_PERIOD,)
-    return 1 / min((f for f in found if f * LONGEST_PERIOD >= 1), default=found[-1])
+    return pattern_period(pressure.tacton)
+
+
+def shown_part(
+    pressure: MovingPressure, fastest: float, frames: int | None = None, most: int = MOST
+) -> tuple[float, int]:
+    """The time in s that pictures play, and in how many frames: `EACH` to a period of the `fastest`
+    line in Hz that counts. A pattern that takes more than `most` frames is played in part, as long
+    as these last, with the least jump where it begins again.
+
+    Parameters
+    ----------
+    frames : so many of the same time instead
+    """
+    span, tacton = shown_period(pressure), pressure.tacton
+    needed = ceil(EACH * fastest * span * (1 - SAME))
+    if needed > (most := max(most, frames or 0)):
+        longest = min(tacton.duration, most / EACH / fastest)
+        span, needed = pattern_period(replace(tacton, duration=longest)), most
+    return span, frames or max(needed, FEWEST)
 
 
 def strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:

@@ -4,6 +4,7 @@ import warnings
 from io import BytesIO
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,6 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from skinwave.comparison import moving_rms
+from skinwave.numbers import significant
+from skinwave.pictures.styles import STYLES, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, told apart by every kind of colour vision; one model, one colour.
@@ -29,38 +32,56 @@ LABELS = {
     "skin-slab": "skin slab",
 }
 MARKERS = {"point-kernel": "o", "point-kernel-published": "x", "paper-sheet": "s"}
+# Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
+TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
+REPORT = STYLES["report"]
+IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
+SETTLE = 0.25  # of the response, before which it is not looked at
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
 
 
 def png(figure: Figure, dpi: int = 110) -> bytes:
     """The figure as a PNG file in memory."""
+    return drawn(figure, "png", dpi)
+
+
+def drawn(figure: Figure, kind: str, dpi: int = 110) -> bytes:
+    """The figure as a file in memory: "png", "svg" or "pdf", whose text stays text."""
     buffer = BytesIO()
-    with warnings.catch_warnings():  # a name in letters that the font lacks is shown as boxes
+    with warnings.catch_warnings(), mpl.rc_context(TEXT):
+        # A name in letters that the font lacks is shown as boxes.
         warnings.filterwarnings("ignore", "Glyph")
-        figure.savefig(buffer, format="png", dpi=dpi)
+        figure.savefig(buffer, format=kind, dpi=dpi)
     return buffer.getvalue()
 
 
-def tacton_figure(title: str, runs: list[Run]) -> Figure:
+def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     """Waveform and spectrum at each probe, all models overlaid."""
+    with mpl.rc_context(style.rc):
+        return _tacton_figure(title, runs, style)
+
+
+def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     probes = runs[0].response.probes
-    figure = Figure(figsize=(10.5, 1.6 * len(probes) + 1.3))
+    figure = Figure(figsize=style.size(10.5, 1.6 * len(probes) + 1.3))
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
     for p, (x, y) in enumerate(probes):
         _waveforms(axes[p, 0], runs, p)
         _spectra(axes[p, 1], runs, p, named=p == 0)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
     axes[0, 0].set_title(
-        f"{title}: waveform about its mean, in units of the model", fontsize=10, parse_math=False
-    )
-    axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize=10)
+        f"{title}\nwaveform about its mean, over the model's largest",
+        fontsize="medium", parse_math=False,
+    )  # fmt: skip
+    axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize="medium")
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
     _legend(figure, runs, scales=True)
     inch = 1 / figure.get_figheight()  # fixed margins: a computed layout takes twice as long
-    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - 0.65 * inch, wspace=0.1, hspace=0.13)
+    top = 0.8 + 0.2 * (len(runs) > IN_A_ROW)
+    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
     return figure
 
 
@@ -119,7 +140,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         handles,
         labels,
         loc="outside upper center" if figure.get_layout_engine() else "upper center",
-        ncols=len(labels),
+        ncols=len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2),
         frameon=False,
     )
 
@@ -127,8 +148,8 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
 def _scale_text(run: Run) -> str:
     scale = _largest(run)
     if run.response.unit == "Pa":
-        return f"{scale:.3g} Pa"
-    return f"{1e6 * scale:.3g} µm"
+        return f"{significant(scale)} Pa"
+    return f"{significant(1e6 * scale)} µm"
 
 
 def _shown(run: Run) -> slice:
@@ -142,8 +163,9 @@ def _largest(run: Run) -> float:
 
 
 def _centred(run: Run) -> Floats:
-    shown = run.response.displacement[_shown(run)]
-    return shown - (shown.max(axis=0) + shown.min(axis=0)) / 2
+    """Motion (t, p) in the part that is shown, about its mean after the start."""
+    motion = run.response.displacement
+    return motion[_shown(run)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
 
 def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
@@ -183,7 +205,7 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
             if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize=8,
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small",
                         bbox={"fc": "white", "ec": "none", "pad": 0.5})  # fmt: skip
 
 
@@ -205,7 +227,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
     if path:
         ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
-        ax.text(path, -58, " focus path", fontsize=8, color="0.4", va="bottom")
+        ax.text(path, -58, " focus path", fontsize="small", color="0.4", va="bottom")
     ax.set_ylim(-60, 4)
     ax.grid(alpha=0.25)
 

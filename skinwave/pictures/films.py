@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 
 from skinwave.effort import Progress, silent
-from skinwave.models.speeds import period
+from skinwave.models import speeds
+from skinwave.numbers import significant
 from skinwave.pictures.figures import COLOURS, SPARE
 from skinwave.pictures.render import Image, stage
 from skinwave.pictures.styles import Style
 from skinwave.pictures.views import View
 
-LASTS = 4.0  # s that a period lasts on the screen
+LASTS = 4.0  # s that a film lasts on the screen,
+EACH = 0.04  # s that a frame does at least
+ROUND_OFF = 1e-4  # of a turn
 FORMATS = (".gif", ".mp4")
 ENCODER = ("imageio", "imageio_ffmpeg")
 SHADES = 240  # colours of a GIF that are found in its frames; the rest are those of the page
@@ -29,8 +32,8 @@ def film(
     camera: str = "tilted",
     panel: tuple[int, int] | None = None,
 ) -> None:
-    """Write the views' frames, one period in the steady state, which repeats without a seam where
-    the load is periodic.
+    """Write the views' frames, one period of the whole pattern in the steady state, which repeats
+    without a seam where the load is periodic.
 
     Raises
     ------
@@ -64,10 +67,23 @@ def check_format(path: Path) -> None:
 
 def seam(view: View) -> str:
     """What part of a view's motion is shown, and whether it repeats without a seam, in words."""
-    span = f"{1e3 * view.period:.3g} ms"
-    if period(view.scene.pressure) is not None:
+    span, whole = f"{significant(1e3 * view.period)} ms", speeds.period(view.scene.pressure)
+    jump = speeds.seam(view.scene.tacton, view.period)
+    if jump < ROUND_OFF:
         return f"one period of {span}, which repeats without a seam"
-    return f"{span}, a period of the slowest tone; the load as a whole has none and leaves a seam"
+    of = (
+        f"a pattern of {significant(1e3 * whole)} ms"
+        if whole
+        else "a pattern that never quite repeats"
+    )
+    return (
+        f"{span} of {of}; where it begins again, phases jump by up to {100 * jump:.2g} % of a turn"
+    )
+
+
+def lasts(frames: int) -> float:
+    """How long in s a film of so many frames is shown."""
+    return max(LASTS, EACH * frames)
 
 
 def _frames(
@@ -95,7 +111,7 @@ def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
     ]
     shown[0].save(
         path, save_all=True, append_images=shown[1:], loop=0, optimize=False,
-        duration=round(1e3 * LASTS / len(frames) / 10) * 10,  # ms, in steps of ten
+        duration=round(100 * lasts(len(frames)) / len(frames)) * 10,  # ms, in steps of ten
     )  # fmt: skip
 
 
@@ -103,6 +119,6 @@ def _write_mp4(path: Path, frames: Iterator[Image], count: int) -> None:
     import imageio.v2 as imageio
 
     writer: Any
-    with imageio.get_writer(path, fps=count / LASTS, macro_block_size=16) as writer:
+    with imageio.get_writer(path, fps=count / lasts(count), macro_block_size=16) as writer:
         for frame in frames:
             writer.append_data(frame)

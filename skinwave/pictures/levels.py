@@ -26,7 +26,7 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     """
     runs = [run for run in runs if run.response.unit == "m"]
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(5.2 * max(len(runs), 1), 4.4), layout="constrained")
+        figure = Figure(figsize=style.size(5.2 * max(len(runs), 1), 4.4), layout="constrained")
         axes = figure.subplots(1, max(len(runs), 1), sharex=True, sharey=True, squeeze=False)[0]
         for ax, run in zip(axes, runs, strict=False):
             _draw(ax, run, probe)

@@ -15,6 +15,7 @@ from matplotlib.tri import Triangulation
 from meshes.tetmesh import Floats
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
+from skinwave.numbers import significant
 from skinwave.pictures.figures import colour, label
 from skinwave.pictures.styles import Style
 from skinwave.pictures.views import Trace, View, path_points, spread_radius, starting_time
@@ -25,7 +26,7 @@ DEEPEST = -40.0  # dB shown
 FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
 DROPS = {-6: "solid", -20: "dashed"}
 FELT = "#ff2fd0"  # the borderline of what is felt
-MAP = 3.4  # inch, side of a map
+MAP, LEGEND = 3.4, 0.4  # inch, side of a map and height of a legend
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,7 +88,7 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
     """
     raster = common_raster(views)
     with mpl.rc_context(style.rc):
-        figure, axes = _panels(len(views))
+        figure, axes = _panels(len(views), style)
         for ax, view in zip(axes, views, strict=True):
             sampled = sampler(view, raster)
             level = sampled(decibel(view))
@@ -116,7 +117,7 @@ def difference_figure(reference: View, views: Sequence[View], style: Style) -> F
     """By how many dB each model moves more or less than the reference, each re its own largest."""
     raster = common_raster([reference, *views])
     with mpl.rc_context(style.rc):
-        figure, axes = _panels(len(views))
+        figure, axes = _panels(len(views), style, 0.0)
         base = np.maximum(sampler(reference, raster)(decibel(reference)), DEEPEST)
         for ax, view in zip(axes, views, strict=True):
             more = np.maximum(sampler(view, raster)(decibel(view)), DEEPEST) - base
@@ -129,17 +130,20 @@ def difference_figure(reference: View, views: Sequence[View], style: Style) -> F
 
 
 def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Figure:
-    """The surface of each model at equal parts of a period, over its own largest motion."""
-    raster = common_raster(views)
+    """The surface of each model at equal parts of a period, over its own largest motion; the last
+    view's largest is among them.
+    """
+    raster, all_of_them = common_raster(views), len(views[0].times)
+    first = int(np.abs(views[-1].pushed).max(axis=1).argmax())
+    frames = sorted((first + k * all_of_them // count) % all_of_them for k in range(count))
     side = 0.8 * MAP
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(side * count + 2.0, side * len(views) + 1.0),
-                        layout="constrained")  # fmt: skip
+        size = style.size(side * count + 2.0, side * len(views) + 1.0)
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(views), count, sharex=True, sharey=True, squeeze=False)
         for row, view in zip(axes, views, strict=True):
             sampled = sampler(view, raster)
-            for k, ax in enumerate(row):
-                frame = k * len(view.times) // count
+            for frame, ax in zip(frames, row, strict=True):
                 image = ax.imshow(
                     sampled(view.pushed[frame] / view.peak), cmap=SIGNED, vmin=-1,
                     vmax=1, extent=raster.frame, origin="lower",
@@ -148,8 +152,8 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 _draw_focus(ax, view, float(view.times[frame]))
             row[0].set_ylabel(f"{label(view.column)}\n±1 = {peak_text(view)}\ny, mm",
                               color=_readable(view, style))  # fmt: skip
-        for k, ax in enumerate(axes[0]):
-            ax.set_title(f"{1e3 * views[0].times[k * len(views[0].times) // count]:.2f} ms")
+        for frame, ax in zip(frames, axes[0], strict=True):
+            ax.set_title(f"{1e3 * views[0].times[frame]:.2f} ms")
         for ax in axes[-1]:
             ax.set_xlabel("x, mm")
         figure.colorbar(image, ax=axes, label="motion into the body about its mean\n"
@@ -178,8 +182,8 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
     traced = [("ray", "distance outwards from the path, mm")]
     traced += [("track", "place along the path, mm")] if views[0].track else []
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3),
-                        layout="constrained")  # fmt: skip
+        size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(traced), len(views), squeeze=False)
         for row, (name, x_label) in zip(axes, traced, strict=True):
             for ax, view in zip(row, views, strict=True):
@@ -201,13 +205,13 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
 def peak_text(view: View) -> str:
     """The largest motion of a view with its unit."""
     if view.unit == "Pa":
-        return f"{view.peak:.3g} Pa"
-    return f"{1e6 * view.peak:.3g} µm"
+        return f"{significant(view.peak)} Pa"
+    return f"{significant(1e6 * view.peak)} µm"
 
 
-def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
-    """Maps side by side, in mm."""
-    figure = Figure(figsize=(MAP * count + 1.2, MAP + 0.9), layout="constrained")
+def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Sequence[Axes]]:
+    """Maps side by side, in mm, with so much room in inch for what stands below them."""
+    figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for ax in axes:
         ax.set_xlabel("x, mm")

@@ -5,20 +5,31 @@ from typing import Any
 
 from simple_model.choices import choose
 
+ONE_COLUMN = 6.5  # inch on a screen: wider figures take two columns in print
+
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """Colours of `paper` and `ink`; `font` size in points of figures, `dpi`; for views in three
-    dimensions the `panel` in pixels (width, height) of one model, and how many times finer it is
-    drawn than shown, `oversampling`.
+    """Colours of `paper` and `ink`; `font` size in points of figures, `dpi`; `columns`, the widths
+    in inch of one column of a printed page and of two, if figures are to have these; for views in
+    three dimensions the `panel` in pixels (width, height) of one model, and how many times finer it
+    is drawn than shown, `oversampling`.
     """
 
     paper: str = "#ffffff"
     ink: str = "#222222"
     font: float = 10.0
     dpi: int = 110
+    columns: tuple[float, float] | None = None
     panel: tuple[int, int] = (480, 432)
     oversampling: int = 1
+
+    def size(self, width: float, height: float) -> tuple[float, float]:
+        """Width and height in inch of a figure that would be so large on a screen."""
+        if self.columns is None:
+            return width, height
+        column = self.columns[width > ONE_COLUMN]
+        return column, column * height / width
 
     @property
     def rc(self) -> Any:
@@ -27,8 +38,6 @@ class Style:
         papers = ("figure.facecolor", "axes.facecolor", "savefig.facecolor")
         return {
             "font.size": self.font,
-            "svg.fonttype": "none",
-            "pdf.fonttype": 42,
             **dict.fromkeys(inks, self.ink),
             **dict.fromkeys(papers, self.paper),
         }
@@ -37,7 +46,7 @@ class Style:
 STYLES = {
     "report": Style(),
     "talk": Style(paper="#15181c", ink="#f2f2f2", font=14.0, dpi=150, panel=(640, 576)),
-    "print": Style(ink="#000000", font=9.0, dpi=300, panel=(480, 432), oversampling=2),
+    "print": Style(ink="#000000", font=7.5, dpi=300, columns=(3.5, 7.0), oversampling=2),
 }
 
 

@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 
 import fem
 from meshes.tetmesh import Floats, Ints
-from simple_model import Effort, sensation_level
+from simple_model import Effort, MovingPressure, sensation_level
 from simple_model.steady import along_path, load_lines, path_knots, summed
-from skinwave.models.speeds import shown_period, strongest_tone, surface_speed
+from skinwave.models.speeds import repeated, shown_part, strongest_tone, surface_speed
 from skinwave.pictures.motion import Waves, line_amplitudes, vibration
 from skinwave.run import is_skin
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
 
-FRAMES = 40  # through a period
+STRONG = 0.1  # of the strongest line: weaker ones need no frames of their own
+SLOWEST = 20.0  # Hz: slower tones are not followed by diagrams of motion over place and time
 GRID = 121  # points along a side of the point kernel's surface
 ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
 TYPICAL = 140.0  # Hz, where nothing vibrates
@@ -53,7 +54,8 @@ class View:
     body : name of the body, by which it has its colour; model, unit ("m" or "Pa"), scene
     points : (n, 3) float, metre; tets : (m, 10) int, none for the point kernel, which has no body
     surface : (s,) int, the points of the upper surface; triangles : (k, 3) int, of these
-    times : (f,) float, s, through one period `period` of the steady state
+    times : (f,) float, s, through the part of the steady state that is played, `period`: that of
+        the whole pattern, see `speeds.shown_part`
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
     rms, sensation : (s,) float, motion into the body about its mean in the unit, and the level in
         dB of its strongest line above the threshold of detection, of the point kernel above that
@@ -103,9 +105,25 @@ class View:
         return float(np.abs(self.pushed).max()) or 1.0
 
 
-def body_view(scene: Scene, body: str, moved: Waves, frames: int = FRAMES) -> View:
-    """A body's view, from all of its motion."""
-    mesh, period = moved.mesh, shown_period(scene.pressure)
+def fastest_line(moved: Waves) -> float:
+    """The highest line in Hz that moves a body by `STRONG` of what its strongest one does."""
+    moving = moved.frequencies > 0
+    lines = moved.lines[moving]
+    power = np.einsum("fm,mn,fn->f", lines.conj(), moved.basis.T @ moved.basis, lines).real
+    return _fastest(moved.frequencies[moving], power)
+
+
+def _fastest(frequencies: Floats, power: Floats) -> float:
+    counts = (power > 0) & (power >= STRONG**2 * power.max(initial=0.0))
+    return float(frequencies[counts].max(initial=0.0))
+
+
+def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | None = None) -> View:
+    """A body's view, from all of its motion; `part` is how long it is played, s, and in how many
+    frames, `speeds.shown_part` of its own motion if not given.
+    """
+    mesh = moved.mesh
+    period, frames = part or shown_part(scene.pressure, fastest_line(moved))
     surface, triangles = _upper(mesh.facets["top"])
     times = np.arange(frames) * period / frames
     motion = vibration(moved, times) @ moved.basis.T
@@ -131,30 +149,34 @@ def body_view(scene: Scene, body: str, moved: Waves, frames: int = FRAMES) -> Vi
     )  # fmt: skip
 
 
-def kernel_view(scene: Scene, reach: Floats, frames: int = FRAMES) -> View:
-    """The point kernel's view, on a flat square as far as `reach` (2,) in metre either way."""
-    pressure, period = scene.pressure, shown_period(scene.pressure)
+def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = None) -> View:
+    """The point kernel's view, on a flat square as far as `reach` (2,) in metre either way; `part`
+    is how long it is played, s, and in how many frames, as `body_view` takes it.
+    """
+    pressure = scene.pressure
     points, triangles = _grid(reach)
+    frequencies, patterns = _pressure_lines(pressure, points)
+    moving = frequencies > 0
+    amplitudes = np.abs(patterns[moving])
+    fastest = _fastest(frequencies[moving], (amplitudes**2).sum(axis=1))
+    period, frames = part or shown_part(pressure, fastest)
     times = np.arange(frames) * period / frames
-    lines = load_lines(pressure)
-    of_path = along_path(pressure.spot(points, path_knots(pressure)).T).T
-    frequencies, patterns = summed(
-        lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics]
-    )
-    still = frequencies == 0
-    mean = patterns[still].real.sum(axis=0)
-    amplitudes = np.abs(patterns[~still])
     motion = np.zeros((frames, len(points), 3), np.float32)
-    motion[:, :, 2] = mean - pressure(points, times)
-    levels = sensation_level(amplitudes, frequencies[~still][:, None], unit="Pa")
+    motion[:, :, 2] = patterns[~moving].real.sum(axis=0) - pressure(points, times)
+    levels = sensation_level(amplitudes, frequencies[moving][:, None], unit="Pa")
+
+    def trace(places: Floats, t: Floats) -> Floats:
+        f, of_place = _pressure_lines(pressure, places)
+        return pressure(places, t) - of_place[f == 0].real.sum(axis=0)
+
     return View(
         body="none", model="point-kernel", unit="Pa", scene=scene, points=points,
         tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
         period=period, times=times, motion=motion,
         rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
         sensation=levels.max(axis=0, initial=-np.inf),
-        tone=strongest_tone(frequencies[~still], amplitudes),
-        speed=None, ray=_ray(scene, reach, pressure), track=_track(scene, pressure),
+        tone=strongest_tone(frequencies[moving], amplitudes),
+        speed=None, ray=_ray(scene, reach, trace), track=_track(scene, trace),
     )  # fmt: skip
 
 
@@ -245,6 +267,13 @@ def _grid(reach: Floats) -> tuple[Floats, Ints]:
     return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
 
 
+def _pressure_lines(pressure: MovingPressure, points: Floats) -> tuple[Floats, fem.Complex]:
+    """Distinct frequencies (g,) in Hz and the load's complex lines (g, n) in Pa at points."""
+    lines = load_lines(pressure)
+    of_path = along_path(pressure.spot(points, path_knots(pressure)).T).T
+    return summed(lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics])
+
+
 def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
     path = path_points(scene)
     origin = path[np.argmax(path[:, 0])]
@@ -266,9 +295,8 @@ def _track(scene: Scene, motion: Motion) -> Trace | None:
 
 
 def _traced(scene: Scene, places: Floats, distance: Floats, motion: Motion) -> Trace:
-    """Motion about its mean through two periods, of the load or of the path if that is longer."""
-    f_d = scene.tacton.trajectory.drawing_frequency
-    span = 2 * max(shown_period(scene.pressure), 1 / f_d if f_d else 0.0)
-    times = np.arange(INSTANTS) / INSTANTS * span
-    moved = motion(places, times)
-    return Trace(places=places, distance=distance, times=times, motion=moved - moved.mean(axis=0))
+    """Motion through two periods of the slowest tone, or of the path if that is slower."""
+    path = scene.tacton.trajectory.drawing_frequency
+    tones = [f for f in repeated(scene.tacton).values() if f >= SLOWEST] + [path] * bool(path)
+    times = np.arange(INSTANTS) / INSTANTS * 2 / min(tones, default=SLOWEST)
+    return Trace(places=places, distance=distance, times=times, motion=motion(places, times))

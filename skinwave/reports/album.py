@@ -1,7 +1,7 @@
 """A scene's answers by every model that pictures put side by side, kept in a folder.
 
 scene.toml  plan.json  trust.json  lines.csv
-BODY/scene.toml  response.npz  lines.csv  effort.json  view.npz  probes.csv  probes.npz
+COLUMN/scene.toml  response.npz  lines.csv  effort.json  view.npz
 """
 
 import json
@@ -12,22 +12,24 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Effort, Response, point_kernel
+from simple_model import Effort, Response, published
+from simple_model.choices import choose
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.files import fill, write_lines
-from skinwave.models.prepared import answer, sample_times
-from skinwave.pictures.motion import assessed_probes, waves
-from skinwave.pictures.views import FRAMES, View, body_view, kernel_view, load, save
+from skinwave.models.prepared import answer
+from skinwave.models.speeds import repeated, shown_part
+from skinwave.pictures.motion import Waves, assessed_probes, waves
+from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Scene, with_body
+from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
+from skinwave.studies import paper15
 from skinwave.verify.suite import suite
 
-PUBLISHED = {"drive": "linear", "focus": "main_lobe"}
-PHYSICAL = {"drive": "pressure_squared", "focus": "gaussian"}
+KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
 PLANNED = 0.05  # tolerance of the plan that stands on the page
 CASES = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a second or two in all
 
@@ -46,25 +48,44 @@ class Album:
     trust: Mapping[str, Any] | None
 
 
-def shown_scenes(scene: Scene) -> dict[str, Scene]:
-    """The scene as published, on a sheet and on a slab, by body name; its own body among them.
+def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
+    """The scene by `Run.column`: by both point kernels and on its own body or, without one, on
+    those of the paper sheet and the skin slab that its path and probes fit on. All but the
+    published kernel receive the same load.
 
-    A preset body that the scene's path or probes do not fit on is left out.
+    Parameters
+    ----------
+    beside : names of preset bodies that it is put on, too
+
+    Raises
+    ------
+    ValueError
+        If a body beside it is unknown, or the path or probes do not fit on it.
     """
-    found = {"none": with_body(scene, BODIES["none"], **PUBLISHED)}
-    own = next((name for name, body in BODIES.items() if body == scene.body), scene.body.kind)
-    physical = PHYSICAL if scene.body.kind == "none" else {}
-    for name in ("paper-sheet", "skin-slab"):
-        if BODIES[name].kind == scene.body.kind:
-            found[own] = scene
-            continue
-        try:
-            found[name] = with_body(scene, BODIES[name], **physical)
-        except ValueError:
-            continue
-    if scene.body.kind not in ("none", "sheet", "slab"):
-        found[own] = scene
-    return found
+    bodies: dict[str, Scene] = {}
+    if scene.body.kind != "none":
+        bodies[body_name(scene.body)] = scene
+    for name in beside:
+        choose("body", name, [n for n in BODIES if n != "none"])
+        other = with_body(scene, BODIES[name])
+        if bodies.setdefault(name, other) != other:
+            raise ValueError(f"the scene's own body is shown as '{name}'; leave it out of --beside")
+    if not bodies:
+        bodies = {n: on for n in paper15.MEASURED_ON if (on := _fitting(scene, n))}
+    return paper15.beside_kernels(scene) | bodies
+
+
+def body_name(body: Body) -> str:
+    """The name of a preset body, or else the kind of a body."""
+    return next((name for name, known in BODIES.items() if known == body), body.kind)
+
+
+def _fitting(scene: Scene, name: str) -> Scene | None:
+    """The scene on a preset body; None if its path or probes do not fit on that."""
+    try:
+        return with_body(scene, BODIES[name])
+    except ValueError:
+        return None
 
 
 def make(
@@ -74,22 +95,29 @@ def make(
     *,
     h: float | None = None,
     solver: str = "auto",
-    frames: int = FRAMES,
+    frames: int | None = None,
+    beside: Sequence[str] = (),
     command: str = "",
 ) -> list[str]:
     """Answer a scene by every model and fill a folder with it; the warnings of all of them.
+
+    Parameters
+    ----------
+    beside : names of preset bodies that are shown, too
 
     Raises
     ------
     ValueError
         If a model refuses the scene.
     """
+    shown = shown_scenes(scene, beside)
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs = []
-    for view, run in answers(scene, progress, h=h, solver=solver, frames=frames):
-        (folder / run.body).mkdir()
-        fill(folder / run.body, run)
-        save(folder / run.body / "view.npz", view)
+    for view, run in answers(scene, shown, progress, h=h, solver=solver, frames=frames):
+        (folder / run.column).mkdir()
+        fill(folder / run.column, run)
+        if view is not None:
+            save(folder / run.column / "view.npz", view)
         runs.append(run)
     write_lines(folder / "lines.csv", runs)
     _plan(folder, scene, runs, progress, solver, command)
@@ -98,34 +126,41 @@ def make(
 
 def answers(
     scene: Scene,
+    shown: Mapping[str, Scene],
     progress: Progress,
     *,
     h: float | None = None,
     solver: str = "auto",
-    frames: int = FRAMES,
-) -> Iterator[tuple[View, Run]]:
-    """A scene's view and run by every model, one at a time; raises what `make` does."""
-    for body, its in shown_scenes(scene).items():
-        progress(f"answer on {body}", 0.0)
-        view, response = _answer(its, body, progress, h, solver, frames)
-        yield view, Run(tacton=scene.name, body=body, scene=its, response=response)
+    frames: int | None = None,
+) -> Iterator[tuple[View | None, Run]]:
+    """The runs of `shown_scenes`, one at a time, each with its view; there is none of the published
+    kernel, whose load is another one. Raises what `make` does.
+    """
+    moved = {
+        body: _moved(its, body, progress, h, solver)
+        for body, its in shown.items()
+        if its.body.kind != "none"
+    }
+    tones = max(repeated(scene.tacton).values(), default=0.0)
+    fastest = max(map(fastest_line, moved.values()), default=tones)
+    part = shown_part(scene.pressure, fastest, frames)  # the same for all, side by side
+    for column, its in shown.items():
+        progress(f"answer by {column}", 0.0)
+        if column in moved:
+            progress(f"{column}: compare with a coarser mesh", 0.0)
+            response = assessed_probes(its, moved[column], h, PLANNED, solver)
+            run = Run(tacton=scene.name, body=column, scene=its, response=response)
+            yield body_view(its, column, moved[column], part), run
+        else:
+            run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
+            yield kernel_view(its, KERNEL_REACH, part) if column == "point-kernel" else None, run
 
 
-def _answer(
-    scene: Scene, body: str, progress: Progress, h: float | None, solver: str, frames: int
-) -> tuple[View, Response]:
-    if scene.body.kind == "none":
-        reach = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
-        response = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
-        return kernel_view(scene, reach, frames), response
-
+def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
     def named(phase: str, fraction: float) -> None:
         progress(f"{body}: {phase}", fraction)
 
-    moved = waves(scene, progress=named, h=h, solver=solver)
-    named("compare with a coarser mesh", 0.0)
-    response = assessed_probes(scene, moved, h, PLANNED, solver)
-    return body_view(scene, body, moved, frames), response
+    return waves(scene, progress=named, h=h, solver=solver)
 
 
 def _plan(
@@ -177,19 +212,36 @@ def open_album(folder: Path) -> Album:
     runs = [_run(path) for path in sorted(folder.rglob("response.npz"), key=_order)]
     if not runs:
         raise ValueError(f"{folder} holds no response.npz; give a scene file or a result folder")
-    views = {path.parent.name: load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)}
+    views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own = folder / "scene.toml"
     scene = read(own) if own.exists() else runs[-1].scene
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
-        views=views, planned=_json(folder / "plan.json"), trust=_json(folder / "trust.json"),
+        views={view.column: view for view in views}, planned=_json(folder / "plan.json"),
+        trust=_json(folder / "trust.json"),
     )  # fmt: skip
 
 
 def _order(path: Path) -> tuple[str, int, str]:
-    """By Tacton, then in the order in which bodies are named everywhere."""
-    body, known = path.parent.name, list(BODIES)
-    return str(path.parent.parent), known.index(body) if body in known else len(known), body
+    """By Tacton, then the point kernels, then in the order in which bodies are named everywhere."""
+    column, known = path.parent.name, ["point-kernel-published", "point-kernel", *BODIES]
+    place = known.index(column) if column in known else len(known)
+    return str(path.parent.parent), place, column
+
+
+def _view(path: Path) -> View:
+    view = load(path)
+    return replace(view, model=_kernel_of(path, view.scene, view.model))
+
+
+def _kernel_of(path: Path, scene: Scene, model: str) -> str:
+    """The model by which a file was written: the folder `none` of releases up to 0.2 holds the
+    point kernel under the published load, by the name that now says the scene's own.
+    """
+    old = path.parent.name == "none" and model == "point-kernel"
+    if old and scene.pressure == published(scene.pressure):
+        return "point-kernel-published"
+    return model
 
 
 def _run(path: Path) -> Run:
@@ -198,6 +250,7 @@ def _run(path: Path) -> Run:
         with np.load(path) as file:
             model = next(n for n in file.files if n not in ("t", "probes", "displacement"))
             times, probes, motion = file["t"], file["probes"], file[model]
+            model = _kernel_of(path, scene, model)
     except (OSError, ValueError, KeyError, StopIteration) as error:
         raise ValueError(f"{path} is no result ({error}); run its scene again") from None
     effort = _json(path.parent / "effort.json")
@@ -206,8 +259,7 @@ def _run(path: Path) -> Run:
         unit="Pa" if model.startswith("point-kernel") else "m",
         effort=Effort(**effort) if effort else Effort(),
     )  # fmt: skip
-    known = (name for name, body in BODIES.items() if body == scene.body)
-    return Run(tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response)
+    return Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
 
 
 def _json(path: Path) -> dict[str, Any] | None:

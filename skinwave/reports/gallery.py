@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import features
 
-from skinwave import document
+from skinwave import document, numbers
 from skinwave.effort import Progress
 from skinwave.pictures import maps, render
-from skinwave.pictures.figures import label, png, tacton_figure
-from skinwave.pictures.films import film, seam
+from skinwave.pictures.figures import drawn, label, tacton_figure
+from skinwave.pictures.films import film, lasts, seam
 from skinwave.pictures.levels import levels_figure, strongest_probe
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
@@ -25,7 +25,7 @@ from skinwave.run import Run
 
 FORMATS = ("png", "svg", "pdf")
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
-QUALITY = 88  # of pictures inside a page
+QUALITY, FILM_QUALITY = 88, 60  # of pictures inside a page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,12 +38,11 @@ class Gallery:
 
     def figure(self, name: str, figure: Figure, caption: str) -> str:
         """A figure as files, and as a part of the page."""
-        drawn = png(figure, self.style.dpi)
-        (self.folder / f"{name}.png").write_bytes(drawn)
-        for ending in self.formats:
-            if ending != "png":
-                figure.savefig(self.folder / f"{name}.{ending}", dpi=self.style.dpi)
-        return _part(np.asarray(Pillow.open(io.BytesIO(drawn)).convert("RGB")), caption, name)
+        for ending in {"png", *self.formats}:
+            path = self.folder / f"{name}.{ending}"
+            path.write_bytes(drawn(figure, ending, self.style.dpi))
+        with Pillow.open(self.folder / f"{name}.png") as image:
+            return _part(np.asarray(image.convert("RGB")), caption, name)
 
     def image(self, name: str, image: render.Image, caption: str) -> str:
         """A view in three dimensions as a PNG, and as a part of the page."""
@@ -61,7 +60,7 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
     else:
         said = f"Views in three dimensions and the film are left out: {renderer().said}."
         parts = [document.paragraph(said)]
-    for name, draw, caption in _flat(views, gallery.style):
+    for name, draw, caption in flat(views, gallery.style):
         progress(f"draw {name}", 0.0)
         parts.append(gallery.figure(name, draw(), caption))
     return parts
@@ -80,10 +79,10 @@ def _spatial(
     parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
     path = gallery.folder / "film.gif"
     film(path, views, style, progress, panel=FILM_PANEL)
-    parts.append(document.picture(path.read_bytes(), f"Film: {seam(own)}.", "film", "gif"))
+    parts.append(_film_part(path, _film(own)))
     if len(own.tets):
         progress("draw cut open", 0.0)
-        cut = render.picture([own], style, frame, camera="front", cut=True)
+        cut = render.picture([own], style, _behind(own), camera="front", cut=True)
         caption = (
             f"{label(own.column)} cut open along y = 0, the section below the black line: "
             f"{render.shown_scale(own)}. {MARKS}"
@@ -105,12 +104,12 @@ def _spatial(
     return parts
 
 
-def _flat(
+def flat(
     views: Sequence[View], style: Style
 ) -> Iterable[tuple[str, Callable[[], Figure], str]]:  # fmt: skip
     """Name, how it is drawn and caption of every map."""
     bodies = [view for view in views if view.unit == "m"]
-    kernel = next((view for view in views if view.unit == "Pa"), None)
+    kernel = next((view for view in views if view.column == "point-kernel"), None)
     yield "rms", lambda: maps.rms_figure(views, style), RMS
     if kernel and bodies:
         yield "difference", lambda: maps.difference_figure(kernel, bodies, style), DIFFERENCE
@@ -123,12 +122,23 @@ def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]
     parts: list[str] = []
     for name, runs in tactons(album).items():
         progress(f"draw {name}", 0.0)
-        caption = "Waveforms and spectra. Rows are probes."
-        parts.append(gallery.figure(f"waveforms-{len(parts)}", tacton_figure(name, runs), caption))
+        figure = tacton_figure(name, runs, gallery.style)
+        parts.append(gallery.figure(f"waveforms-{len(parts)}", figure, _waveforms(runs)))
         if any(run.response.unit == "m" for run in runs):
-            drawn = levels_figure(runs, strongest_probe(runs), gallery.style)
-            parts.append(gallery.figure(f"felt-{len(parts)}", drawn, f"{name}. {FELT}"))
+            figure = levels_figure(runs, strongest_probe(runs), gallery.style)
+            parts.append(gallery.figure(f"felt-{len(parts)}", figure, f"{name}. {FELT}"))
     return parts
+
+
+def _waveforms(runs: Sequence[Run]) -> str:
+    """What the waveforms of a Tacton show, and what each difference between them comes from."""
+    columns = [run.column for run in runs]
+    text = "Waveforms and spectra. Rows are probes."
+    if {"point-kernel-published", "point-kernel"} <= set(columns):
+        text += f" {LOADS}"
+    if "point-kernel" in columns and any(run.response.unit == "m" for run in runs):
+        text += f" {PROPAGATED}"
+    return text
 
 
 def tactons(album: Album) -> dict[str, list[Run]]:
@@ -151,6 +161,30 @@ def _drawn(views: Sequence[View]) -> str:
     return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
 
 
+def _behind(view: View) -> int:
+    """The frame of the largest motion among those whose focus is on the half that is drawn."""
+    largest = np.abs(view.pushed).max(axis=1)
+    seen = view.scene.tacton.trajectory.position(view.times)[:, 1] >= 0
+    return int(np.where(seen, largest, -1.0).argmax())
+
+
+def _film_part(path: Path, caption: str) -> str:
+    """A film as a part of the page, in a third of the bytes of its GIF where that can be done."""
+    if not features.check("webp"):
+        return document.picture(path.read_bytes(), caption, "film", "gif")
+    buffer = io.BytesIO()
+    with Pillow.open(path) as film:
+        film.save(buffer, format="webp", save_all=True, quality=FILM_QUALITY, method=2, loop=0)
+    return document.picture(buffer.getvalue(), caption, "film", "webp")
+
+
+def _film(view: View) -> str:
+    """What the film plays, and how much more slowly."""
+    count = len(view.times)
+    slower = numbers.significant(lasts(count) / view.period, 2)
+    return f"Film: {seam(view)}. {count} frames, {slower} times more slowly."
+
+
 def _part(image: render.Image, caption: str, name: str) -> str:
     """A picture in as few bytes as a browser needs."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
@@ -164,31 +198,39 @@ NO_VIEWS = (
 )
 MARKS = "Black: path and focus; yellow: probes."
 COMPARED = (
-    "Colour: motion into the body about its mean over each model's largest, and the point "
-    "kernel's pressure likewise: a pressure and a motion have no common unit."
+    "Colour: motion into the body about its mean, or the point kernel's pressure, over each "
+    "model's largest: a pressure and a motion have no common unit. All receive the same load."
 )
 RMS = (
-    "RMS motion about its mean over the whole steady state, relative to each model's largest; "
-    "spread is the distance of the outermost -6 and -20 dB from the centre of the path. Just "
-    "felt: a body's strongest line at its threshold for a focal spot; the point kernel's peak "
+    "RMS motion about its mean over the whole steady state, relative to each model's largest. All "
+    "models receive the same load, so that a body's map differs from the kernel's by propagation "
+    "alone. Spread is the distance of the outermost -6 and -20 dB from the centre of the path. "
+    "Just felt: a body's strongest line at its threshold for a focal spot; the point kernel's peak "
     "pressure at the 4.4 Pa that is felt with AM at 200 Hz."
 )
 DIFFERENCE = (
-    "Where waves carry motion that the point kernel knows nothing of (red), and where it "
-    "promises more than there is (blue). Levels are each relative to the model's own largest; "
-    "below -40 dB they count as -40 dB."
+    "What propagation changes: the level of a body's RMS motion minus that of the point kernel's "
+    "pressure under the same load, each relative to its own largest. Red: waves carry motion to "
+    "where the kernel predicts less; blue: the kernel predicts more than the body moves. Levels "
+    "below -40 dB count as -40 dB."
 )
 SNAPSHOTS = (
-    "The surface through a period. Behind a focus that is faster than the surface wave, the Mach "
-    "angle asin(c/v); no clean cone forms on a circle smaller than a wavelength."
+    "The surface at equal parts of what the film plays. Behind a focus that is faster than the "
+    "surface wave, the Mach angle asin(c/v); no clean cone forms on a circle smaller than a "
+    "wavelength."
 )
 WAVES = (
-    "Motion over place and time in the steady state. Above: outwards along x from the path's "
-    "outermost point; the dashed lines x = c t are those of a surface wave far from its source in "
-    "a deep or endless body. Near the path and in thin slabs the phase runs ahead of them, a "
-    "clamped sheet stands rather than runs, and in the point kernel nothing runs at all. "
-    "Below: along the path; the focus runs along the black lines."
+    "Motion over place and time in the steady state, two periods of the slowest tone. Above: "
+    "outwards along x from the path's outermost point; the dashed lines x = c t are those of a "
+    "surface wave far from its source in a half-space or an infinite sheet. Near the path and in "
+    "thin slabs the phase runs ahead of them, in a clamped sheet waves stand, and in the point "
+    "kernel nothing propagates. Below: along the path; the focus runs along the black lines."
 )
+LOADS = (
+    "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "
+    "others have the scene's: what the two kernels differ by, drive law and focal spot change."
+)
+PROPAGATED = "What a body differs by from the kernel under the same load, propagation changes."
 FELT = (
     "Lines of the motion at the probe that moves most, beside the threshold of detection (a focal "
     "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."

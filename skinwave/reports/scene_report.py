@@ -8,6 +8,7 @@ from typing import Any
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
+from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
 from skinwave.pictures.renderer import renderer
@@ -20,6 +21,7 @@ from skinwave.scene_file import dumps
 from skinwave.studies import tables
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import (
+    SPOTS,
     above,
     extent,
     levels_of,
@@ -87,7 +89,7 @@ def _write_data(folder: Path, album: Album) -> None:
     folder.mkdir()
     for name, runs in tactons(album).items():
         for k, run in enumerate(runs):
-            stem = run.body if len(tactons(album)) == 1 else f"{name}-{run.body}"
+            stem = run.column if len(tactons(album)) == 1 else f"{name}-{run.column}"
             write_probes(folder / f"{stem}_probes", run.response)
             if k == len(runs) - 1:
                 write_sound(folder, run.response, strongest_probe([run]))
@@ -112,7 +114,8 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
         ["focus", path_of(tacton)],
         ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
         ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
-        ["drive", f"{pressure.drive}{of_depth}, {pressure.peak_pressure:g} Pa at full drive, "
+        ["drive", f"{pressure.drive}{of_depth}, {SPOTS[pressure.focus]}, "
+                  f"{pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
         ["body", extent(body) + above(body)],
         ["duration", f"{tacton.duration:g} s"],
@@ -189,11 +192,13 @@ def _unnamed_rows(runs: Sequence[Run], probe: int) -> list[list[str]]:
 
 
 def _size(run: Run, amplitude: float) -> str:
-    return f"{amplitude if run.response.unit == 'Pa' else 1e6 * amplitude:.3g}"
+    return significant(amplitude if run.response.unit == "Pa" else 1e6 * amplitude)
 
 
 def _level(level: float | None) -> str:
-    return "" if level is None or level < -200 else f"{round(level):+d}"
+    if level is None:
+        return ""
+    return f"{round(level):+d}" if level >= FAINTEST else decibel(level)
 
 
 def _comparison(album: Album) -> list[str]:
@@ -223,13 +228,13 @@ def _trust(album: Album) -> list[str]:
             found.append(
                 f"{label(run.body)}: the work of the load and what has become of it differ by "
                 f"{effort.energy_imbalance:.0e} of either (refused beyond 1e-2); reduction leaves "
-                f"an estimated {100 * effort.estimate:.2g} %."
+                f"an estimated {significant(100 * effort.estimate, 2)} %."
             )
     trust: Mapping[str, Any] = album.trust or {}
     if "misfit" in trust:
         found.append(
             f"The waveforms drawn here differ from those of the planned model, {trust['model']}, "
-            f"by {100 * trust['misfit']:.2g} % over all probes."
+            f"by {significant(100 * trust['misfit'], 2)} % over all probes."
         )
     found.append("The pressure of a device is uncertain by a factor of 2, and all motion with it.")
     parts = [document.paragraph(text) for text in dict.fromkeys(found)]

@@ -17,7 +17,8 @@ from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
 
 ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",
-    "no propagation": "waves run through an endless flat body",
+    "sinc^2 profile": "the focal spot is a Gaussian of the same half width",
+    "no propagation": "waves run through an infinite flat body under the same load",
     "little loss": "the material loses as much as it does",
     "viscous loss": "what is lost relaxes, as in a standard linear solid, and is the same only at "
     "the strongest line",
@@ -29,6 +30,7 @@ ASSUMPTIONS = {
     "flat": "the palm is curved, and its layers are one of their mean stiffness",
     "small deflection": "the sheet stretches as it bends",
 }
+ELEMENTS = {"endless", "continuous path", "one material", "flat", "small deflection"}
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LOSS_LEFT = 0.1  # of the material's own: with none at all a resonance has no limit
 RELAXATION_TIME = PRESETS["palm-zener"].relaxation_time
@@ -80,9 +82,12 @@ def beside(scene: Scene) -> tuple[str, ...]:
 
 
 def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
-    """Whether elements can keep an assumption: an endless body is one whose sides absorb, if they
-    do not anyway, and if something holds it then.
+    """Whether all others can be dropped without an assumption: the array's field has no profile of
+    its own, and an infinite body of elements is one whose sides absorb, if they do not anyway, and
+    if something holds it then.
     """
+    if name == "sinc^2 profile":
+        return "main lobe only" not in names
     body, endless = scene.body, replace(scene.body, sides="absorbing")
     flat = body.kind == "slab" and "flat" not in names
     return name != "endless" or (flat and endless != body and endless.is_held)
@@ -97,14 +102,13 @@ def relaxed(
 ) -> tuple[Scene, str]:
     """A scene without the dropped assumptions, and the model that answers it.
 
+    What is assumed of the load is the same with and without propagation.
+
     Parameters
     ----------
     update_rate, points : of the device that draws the path, as `held` takes them
     """
-    waves = "no propagation" in dropped
-    elements = {"endless", "main lobe only", "continuous path", "one material", "flat",
-                "small deflection"} & set(dropped)  # fmt: skip
-    spot = "gaussian" if waves else "main_lobe"
+    spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
     own = scene.pressure.drive if scene.pressure.drive != "linear" else "pressure_squared"
     pressure = replace(
         scene.pressure,
@@ -114,9 +118,12 @@ def relaxed(
     if "continuous path" in dropped:
         path = held(scene.tacton.trajectory, update_rate, points)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
-    if not waves:
-        return replace(scene, pressure=pressure, body=BODIES["none"]), "point-kernel"
+    if "no propagation" not in dropped:
+        kernel = "point-kernel" if dropped else "point-kernel-published"
+        return replace(scene, pressure=pressure, body=BODIES["none"]), kernel
     body = _body(scene, dropped)
+    # Wavenumber integrals are those of a Gaussian in a homogeneous, flat and infinite body.
+    elements = pressure.focus != "gaussian" or not ELEMENTS.isdisjoint(dropped)
     model = "fem" if elements else "flat-body"
     if elements and body.kind == "slab" and "endless" not in dropped:
         body = replace(body, sides="absorbing")

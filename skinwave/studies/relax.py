@@ -33,7 +33,7 @@ from skinwave.studies.assumptions import (
 )
 
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
-FIRST = "as published"
+FIRST = "as published"  # by the model point-kernel-published
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from skinwave import document
 from skinwave.comparison import compare
+from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import png
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Effect, Ladder, Rung, followed_lines
@@ -22,10 +23,10 @@ def sentence(e: Effect) -> str:
     text = (
         f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at ({x:g}, {y:g}) mm by "
     )
-    text += f"{100 * e.waveform:.3g} %"
+    text += f"{significant(100 * e.waveform)} %"
     if e.decibel:
         line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
-        text += f" and the {line} line by {e.decibel[line]:+.1f} dB"
+        text += f" and the {line} line by {decibel(e.decibel[line], signed=True)} dB"
     cost = f"costs {e.seconds:.1f} s more" if e.seconds > 0.05 else "costs nothing more"
     return f"{text}, and {cost}."
 
@@ -67,9 +68,9 @@ def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]
     """Header and rows, the greatest effect first."""
     rows = [
         [
-            e.name, f"{100 * e.waveform:.3g}", f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
-            "" if e.alone is None else f"{100 * e.alone:.3g}", f"{e.seconds:+.1f}",
-            ", ".join(f"{name} {value:+.1f}" for name, value in e.decibel.items()),
+            e.name, significant(100 * e.waveform), f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
+            "" if e.alone is None else significant(100 * e.alone), f"{e.seconds:+.1f}",
+            ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
         ]
         for e in effects
     ]  # fmt: skip

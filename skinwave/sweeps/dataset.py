@@ -13,7 +13,7 @@ from typing import Any
 from skinwave.files import output_file
 
 ROWS = "rows"  # the folder of the files within that of a sweep
-KEY = "key"  # the column that names a row
+KEY, INDEX = "key", "index"  # the columns that name a row and that order rows
 
 Row = Mapping[str, Any]
 
@@ -40,12 +40,18 @@ def open_folder(out: Path) -> Path:
 def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
     """Add rows as a file of their own, all or none.
 
-    `columns` by name are "text", "number" or, one at each probe, "numbers"; cells may be missing.
+    `columns` by name are "text", "whole", "number" or, one at each probe, "numbers"; cells may be
+    missing.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    types = {"text": pa.string(), "number": pa.float64(), "numbers": pa.list_(pa.float64())}
+    types = {
+        "text": pa.string(),
+        "whole": pa.int64(),
+        "number": pa.float64(),
+        "numbers": pa.list_(pa.float64()),
+    }
     schema = pa.schema([(name, types[kind]) for name, kind in columns.items()])
     table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema)
     place = out / ROWS / f"part-{rows[0][KEY]}.parquet"
@@ -55,7 +61,7 @@ def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
 
 
 def read(out: Path) -> list[dict[str, Any]]:
-    """All rows, each once, with the columns of all of them.
+    """All rows, each once, in the order of the design, with the columns of all of them.
 
     Raises
     ------
@@ -65,14 +71,28 @@ def read(out: Path) -> list[dict[str, Any]]:
     rows = list({row[KEY]: row for row in _table(out, None).to_pylist()}.values())
     if not rows:
         raise ValueError(f"{out} holds no rows of a sweep; name the folder of one")
-    return rows
+    last = len(rows)  # rows of releases up to 0.2 have no index
+    return sorted(rows, key=lambda row: last if row.get(INDEX) is None else row[INDEX])
 
 
-def names(out: Path) -> set[str]:
-    """The names of the rows that are there."""
+def names(out: Path) -> dict[str, int | None]:
+    """The names of the rows that are there, and the index of each."""
     if not any((out / ROWS).glob("part-*.parquet")):
-        return set()
-    return set(_table(out, [KEY])[KEY].to_pylist())
+        return {}
+    table = _table(out, [KEY, INDEX])
+    indices = table[INDEX].to_pylist() if INDEX in table.column_names else [None] * len(table)
+    return dict(zip(table[KEY].to_pylist(), indices, strict=True))
+
+
+def numbered(wanted: Sequence[str], there: Mapping[str, int | None]) -> dict[str, int]:
+    """The index of each wanted row, its place in the design; what is added to the rows of another
+    design comes after these.
+    """
+    places = {name: k for k, name in enumerate(wanted)}
+    if all(places.get(name) == index for name, index in there.items()):
+        return places
+    first = 1 + max([len(there) - 1, *(index for index in there.values() if index is not None)])
+    return {name: first + k for k, name in enumerate(n for n in wanted if n not in there)}
 
 
 def write_csv(out: Path, rows: Iterable[Row]) -> None:
@@ -101,7 +121,7 @@ def _table(out: Path, columns: list[str] | None) -> Any:
     parts = sorted((out / ROWS).glob("part-*.parquet"))
     try:
         tables = [
-            pq.read_table(pa.BufferReader(part.read_bytes()), columns=columns) for part in parts
+            pq.ParquetFile(pa.BufferReader(part.read_bytes())).read(columns) for part in parts
         ]
         return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
     except (OSError, pa.ArrowException) as error:

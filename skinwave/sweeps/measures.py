@@ -33,8 +33,10 @@ COSTS = ("seconds", "peak_memory_gib")  # which differ from run to run
 
 
 def columns(cases: Iterable[Case]) -> dict[str, str]:
-    """The columns of a sweep and whether each is "text", "number" or, at each probe, "numbers"."""
-    found = dict.fromkeys(TEXTS, "text")
+    """The columns of a sweep and whether each is "text", "whole", "number" or, at each probe,
+    "numbers".
+    """
+    found = {"index": "whole"} | dict.fromkeys(TEXTS, "text")
     of_lines: dict[str, str] = {}
     for case in cases:
         for key, value in case.keys.items():

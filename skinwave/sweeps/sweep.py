@@ -100,6 +100,7 @@ def sweep(
     release = version("skinwave")
     named = {case.name(release, knobs): case for case in wanted}
     left = {name: case for name, case in named.items() if name not in there}
+    index = dataset.numbered(list(named), there)
     types = columns(wanted)
     tally = {"done": 0, "failed": 0}
     constant = {
@@ -109,7 +110,8 @@ def sweep(
 
     def written(rows: Sequence[dict[str, Any]]) -> None:
         if rows:
-            dataset.append(folder, [constant | row for row in rows], types)
+            numbered = [{"index": index[row["key"]]} | constant | row for row in rows]
+            dataset.append(folder, numbered, types)
         for row in rows:
             tally[row["status"]] += 1
         report("run", (len(named) - len(left) + sum(tally.values())) / len(named))

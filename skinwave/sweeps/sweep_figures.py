@@ -7,6 +7,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from simple_model.choices import choose
@@ -16,6 +18,8 @@ from skinwave.pictures.styles import Style
 Row = Mapping[str, Any]
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
+MOST_NAMED = len(MARKERS)  # curves that a legend names; of more numbers a colour bar does
+FILLED = 0.5  # of a grid: where fewer of its cells have a run, runs are drawn as points
 UNITS = {  # by the end of a column's name
     "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
     "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB",
@@ -65,10 +69,12 @@ def value(row: Row, column: str) -> float:
 
 
 def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
-    """A column over one key, a curve for each value of another."""
+    """A column over one key, a curve for each value of another; points where a value of that is
+    met once, as in a Latin hypercube, or where what else is varied would be joined with it.
+    """
     _check(rows, (column, x, *([by] if by else [])))
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+        figure = Figure(figsize=style.size(6.4, 4.4), layout="constrained")
         ax = figure.subplots()
         curves(ax, rows, column, x, by)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
@@ -76,8 +82,12 @@ def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style:
 
 
 def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
-    """A column over two keys, of what they share the mean; cells without a run stay empty."""
+    """A column over two keys, of what they share the mean; cells without a run stay empty. Runs
+    that lie on no grid are points.
+    """
     _check(rows, (column, x, y))
+    if _off_grid(rows, x, y):
+        return _point_figure(rows, column, x, y, style)
     across, up = _levels(rows, x), _levels(rows, y)
     cells: dict[tuple[int, int], list[float]] = {}
     for row in rows:
@@ -87,7 +97,7 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
     for where, values in cells.items():
         table[where] = np.mean(values)
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+        figure = Figure(figsize=style.size(6.4, 4.8), layout="constrained")
         ax = figure.subplots()
         drawn = np.where(np.isfinite(table), table, np.nan)
         image = ax.pcolormesh(drawn, cmap="viridis", edgecolors="face", linewidth=0.3)
@@ -97,11 +107,32 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
     return figure
 
 
+def _off_grid(rows: Sequence[Row], x: str, y: str) -> bool:
+    """Whether runs meet few of the pairs of two keys that are numbers."""
+    levels = [_levels(rows, key) for key in (x, y)]
+    met = {(_plain(row.get(x)), _plain(row.get(y))) for row in rows}
+    numbers = all(isinstance(level, float) for found in levels for level in found)
+    return numbers and len(met) < FILLED * len(levels[0]) * len(levels[1])
+
+
+def _point_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
+    """A column as the colour of points over two keys."""
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=style.size(6.4, 4.8), layout="constrained")
+        ax = figure.subplots()
+        across, up, colours = ([value(row, key) for row in rows] for key in (x, y, column))
+        drawn = ax.scatter(across, up, c=colours, cmap="viridis", edgecolors=style.ink, lw=0.4)
+        ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
+        ax.grid(alpha=0.25)
+        figure.colorbar(drawn, ax=ax, label=axis_label(column))
+    return figure
+
+
 def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
     """Displacement and sensation level over the drawing speed, and the speed of surface waves."""
     _check(rows, (SPEED, "peak_um"))
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=(6.4, 6.6), layout="constrained")
+        figure = Figure(figsize=style.size(6.4, 6.6), layout="constrained")
         axes = figure.subplots(2, 1, sharex=True)
         for ax, column in zip(axes, ("peak_um", "level_db"), strict=True):
             curves(ax, rows, column, SPEED, by)
@@ -120,27 +151,43 @@ def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
 
 
 def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -> None:
-    """A curve for each value of a key; where other keys differ, the mean and the range."""
+    """A curve for each value of a key; where other keys differ, the mean and the range or, if no
+    two runs share what is drawn, points.
+    """
     groups = _levels(rows, by) if by else [None]
     words = not isinstance(_levels(rows, x)[0], float)
-    colours = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(groups)))
+    many = len(groups) > MOST_NAMED and all(isinstance(group, float) for group in groups)
+    scale = ScalarMappable(Normalize(groups[0], groups[-1]) if many else None, "viridis")
+    colours = (
+        scale.to_rgba(np.array(groups)) if many else scale.cmap(np.linspace(0, 0.88, len(groups)))
+    )
+    dashes = "solid" if _joined(rows, x, by) else "none"
     for k, group in enumerate(groups):
         mine = [row for row in rows if by is None or _plain(row.get(by)) == group]
         at = _levels(mine, x)
         found = [[value(r, column) for r in mine if _plain(r.get(x)) == level] for level in at]
         places = np.arange(len(at)) if words else np.array(at)
         mean = np.array([np.mean(values) for values in found])
-        label = None if by is None else _with_unit(by, group)
+        label = None if by is None or many else _with_unit(by, group)
         ax.plot(places, np.where(np.isfinite(mean), mean, np.nan), color=colours[k],
-                marker=MARKERS[k % len(MARKERS)], ms=4, lw=1.5, label=label)  # fmt: skip
+                marker="o" if many else MARKERS[k % len(MARKERS)], ms=4, lw=1.5, ls=dashes,
+                label=label)  # fmt: skip
         if max(map(len, found)) > 1:
             low, high = (np.array([f(v) for v in found]) for f in (np.min, np.max))
             ax.fill_between(places, low, high, color=colours[k], alpha=0.15, lw=0)
     if words:
         ax.set_xticks(range(len(at)), [str(level) for level in at])
-    if by is not None:
+    if by is not None and many:
+        ax.figure.colorbar(scale, ax=ax, label=axis_label(by))
+    elif by is not None:
         ax.legend(fontsize="small", frameon=False)
     ax.grid(alpha=0.25)
+
+
+def _joined(rows: Sequence[Row], x: str, by: str | None) -> bool:
+    """Whether neighbours along a curve differ by nothing else, or by its mean over all else."""
+    pairs = {(_plain(row.get(x)), _plain(row.get(by)) if by else None) for row in rows}
+    return len(pairs) < len(rows) or not set(varied(rows)) - {x, by}
 
 
 def axis_label(column: str) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 from simple_model.response import step
 from skinwave.exports import sampled, write_table
-from skinwave.pictures.figures import colour
+from skinwave.pictures.figures import colour, drawn
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
@@ -151,6 +151,4 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
         row[1].set(xlabel="time, ms", ylabel=unit, title="waveform at the point")
         row[2].plot(answer.frequencies, per * answer.spectrum, **line_style)
         row[2].set(xlabel="frequency, Hz", ylabel=unit, title="spectrum", xlim=(0, 600))
-    buffer = BytesIO()
-    figure.savefig(buffer, format=kind, dpi=150)
-    return buffer.getvalue()
+    return drawn(figure, kind, 150)

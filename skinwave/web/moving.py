@@ -1,7 +1,6 @@
 """A body in three dimensions, moving through one period of the steady state about its mean."""
 
 from dataclasses import dataclass
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -10,12 +9,11 @@ import fem
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import MovingPressure
 from simple_model.steady import played
-from skinwave.models.speeds import period, shown_period
+from skinwave.models.speeds import seam, shown_part
 from skinwave.scene import Body
 
-FEWEST, MOST = 32, 128  # frames of a period
-EACH = 8  # frames of the fastest vibration that is seen
-SEEN = 0.02  # of the largest line: weaker ones need no frames of their own
+SEEN = 0.1  # of the largest line: weaker ones need no frames of their own
+CLOSED = 1e-4  # of a turn, by which phases may be off where the motion begins again
 DRAWN = 0.06  # of the width: how far the largest motion is drawn
 FOCUS_ROOM = 5.0  # mm about a focus in which the surface is looked for
 DRAWN_POINTS = 121  # of each path
@@ -82,14 +80,13 @@ def moving_of(
     shape: Shape, pressure: MovingPressure, frequencies: Floats, upwards: fem.Complex
 ) -> Moving:
     """The motion of lines (f,) in Hz, of complex amplitudes (f, n) in metre upwards."""
-    span = shown_period(pressure)
     strength = np.abs(upwards).max(axis=1, initial=0.0)
     seen = frequencies[strength > SEEN * strength.max(initial=0.0)]
-    count = int(np.clip(ceil(EACH * span * seen.max(initial=0.0)), FEWEST, MOST))
+    span, count = shown_part(pressure, seen.max(initial=0.0))
     t = np.arange(count) * span / count
     return Moving(
         shape=shape, frames=played(frequencies, upwards, t), period=span,
-        repeats=period(pressure) is not None,
+        repeats=seam(pressure.tacton, span) < CLOSED,
     )  # fmt: skip
 
 

@@ -117,8 +117,8 @@ def body() -> None:
             html.Span(id="body-now")
         html.Div(
             "motion drawn {{ body_motion.times }} times, about its mean; "
-            "{{ body_motion.repeats ? 'one period' : 'a period of the slowest tone, "
-            "after which it jumps' }}",
+            "{{ body_motion.repeats ? 'one period' : 'a part of the pattern, "
+            "after which it jumps a little' }}",
             v_if="body_motion.times", classes="sw-caption",
         )  # fmt: skip
 

@@ -1,6 +1,6 @@
 // The body in three dimensions: its surface as drawing.py sends it, moved through one period.
 (() => {
-  const LASTS = 4000; // ms that a period lasts on the screen
+  const LASTS = 4000, EACH = 40; // ms that a period lasts on the screen, and a frame at least
   const VERTEX = `#version 300 es
     in vec3 place; in float before; in float after;
     uniform mat3 turn; uniform vec3 middle; uniform vec2 size; uniform float part, drawn;
@@ -208,7 +208,8 @@
         return;
       }
       if (view.playing && !document.hidden) {
-        view.at = (view.at + (view.last === null ? 0 : now - view.last) / LASTS) % 1;
+        const lasts = Math.max(LASTS, EACH * (at.motion?.count ?? 0));
+        view.at = (view.at + (view.last === null ? 0 : now - view.last) / lasts) % 1;
         draw(at);
       }
       view.last = now;
