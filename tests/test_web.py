@@ -357,6 +357,23 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
 
 
+@pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}, {"shape": "point", "am": 0}])
+@pytest.mark.parametrize("moving", [False, True])
+def test_silence_moves_nothing_and_is_drawn_as_zero(more, moving):
+    given = STARTS | {"body": "skin-slab", "amplitude": 0, "duration": 0.1} | more
+    scene = scenes.scene_of(given)
+    kernel, shown = model.kernel(scene), waves.Waves()(scene, nothing, moving)
+    assert not shown.response.displacement.any()
+    assert (shown.lines, shown.map.felt) == ((), ())
+    assert not shown.map.rms.any()
+    assert (shown.moving is not None) == moving
+    for plot in (plots.spectrum_plot(kernel, shown, ()),
+                 plots.waveform_plot(kernel, shown, (), (0.0, 0.06))):  # fmt: skip
+        ranges = [plot[axis]["range"] for axis in ("y", "y2")]
+        assert np.isfinite(ranges).all()
+        assert all(low < high for low, high in ranges)
+
+
 @pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}])
 def test_tabulated_waves_follow_paths_of_their_own(scene, more):
     values = STARTS | OWN | {"body": "skin-slab", "duration": 0.1} | more

@@ -142,7 +142,10 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     index = np.rint(away / fine[1]).astype(np.int32)
     of_lines = CubicSpline(table.frequencies, table.g, axis=0)(f)
     of_lines = CubicSpline(table.distances, of_lines, axis=1)(fine).astype(np.complex64)
-    motion = np.array([g[index] @ weights for g, weights in zip(of_lines, w, strict=True)])
+    # Silence has no lines, and moves nothing: the shape is not left to what there is.
+    motion = np.zeros((len(f), SIDE**2), np.complex128)
+    for line, g, weights in zip(motion, of_lines, w, strict=True):
+        line[:] = g[index] @ weights
     seen = None
     if moving:
         shape = slab_shape(scene.body, places())
