@@ -96,9 +96,9 @@ def in_a_browser(moves: int) -> None:
                 page.wait_for_function(DRAWN)
                 ready.append(time.perf_counter() - before)
             row("page ready", ready)
-            said = "point kernel, Pa"
+            said = "kernel, same load, Pa"
             times = page.evaluate(PRESSED, ["am", moves, said])
-            row("slider to plots, point kernel", [t / 1e3 for t in times])
+            row("slider to plots, kernel", [t / 1e3 for t in times])
             page.goto(address + "?body=skin-slab")
             page.wait_for_function(
                 "() => window.trame?.state?.get('wave_map')?.picture"

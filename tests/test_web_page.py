@@ -191,6 +191,20 @@ def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
     photographed(page, "kernel")
 
 
+def test_it_opens_with_the_skin_slab_and_its_body_first(page):
+    assert page.locator(".v-field:has(#body)").inner_text().strip().endswith("skin-slab")
+    first = page.locator("#controls input, #controls [role=slider]").first
+    assert first.get_attribute("id") == "body"
+    page.wait_for_function("() => window.trame.state.get('wave_map').picture")
+    page.locator("#published").check()
+    page.wait_for_function(
+        "() => window.trame.utils.plots.shown.waveform_plot.figure.data.length === 3"
+    )
+    assert drawn(page, "waveform_plot")[0]["name"] == "kernel, as published, Pa"
+    photographed(page, "published")
+    page.locator("#published").uncheck()
+
+
 @pytest.mark.parametrize("key", [key for key in NUMBERS if key not in ("ramp", "drawn")])
 def test_a_slider_and_a_field_turn_each_number(page, key):
     number, row = NUMBERS[key], page.locator(f".sw-row:has(#{key}-field)")
@@ -223,8 +237,8 @@ def test_a_number_can_be_typed_digit_by_digit(page):
 def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     choose(page, "ratio", "0.25:0.75")
     query_has(page, "ratio=0.25:0.75")
-    choose(page, "drive", "pressure squared")
-    query_has(page, "drive=pressure_squared")
+    choose(page, "drive", "linear")
+    query_has(page, "drive=linear")
     page.locator("#foci-field").fill("3")
     choose(page, "sharing", "in turn")
     query_has(page, "sharing=time_multiplexed")
@@ -351,7 +365,6 @@ def test_foci_follow_paths_of_their_own(page, tmp_path):
     page.wait_for_selector("#paths-error", state="detached")
     page.locator("#pulses-field").fill("100/50")
     query_has(page, "pulses=100/50")
-    choose(page, "body", "skin-slab")
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     photographed(page, "own-paths")
     kept = state(page, "query")
@@ -381,8 +394,13 @@ def test_presets_undo_redo_pin_and_looks(page):
     query_has(page, "size=30")
     page.locator("#pin").click()
     page.locator("#undo").click()
-    page.wait_for_function("() => window.trame.state.get('spectrum_plot').data.length === 3")
-    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel, Pa"
+    state_becomes(page, "query", "")
+    names = [curve["name"] for curve in drawn(page, "spectrum_plot")]
+    assert "A: kernel, same load, Pa" in names
+    assert "B: kernel, same load, Pa" in names
+    differs = page.locator("#differs tr")
+    assert differs.nth(1).inner_text().split("\t") == ["AM frequency", "80 Hz", "140 Hz"]
+    assert differs.nth(2).inner_text().split("\t") == ["Size", "30 mm", "20 mm"]
     page.locator("#swap").click()
     query_has(page, "size=30")
     photographed(page, "pinned")
@@ -442,7 +460,6 @@ def test_curves_are_drawn_read_and_zoomed_by_keys(page):
 
 
 def test_the_body_moves_in_three_dimensions(page):
-    choose(page, "body", "skin-slab")
     page.locator("#solid").click()
     page.wait_for_function("() => window.trame.state.get('body_motion').frames")
     play, now = page.locator("#body-play"), page.locator("#body-now")
@@ -490,16 +507,18 @@ def test_what_is_saved_opens_again(page, tmp_path):
 
 
 def test_plots_follow_a_slider_and_waves_come_with_a_body(page):
+    choose(page, "body", "none")
+    query_has(page, "body=none")
     kernel = latencies(page, "am", 8, "true")
     choose(page, "body", "skin-slab")
     state_becomes(page, "waves_stale", False)
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     shown = drawn(page, "waveform_plot")
-    assert [curve["name"] for curve in shown] == ["point kernel, Pa", "waves (flat-body), µm"]
+    assert [curve["name"] for curve in shown] == ["kernel, same load, Pa", "waves (flat-body), µm"]
     current = "data.some(d => d.name === 'waves (flat-body), µm')"
     overlay = latencies(page, "am", 8, current)
     photographed(page, "waves")
-    for what, times in (("point kernel", kernel), ("waves", overlay)):
+    for what, times in (("kernel", kernel), ("waves", overlay)):
         print(f"{what}: median {statistics.median(times):.3f} s, largest {times.max():.3f} s")
     assert statistics.median(kernel) < 3  # other work may have most of the machine
     assert statistics.median(overlay) < 5

@@ -84,9 +84,10 @@ def _bar(session: Session) -> None:
         )
         v3.VBtn("{{ pinned ? 'Unpin' : 'Pin' }}", prepend_icon="mdi-pin",
                 click=partial(moves.pin, session),
-                id="pin", title="Keep what is shown as dotted curves, to compare with")  # fmt: skip
+                id="pin", raw_attrs=[':aria-pressed="String(pinned)"'],
+                title="Keep what is shown as A, to compare with B, what is shown then")  # fmt: skip
         v3.VBtn("A/B", click=partial(moves.exchange, session), disabled=("!pinned",), id="swap",
-                title="Exchange what is shown and what is pinned")  # fmt: skip
+                title="Exchange A, which is pinned, and B, which is shown")  # fmt: skip
         _save_menu()
         _button("mdi-theme-light-dark", "Light or dark", "dark = !dark", id="theme")
         _button("mdi-information-outline", "About this model", "about = !about", id="about")
@@ -113,10 +114,10 @@ def _maps(session: Session) -> None:
     with html.Div(classes="sw-maps"):
         with html.Div():
             html.Div(
-                "<b>Point kernel</b>, RMS pressure: up to {{ kernel_map.largest }}",
+                "<b>Kernel, same load</b>, RMS pressure: up to {{ kernel_map.largest }}",
                 classes="sw-caption",
             )
-            panels.area("kernel_map", "kernel-map", "point kernel")
+            panels.area("kernel_map", "kernel-map", "kernel, same load")
         with html.Div(v_if="body != 'none'", classes=("{ 'sw-stale': waves_stale }",)):
             with html.Div(classes="sw-caption sw-which"):
                 html.Span(
@@ -140,6 +141,7 @@ def _maps(session: Session) -> None:
                 raw_attrs=['aria-label="Where the foci are in a drawing period, per cent"'],
                 label="foci at", id="phase",
             )  # fmt: skip
+            panels.differences()
             panels.line_table()
 
 

@@ -17,6 +17,7 @@ from simple_model import (
     evenly,
     lines,
     modulation,
+    published,
     sensation_level,
     spectrum,
     tacton_lines,
@@ -83,8 +84,15 @@ class Answer:
 
 
 def kernel(scene: Scene) -> Answer:
-    """The point kernel's answer to a scene of one probe."""
+    """The point kernel's answer to a scene of one probe, under the load that a body receives."""
     return answer_of(scene, simulate(scene, "point-kernel"), kernel_map(scene.pressure))
+
+
+def as_published(scene: Scene) -> Answer:
+    """The point kernel's answer under the published load, whatever load the scene has."""
+    return answer_of(
+        scene, simulate(scene, "point-kernel-published"), kernel_map(published(scene.pressure))
+    )
 
 
 def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:

@@ -18,9 +18,17 @@ DRIVES = {
     "pressure_squared": "pressure squared: usual AM",
     "force_corrected": "force corrected: square root first",
 }
+PROFILES = {
+    "gaussian": "Gaussian, of the half width and force of the array's",
+    "main_lobe": "main lobe (sinc²), as published",
+}
 LEFT_OUT = (
     "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): a skin point feels the pressure of the "
-    "focus where it is, weighted by distance. Nothing propagates, no body gives way.",
+    "focus where it is, weighted by distance. Nothing propagates, no body deflects. <i>Kernel, "
+    "same load</i> has the drive law and focus profile that are chosen, as every body has; "
+    "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. What "
+    "drive and profile change is the one against the other; what propagation changes is the waves "
+    "against the kernel under the same load.",
     "<b>Skin slab</b>: exact waves of an endless flat layer of soft tissue of 15 mm on bone; no "
     "sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
@@ -29,13 +37,12 @@ LEFT_OUT = (
     "as far as the area goes; its sides are drawn straight down to the bone.",
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
     "pressure, 50 Pa at full drive, is uncertain by a factor of 2. Air is left out.",
-    "With a body the focus is a Gaussian of the same width as the main lobe that the point kernel "
-    "alone has. Side lobes, and what several simultaneous foci do to each other, are left out: "
+    "Side lobes of the focus, and what several simultaneous foci do to each other, are left out: "
     "simultaneous and time-multiplexed foci push alike here, devices differ.",
     "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
     "polygon, nowhere further from it than 0.01 mm.",
     "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
-    "above the threshold for a focal spot; point kernel: 4.4 Pa, just felt with AM at 200 Hz. "
+    "above the threshold for a focal spot; kernel: 4.4 Pa, just felt with AM at 200 Hz. "
     "Maps of a rhythm are those of its pulses while they are on.",
     "Weights of the superposition multiply the two "
     "AM sinusoids; a frequency of 0 is a factor of 1.",
@@ -45,6 +52,8 @@ LEFT_OUT = (
 def control_panel(session: Session) -> None:
     """All that can be turned."""
     with html.Div(classes="sw-controls", id="controls"):
+        v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
+                   hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
         heading("In time")
         for key in ("amplitude", "am"):
             number(session, key)
@@ -57,8 +66,11 @@ def control_panel(session: Session) -> None:
         heading("On the skin")
         number(session, "height")
         choice("drive", "Drive law", [{"title": DRIVES[d], "value": d} for d in CHOICES["drive"]])
-        v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
-                   hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
+        choice("profile", "Focus profile",
+               [{"title": PROFILES[p], "value": p} for p in CHOICES["profile"]])  # fmt: skip
+        v3.VCheckbox(v_model=("published", False), density="compact", hide_details=True,
+                     id="published", label="show the kernel as published, too")  # fmt: skip
+        html.Div("that is, under its own load: linear drive, main lobe", classes="sw-note")
         for key in ("x", "y"):
             number(session, key)
         heading("Scene file")
@@ -120,6 +132,20 @@ def body() -> None:
             "{{ body_motion.repeats ? 'one period' : 'a period of the slowest tone, "
             "after which it jumps' }}",
             v_if="body_motion.times", classes="sw-caption",
+        )  # fmt: skip
+
+
+def differences() -> None:
+    """What is pinned and what is shown: where the two sets of values differ."""
+    with html.Table(classes="sw-table", id="differs", v_if="pinned"):
+        html.Caption("{{ differs.length ? 'What differs' : 'A and B are the same' }}")
+        html.Tr(
+            "<th scope='col'></th><th scope='col' class='sw-a'>A, pinned</th>"
+            "<th scope='col' class='sw-b'>B, shown</th>", v_if="differs.length",
+        )  # fmt: skip
+        html.Tr(
+            "<th scope='row'>{{ row.name }}</th><td>{{ row.a }}</td><td>{{ row.b }}</td>",
+            v_for="row in differs", key="row.name",
         )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ which is the page's own. Zooming is forgotten when `kept` changes.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import Tacton, threshold
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, PRESSURE
+from skinwave.pictures.figures import LABELS
 from skinwave.web.drawings import written
 from skinwave.web.model import Answer, commanded_curve, thinned
 
@@ -22,7 +24,21 @@ STALE = 0.2  # opacity of an answer that is not that of the controls
 NAMED = 6  # lines with a name in the plot
 SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (-0.06, 0.0),
          "all": (0.0, np.inf)}  # fmt: skip
+KERNEL = f"{LABELS['point-kernel']}, Pa"
 Plot = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curves:
+    """What is drawn in one plot: the `kernel` under the load that the `waves` answer to, as well,
+    which are of other controls while `stale`; the kernel as `published`; and what is `pinned`.
+    """
+
+    kernel: Answer
+    waves: Answer | None = None
+    published: Answer | None = None
+    pinned: Sequence[Answer] = ()
+    stale: bool = False
 
 
 def numbers(values: Floats) -> list[float]:
@@ -58,15 +74,12 @@ def commanded_plot(tacton: Tacton, start: float, end: float) -> Plot:
     }  # fmt: skip
 
 
-def waveform_plot(
-    kernel: Answer, waves: Answer | None, pinned: Sequence[Answer], span: tuple[float, float],
-    *, stale: bool = False,
-) -> Plot:  # fmt: skip
+def waveform_plot(curves: Curves, span: tuple[float, float]) -> Plot:
     """Pressure by the point kernel and displacement of the body at the selected point, between two
     times in s.
     """
     data = []
-    for answer, style in _styled(kernel, waves, pinned, stale):
+    for answer, style in _styled(curves):
         times = answer.response.times
         shown = (times >= span[0]) & (times <= span[1] + 0.5 * step(times))
         t, y = thinned(times[shown], answer.response.displacement[shown, 0])
@@ -78,18 +91,15 @@ def waveform_plot(
     }  # fmt: skip
 
 
-def spectrum_plot(
-    kernel: Answer, waves: Answer | None, pinned: Sequence[Answer], *,
-    stale: bool = False, highest: float = 600.0,
-) -> Plot:  # fmt: skip
+def spectrum_plot(curves: Curves, highest: float = 600.0) -> Plot:
     """The spectra at the selected point, their lines named, and what is felt of them."""
-    data = []
-    for answer, style in _styled(kernel, waves, pinned, stale):
+    data, waves = [], curves.waves
+    for answer, style in _styled(curves):
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
     data.append(_just_felt(highest) if waves is None else _threshold_curve(highest))
-    named = waves if waves is not None and not stale else kernel
+    named = waves if waves is not None and not curves.stale else curves.kernel
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
@@ -101,20 +111,29 @@ def _in_unit(answer: Answer) -> float:
     return 1e6 if answer.response.unit == "m" else 1.0
 
 
-def _styled(
-    kernel: Answer, waves: Answer | None, pinned: Sequence[Answer], stale: bool
-) -> list[tuple[Answer, dict[str, Any]]]:
-    """What is drawn, the pinned first, each with its style."""
+def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
+    """What is drawn, in the order of its names: kernels, waves, and all that is pinned, as A."""
+    shown = "B: " if curves.pinned else ""
     found: list[tuple[Answer, dict[str, Any]]] = []
-    for answer in pinned:
-        name = "pinned kernel, Pa" if answer.response.unit == "Pa" else "pinned waves, µm"
-        found.append((answer, {"role": "pinned", "name": name, "dash": "dot"}))
-    found.append((kernel, {"role": "kernel", "name": "point kernel, Pa"}))
-    if waves is not None:
-        name = f"waves ({waves.response.model}), µm" + (" — being computed" if stale else "")
-        style = {"role": "waves", "name": name, "opacity": STALE if stale else 1.0}
-        found.append((waves, style))
+    if curves.published is not None:
+        name = f"{LABELS['point-kernel-published']}, Pa"
+        found.append((curves.published, {"role": "published", "name": name, "width": 0.8}))
+    found.append((curves.kernel, {"role": "kernel", "name": shown + KERNEL}))
+    if curves.waves is not None:
+        style = {"role": "waves", "name": shown + waves_name(curves.waves, curves.stale),
+                 "opacity": STALE if curves.stale else 1.0}  # fmt: skip
+        found.append((curves.waves, style))
+    for answer in curves.pinned:
+        of_kernel = answer.response.unit == "Pa"
+        name = KERNEL if of_kernel else waves_name(answer)
+        style = {"role": "pinned", "name": f"A: {name}", "dash": "dot" if of_kernel else "dash"}
+        found.append((answer, style))
     return [(a, style | {"axis": "y2" if a.response.unit == "m" else "y"}) for a, style in found]
+
+
+def waves_name(answer: Answer, stale: bool = False) -> str:
+    """The name of waves in every legend, with their unit."""
+    return f"waves ({answer.response.model}), µm" + (" — being computed" if stale else "")
 
 
 def _threshold_curve(highest: float) -> dict[str, Any]:

@@ -1,14 +1,14 @@
 """From answers to the keys of a page's state that its plots, maps and tables show."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from skinwave.scene import Body, Scene
 from skinwave.web import drawings, model, moving, plots
-from skinwave.web.controls import CHOICES, OWN_BODY
+from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.model import Answer
+from skinwave.web.plots import Curves
 
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
 
@@ -25,23 +25,21 @@ def first(own: Body | None) -> dict[str, Any]:
         "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
-        "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
+        "published": False, "pinned": False, "pinned_query": "", "differs": [],
+        "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "untold": "",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
 
-def answers(
-    state: Any, scene: Scene, kernel: Answer, waves: Answer | None, pinned: Sequence[Answer]
-) -> None:
-    """Plots, maps and table of answers; waves are of other controls while `waves_stale`."""
-    stale, tacton = bool(state.waves_stale), scene.tacton
-    given = (kernel, waves, pinned)
+def answers(state: Any, scene: Scene, curves: Curves) -> None:
+    """Plots, maps and table of answers."""
+    kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
     span = plots.span_of(state.span, tacton.duration)
     state.update({
-        "waveform_plot": plots.waveform_plot(*given, span, stale=stale),
-        "spectrum_plot": plots.spectrum_plot(*given, stale=stale, highest=state.highest),
+        "waveform_plot": plots.waveform_plot(curves, span),
+        "spectrum_plot": plots.spectrum_plot(curves, state.highest),
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
@@ -57,6 +55,15 @@ def answers(
         })  # fmt: skip
     elif seen is None and state.body_motion:
         state.update({"body_shape": {}, "body_motion": {}})
+
+
+def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
+    """What differs between two sets of values, as a table: A is pinned, B is what is shown."""
+    return [
+        {"name": NAMES[key], "a": said(key, pinned[key]), "b": said(key, values[key])}
+        for key in KEYS
+        if pinned[key] != values[key]
+    ]
 
 
 def untold(count: int, duration: float) -> str:

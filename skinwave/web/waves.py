@@ -97,12 +97,13 @@ class Waves:
         raises what `simulate` does.
         """
         if has_exact_waves(scene.body):
+            gaussian_only(scene.pressure)
             flat = (scene.body, scene.pressure.height)
             table = self._keep("table", flat, lambda: tabulate(*flat, progress))
             return flat_answer(table, scene, moving)
         tacton = scene.tacton
         places_only = at_any_speed(tacton.trajectory), tacton.n_paths
-        key = (scene.body, places_only, scene.pressure.height)
+        key = (scene.body, places_only, scene.pressure.height, scene.pressure.focus)
         body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
         return reduced_answer(body, scene, moving)
 
@@ -117,6 +118,21 @@ class Waves:
         while len(kept) > KEPT:
             del kept[next(iter(kept))]
         return found
+
+
+def gaussian_only(pressure: MovingPressure) -> None:
+    """Refuse what a table of a Gaussian spot cannot answer.
+
+    Raises
+    ------
+    ValueError
+        If the focus is another.
+    """
+    if pressure.focus != "gaussian":
+        raise ValueError(
+            f"focus profile '{pressure.focus}' has no wavenumber integral on a slab; choose "
+            "'gaussian', which has the same half width and force"
+        )
 
 
 def tabulate(body: Body, height: float, progress: Progress) -> Table:

@@ -128,7 +128,7 @@
 
   function line(g, curve, colours) {
     g.strokeStyle = g.fillStyle = colours[curve.role];
-    g.lineWidth = 1.4;
+    g.lineWidth = curve.width ?? 1.4;
     g.setLineDash({ dash: [6, 4], dot: [1.5, 3] }[curve.dash] || []);
     g.globalAlpha = curve.opacity ?? 1;
   }
@@ -159,7 +159,7 @@
         if (xOf(curve, middle) > value) high = middle; else low = middle;
       }
       const k = value - xOf(curve, low) < xOf(curve, high) - value ? low : high;
-      return `${curve.name.split(",")[0]} ${curve.y[k].toPrecision(4)}`;
+      return `${curve.name} ${curve.y[k].toPrecision(4)}`;
     });
     g.fillStyle = ink;
     g.fillRect(plot.at, box.y, 1, box.h);
@@ -180,7 +180,7 @@
     const style = getComputedStyle(canvas), own = (name) => style.getPropertyValue(name).trim();
     const ink = own("--sw-ink"), faint = own("--sw-grid"), paper = own("--sw-paper");
     const colours = Object.fromEntries(
-      ["kernel", "waves", "pinned", "felt"].map((role) => [role, own(`--sw-${role}`)]));
+      ["kernel", "published", "waves", "pinned", "felt"].map((role) => [role, own(`--sw-${role}`)]));
     const at = scales(plot), { box } = at, g = canvas.getContext("2d");
     if (canvas.width !== Math.round(at.w * ratio)) canvas.width = Math.round(at.w * ratio);
     if (canvas.height !== Math.round(at.h * ratio)) canvas.height = Math.round(at.h * ratio);
