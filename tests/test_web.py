@@ -369,14 +369,40 @@ def test_the_influenced_area_ends_a_main_lobe_from_the_path():
 
 
 def test_the_carrier_is_shown_where_it_can_be_resolved():
-    tacton = scenes.scene_of(STARTS).tacton
-    t, p, resolved = model.commanded_curve(tacton, 0.001, 0.002)
-    assert resolved
-    assert p == pytest.approx(commanded(tacton, t))
-    t, p, resolved = model.commanded_curve(tacton, 0, 1)
-    assert not resolved
-    assert len(t) <= model.MOST_SHOWN
-    assert p.max() == pytest.approx(1, abs=0.05)
+    pressure = scenes.scene_of(STARTS | {"drive": "linear"}).pressure
+    found = model.commanded_curve(pressure, 0.001, 0.002)
+    assert found.carrier
+    assert found.largest == pytest.approx(commanded(pressure.tacton, found.times))
+    found = model.commanded_curve(pressure, 0, 0.06)
+    assert not found.carrier
+    assert len(found.times) <= model.MOST_SHOWN
+    assert found.largest.max() == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("drive", controls.CHOICES["drive"])
+def test_the_square_of_the_commanded_sound_is_what_pushes(drive):
+    values = STARTS | {"drive": drive, "am2": 90, "ratio": "0.5:0.5", "amplitude": 60}
+    pressure = scenes.scene_of(values | {"pulses": "20/10"}).pressure
+    t = np.linspace(0, 0.1, 999)
+    pushed = pressure.gain(t) / pressure.peak_pressure
+    sound = model.sound_amplitude(pressure, t)
+    assert (sound if drive == "linear" else sound**2) == pytest.approx(pushed)
+
+
+@pytest.mark.parametrize(("am", "envelope", "duration"), [(500, 0, 10), (499, 3, 1), (140, 0, 2)])
+def test_the_commanded_signal_has_its_true_envelope_however_long(am, envelope, duration):
+    values = STARTS | {"am": am, "envelope": envelope, "duration": duration}
+    pressure = scenes.scene_of(values).pressure
+    found = model.commanded_curve(pressure, 0, duration)
+    width = found.times[1] - found.times[0]
+    within = np.linspace(-0.5, 0.5, 2000) * width
+    for k in range(0, len(found.times), 37):
+        true = np.abs(model.sound_amplitude(pressure, found.times[k] + within))
+        assert found.largest[k] == pytest.approx(true.max(), abs=0.02)
+        assert found.least[k] == pytest.approx(true.min(), abs=0.02)
+    plot = plots.commanded_plot(pressure, 0, duration)
+    assert "largest and least" in plot["title"]
+    assert "pressure squared" in plot["title"]
 
 
 def test_a_thinned_curve_keeps_its_peaks():
@@ -682,6 +708,21 @@ def test_waves_are_stale_until_they_are_answered(session):
         moves.cancel(session)
     assert session.state.body == "none"
     assert not session.state.busy
+
+
+def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
+    answer = waves.Waves()(session.scene, nothing)
+    effort = replace(
+        answer.response.effort, warnings=("wrong by about 18 %", "wrong by about 18 %")
+    )
+    answer = replace(answer, response=replace(answer.response, effort=effort))
+    assert session.state.warnings == []
+    with session.state:
+        told(session, "answer", session.number, answer)
+    assert session.state.warnings == ["wrong by about 18 %"]
+    with session.state:
+        session.state.am = 150
+    assert session.state.warnings == [], "they are of another answer"
 
 
 def test_a_held_frequency_and_a_preset(session):

@@ -6,7 +6,8 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 from trame_client.widgets.core import HtmlElement
 
-from skinwave.web.controls import CHOICES
+from skinwave.web import drawings
+from skinwave.web.controls import CHOICES, NUMBERS
 from skinwave.web.fields import choice, heading, number
 from skinwave.web.moves import cancel
 from skinwave.web.session import Session
@@ -22,6 +23,7 @@ PROFILES = {
     "gaussian": "Gaussian, of the half width and force of the array's",
     "main_lobe": "main lobe (sinc²), as published",
 }
+REACH_MM = NUMBERS["x"].high
 LEFT_OUT = (
     "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): a skin point feels the pressure of the "
     "focus where it is, weighted by distance. Nothing propagates, no body deflects. <i>Kernel, "
@@ -80,8 +82,11 @@ def control_panel(session: Session) -> None:
 
 def area(name: str, marked: str, said: str, shown: str = "true") -> None:
     """A map of the area with path, foci, borderlines and the selected point, which it selects."""
-    steps = {"left": "x - 1, y", "right": "x + 1, y", "up": "x, y + 1", "down": "x, y - 1"}
-    keys = [f"@keydown.{key}.prevent=\"trigger('select', [{at}])\"" for key, at in steps.items()]
+    steps = {"left": "-1, 0", "right": "1, 0", "up": "0, 1", "down": "0, -1"}
+    keys = [
+        f'@keydown.{key}.prevent="utils.skinwave.step({by}, {REACH_MM:g})"'
+        for key, by in steps.items()
+    ]
     drag = "trigger('select', utils.skinwave.place($event))"
     HtmlElement(
         "svg", v_if=shown, classes="sw-map", id=marked, children=[
@@ -133,20 +138,38 @@ def body() -> None:
             "after which it jumps' }}",
             v_if="body_motion.times", classes="sw-caption",
         )  # fmt: skip
+        colour_bar("body_motion.ends || []", drawings.SIGNED)
 
 
 def differences() -> None:
     """What is pinned and what is shown: where the two sets of values differ."""
-    with html.Table(classes="sw-table", id="differs", v_if="pinned"):
-        html.Caption("{{ differs.length ? 'What differs' : 'A and B are the same' }}")
-        html.Tr(
-            "<th scope='col'></th><th scope='col' class='sw-a'>A, pinned</th>"
-            "<th scope='col' class='sw-b'>B, shown</th>", v_if="differs.length",
-        )  # fmt: skip
-        html.Tr(
-            "<th scope='row'>{{ row.name }}</th><td>{{ row.a }}</td><td>{{ row.b }}</td>",
-            v_for="row in differs", key="row.name",
-        )  # fmt: skip
+    columns = "<td v-for='row in differs' :key='row.name'>{{ row.%s }}</td>"
+    HtmlElement("table", v_if="pinned", classes="sw-differs", id="differs", children=[
+        "<tr><th scope='col'>{{ differs.length ? '' : 'A and B are the same' }}</th>"
+        "<th v-for='row in differs' :key='row.name' scope='col'>{{ row.name }}</th></tr>"
+        "<tr v-if='differs.length'><th scope='row' class='sw-a'>A, pinned</th>"
+        + columns % "a" + "</tr><tr v-if='differs.length'><th scope='row'>B, shown</th>"
+        + columns % "b" + "</tr>"
+    ])  # fmt: skip
+
+
+def warnings() -> None:
+    """What is less than was asked for, and how wrong the answer may be: as text, for sentences may
+    quote what came from a file.
+    """
+    with html.Div(v_if="warnings.length || expected", classes="sw-warnings", id="warnings",
+                  raw_attrs=['role="status"', 'aria-label="Warnings of this answer"']):  # fmt: skip
+        html.P("Warning: {{ said }}", v_for="said in warnings", key="said")
+        html.P("{{ expected }}", v_if="expected", id="expected")
+
+
+def colour_bar(ends: str, shades: str) -> None:
+    """The colours of a map and what they stand for; `ends` is an expression of texts, evenly
+    spaced.
+    """
+    html.Div(classes="sw-colours", style=f"background: {shades}", raw_attrs=['aria-hidden="true"'])
+    with html.Div(classes="sw-ends"):
+        html.Span("{{ end }}", v_for=f"(end, k) in {ends}", key="k")
 
 
 def line_table() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Tacton, threshold
+from simple_model import MovingPressure, threshold
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, PRESSURE
 from skinwave.pictures.figures import LABELS
@@ -24,6 +24,7 @@ STALE = 0.2  # opacity of an answer that is not that of the controls
 NAMED = 6  # lines with a name in the plot
 SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (-0.06, 0.0),
          "all": (0.0, np.inf)}  # fmt: skip
+ROOM = 1.4  # of the tallest line of a spectrum, for names above it
 KERNEL = f"{LABELS['point-kernel']}, Pa"
 Plot = dict[str, Any]
 
@@ -58,17 +59,29 @@ def span_of(name: str, duration: float) -> tuple[float, float]:
     return start, min(end, duration)
 
 
-def commanded_plot(tacton: Tacton, start: float, end: float) -> Plot:
-    """The commanded Tacton between two times in s, with its carrier if that can be resolved."""
-    t, p, resolved = commanded_curve(tacton, start, end)
-    curve = {
-        "role": "kernel", "axis": "y", "name": "carrier" if resolved else "envelope",
-        "x0": 1e3 * float(t[0]), "dx": 1e3 * float(t[1] - t[0]), "y": numbers(100 * p),
-    }  # fmt: skip
-    shown = "with its 40 kHz carrier" if resolved else "envelope of the carrier; zoom in to see it"
+def commanded_plot(pressure: MovingPressure, start: float, end: float) -> Plot:
+    """The commanded signal between two times in s: with its carrier or, where that cannot be
+    resolved, its envelope.
+    """
+    found = commanded_curve(pressure, start, end)
+    t = 1e3 * found.times
+    curve = {"role": "kernel", "axis": "y", "x0": float(t[0]), "dx": float(t[1] - t[0])}
+    name = "carrier" if found.carrier else "envelope" if found.least is None else "largest"
+    data = [curve | {"name": name, "y": numbers(100 * found.largest),
+                     "mirrored": not found.carrier}]  # fmt: skip
+    if found.carrier:
+        shown = "with its 40 kHz carrier"
+    elif found.least is None:
+        shown = "envelope of the carrier; zoom in to see it"
+    else:
+        shown = "largest and least amplitude; zoom in to see it"
+        least = numbers(100 * found.least)
+        data.append(curve | {"name": "least", "y": least, "mirrored": True, "role": "published"})
+    law = pressure.drive.replace("_", " ")
     return {
-        "title": f"Commanded Tacton, {shown}", "data": [curve | {"mirrored": not resolved}],
-        "x": {"said": "time, ms", "range": [1e3 * float(t[0]), 1e3 * float(t[-1])]},
+        "title": f"Commanded signal, {law}, {shown}", "data": data,
+        "x": {"said": "time, ms", "range": [1e3 * max(0.0, start),
+                                            1e3 * min(end, pressure.tacton.duration)]},
         "y": {"said": "% of full drive", "range": [-108.0, 108.0]},
         "asks": True,
     }  # fmt: skip
@@ -87,7 +100,7 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> Plot:
     return {
         "title": "Waveform at the point", "data": data, "kept": f"{span}", "legend": True,
         "x": {"said": "time, ms", "range": [1e3 * float(end) for end in span]},
-        **_axes(data),
+        **_axes(data, "into the body, µm"),
     }  # fmt: skip
 
 
@@ -103,7 +116,8 @@ def spectrum_plot(curves: Curves, highest: float = 600.0) -> Plot:
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
-        "names": _names(named, highest), **_axes(data, _tallest(waves, highest), 1.25),
+        "names": _names(named, highest),
+        **_axes(data, "displacement, µm", _tallest(waves, highest), ROOM),
     }  # fmt: skip
 
 
@@ -180,11 +194,13 @@ def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _axes(data: Sequence[Plot], most: float | None = None, room: float = 1.08) -> dict[str, Any]:
-    """Both axes with one zero; `most` is the largest that the second has to show, `room` what
-    there is above the largest, over it.
+def _axes(
+    data: Sequence[Plot], second: str, most: float | None = None, room: float = 1.08
+) -> dict[str, Any]:
+    """Both axes with one zero; `second` is what the second shows and `most` the largest that it has
+    to show, `room` what there is above the largest, over it.
     """
-    said = {"y": "pressure, Pa", "y2": "displacement, µm"}
+    said = {"y": "pressure, Pa", "y2": second}
     ends = {}
     for name in said:
         values = [v for curve in data if curve["axis"] == name for v in curve["y"]]

@@ -1,5 +1,6 @@
 """From answers to the keys of a page's state that its plots, maps and tables show."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,8 @@ def first(own: Body | None) -> dict[str, Any]:
         "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
-        "published": False, "pinned": False, "pinned_query": "", "differs": [],
+        "warnings": [], "expected": "", "published": False,
+        "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "untold": "",
@@ -47,6 +49,8 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         "rows": drawings.rows(kernel, None if stale else waves),
         "untold": untold(len(model.untold_lines(scene, kernel.response)), tacton.duration),
     })  # fmt: skip
+    told = [kernel] if waves is None or stale else [kernel, waves]
+    state.update({"warnings": warnings(told), "expected": expected(told[-1])})
     seen = waves.moving if waves else None
     if seen is not None and not stale:
         state.update({
@@ -55,6 +59,17 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         })  # fmt: skip
     elif seen is None and state.body_motion:
         state.update({"body_shape": {}, "body_motion": {}})
+
+
+def warnings(answers: Sequence[Answer]) -> list[str]:
+    """What answers say is less than was asked for, each sentence once."""
+    return list(dict.fromkeys(s for answer in answers for s in answer.response.effort.warnings))
+
+
+def expected(answer: Answer) -> str:
+    """How wrong an answer is expected to be, in words, if it says so."""
+    error = getattr(answer.response, "expected_error", None)
+    return "" if not error else f"Expected numerical error: {100 * error:.2g} %"
 
 
 def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
@@ -77,7 +92,7 @@ def untold(count: int, duration: float) -> str:
 def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> None:
     """The commanded Tacton between two times in s, or in the span that is chosen."""
     between = zoom or plots.span_of(state.span, scene.tacton.duration)
-    state.commanded_plot = plots.commanded_plot(scene.tacton, *between)
+    state.commanded_plot = plots.commanded_plot(scene.pressure, *between)
 
 
 def foci(state: Any, scene: Scene) -> None:
@@ -90,10 +105,10 @@ def foci(state: Any, scene: Scene) -> None:
 
 def _map(answer: Answer | None) -> dict[str, Any]:
     if answer is None:
-        return {"picture": "", "felt": "", "largest": ""}
+        return {"picture": "", "felt": "", "ends": []}
     found, unit = answer.map, answer.response.unit
     return {
         "picture": drawings.picture(found),
         "felt": drawings.drawn(found.felt),
-        "largest": drawings.shown_value(float(np.nanmax(found.rms, initial=0.0)), unit),
+        "ends": drawings.ends(float(np.nanmax(found.rms, initial=0.0)), unit),
     }
