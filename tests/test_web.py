@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from simple_model import MovingPressure, Tacton, Trajectory, commanded, spectrum
-from simple_model.flat_body import steady_lines
-from simple_model.focus import lobe_width
+from simple_model.flat_body import point_response, steady_lines
+from simple_model.focus import lobe_width, spot_width
 from skinwave.cli import main
 from skinwave.models.bodies import compliance
 from skinwave.scene import BODIES, Body
@@ -33,6 +33,7 @@ from skinwave.web import (
     moving,
     plots,
     scenes,
+    slabs,
     waves,
     worker,
 )
@@ -435,6 +436,26 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
     shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
     exact = simulate(scene, "flat-body").displacement[:, 0]
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("height", [0.02, 0.09, 0.2, 0.6])
+@pytest.mark.parametrize("body", [BODIES["skin-slab"], Body(depth=np.inf), Body(depth=0.004)])
+def test_one_grid_of_wavenumbers_serves_every_height(body, height):
+    table = slabs.tabulate(slabs.wavenumbers(body, nothing), height)
+    some = slice(None, None, 37)
+    w, distances = 2 * np.pi * table.frequencies[some], table.distances
+    exact = point_response(compliance(body), distances, w, spot_width(height))
+    assert np.abs(table.g[some] - exact).max() < 3e-5 * np.abs(exact).max()
+
+
+def test_another_height_evaluates_no_compliance_anew(scene, monkeypatch):
+    answered = waves.Waves()
+    answered(scene, nothing)
+    monkeypatch.setattr(slabs, "compliance", None)
+    higher = replace(scene, pressure=replace(scene.pressure, height=0.23))
+    shown = answered(higher, nothing).response.displacement[:, 0]
+    exact = simulate(higher, "flat-body").displacement[:, 0]
+    assert np.linalg.norm(shown - exact) < 2e-3 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}, {"shape": "point", "am": 0}])

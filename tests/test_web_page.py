@@ -471,7 +471,10 @@ def test_names_of_lines_are_on_no_peak_and_on_no_other_name(page, query):
         if step == "pinned":
             page.locator("#pin").click()
             page.locator("#published").check()
-            page.wait_for_function("() => window.trame.state.get('spectrum_plot').data.length > 3")
+            page.wait_for_function(
+                "() => window.trame.utils.plots.shown.spectrum_plot.figure.data[0].role"
+                " === 'published'"
+            )
     photographed(page, "names")
     page.locator("#published").uncheck()
 
