@@ -57,22 +57,25 @@ def own_share(moves: int) -> None:
     server = get_server("bench", client_type="vue3")
     session = session_of(server)
     server.state.ready()
-    spent = []
-    for am in 100 + np.arange(moves):
-        before = time.process_time()
-        with server.state:
-            server.state.am = int(am)
-        spent.append(time.process_time() - before)
-    row("the process behind the page, CPU", spent)
+    for key, first in (("am", 100), ("height", 180)):
+        spent = []
+        for value in first + np.arange(moves):
+            before = time.process_time()
+            with server.state:
+                server.state[key] = int(value)
+            spent.append(time.process_time() - before)
+        row(f"{key}: the process behind the page, CPU", spent)
     session.worker.close()
-    answered, spent = waves.Waves(), []
-    for am in 100 + np.arange(moves + 1):
-        scene = scene_of(STARTS | {"body": "skin-slab", "am": float(am)})
-        before = time.process_time()
-        answered(scene, lambda phase, done: None)
-        spent.append(time.process_time() - before)
-    row("waves of the slab, CPU", spent[1:])
-    print(f"{'':<4}the first, with its table: {spent[0]:.2f} s")
+    answered = waves.Waves()
+    for key, first in (("am", 100), ("height", 180)):
+        spent = []
+        for value in first + np.arange(moves + 1):
+            scene = scene_of(STARTS | {"body": "skin-slab", key: float(value)})
+            before = time.process_time()
+            answered(scene, lambda phase, done: None)
+            spent.append(time.process_time() - before)
+        row(f"{key}: waves of the slab, CPU", spent[1:])
+        print(f"{'':<4}the first: {spent[0]:.2f} s")
 
 
 def in_a_browser(moves: int) -> None:
@@ -96,9 +99,11 @@ def in_a_browser(moves: int) -> None:
                 page.wait_for_function(DRAWN)
                 ready.append(time.perf_counter() - before)
             row("page ready", ready)
-            said = "point kernel, Pa"
+            page.goto(address + "?body=none")
+            page.wait_for_function(DRAWN)
+            said = "kernel, same load, Pa"
             times = page.evaluate(PRESSED, ["am", moves, said])
-            row("slider to plots, point kernel", [t / 1e3 for t in times])
+            row("slider to plots, kernel alone", [t / 1e3 for t in times])
             page.goto(address + "?body=skin-slab")
             page.wait_for_function(
                 "() => window.trame?.state?.get('wave_map')?.picture"
@@ -106,6 +111,8 @@ def in_a_browser(moves: int) -> None:
             )
             times = page.evaluate(PRESSED, ["am", moves, "waves (flat-body), µm"])
             row("slider to waves of the slab", [t / 1e3 for t in times])
+            times = page.evaluate(PRESSED, ["height", moves, "waves (flat-body), µm"])
+            row("height to waves of the slab", [t / 1e3 for t in times])
             browser.close()
     finally:
         server.terminate()

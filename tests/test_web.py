@@ -14,9 +14,9 @@ from unittest.mock import AsyncMock, Mock
 import numpy as np
 import pytest
 
-from simple_model import Tacton, Trajectory, commanded, spectrum
-from simple_model.flat_body import steady_lines
-from simple_model.focus import lobe_width
+from simple_model import MovingPressure, Tacton, Trajectory, commanded, spectrum
+from simple_model.flat_body import point_response, steady_lines
+from simple_model.focus import lobe_width, spot_width
 from skinwave.cli import main
 from skinwave.models.bodies import compliance
 from skinwave.scene import BODIES, Body
@@ -33,6 +33,7 @@ from skinwave.web import (
     moving,
     plots,
     scenes,
+    slabs,
     waves,
     worker,
 )
@@ -131,7 +132,8 @@ def test_an_address_carries_every_control():
     changed = STARTS | {
         "amplitude": 55.0, "am": 33.5, "am2": 210.0, "ratio": "0.25:0.75", "envelope": 2.5,
         "duration": 0.7, "shape": "triangle", "size": 31.5, "speed": 4.2, "height": 150.0,
-        "drive": "force_corrected", "body": "palm", "foci": 3, "sharing": "time_multiplexed",
+        "drive": "force_corrected", "profile": "main_lobe", "body": "palm",
+        "foci": 3, "sharing": "time_multiplexed",
         "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
         "drawn": 42.5, "paths": "circle/20/-15/0, line/10/15/0.5, point/0/0/-20",
     }  # fmt: skip
@@ -265,6 +267,59 @@ def test_undo_takes_a_drawn_slider_as_one_move():
     assert history.redo() is None
 
 
+# The load
+
+
+def test_a_page_opens_with_a_body_under_the_load_of_command_line_and_python():
+    scene = scenes.scene_of(STARTS)
+    assert scene.body == BODIES["skin-slab"]
+    load = MovingPressure(tacton=scene.tacton)
+    assert scene.pressure == load
+    assert loads(dumps(scene)).pressure == load
+
+
+def test_a_body_changes_nothing_of_the_kernel_beside_it():
+    for load in ({}, {"drive": "linear"}, {"profile": "main_lobe"}):
+        given = [STARTS | load | {"body": body} for body in controls.CHOICES["body"]]
+        kernels = [model.kernel(scenes.scene_of(values)).response for values in given]
+        for other in kernels[1:]:
+            assert np.array_equal(other.displacement, kernels[0].displacement)
+
+
+def test_the_published_kernel_is_shown_beside_the_one_under_the_same_load(session):
+    def named():
+        return [d["name"] for d in session.state.spectrum_plot["data"]]
+
+    assert named()[:1] == ["kernel, same load, Pa"]
+    with session.state:
+        session.state.published = True
+    assert named()[:2] == ["kernel, as published, Pa", "kernel, same load, Pa"]
+    for given in ({}, {"am": 90}):
+        with session.state:
+            session.state.update(given)
+        shown = session.state.waveform_plot["data"][0]["y"]
+        own = compute(session.scene, "point-kernel-published").displacement[:, 0]
+        assert max(shown) == pytest.approx(own[:600].max(), abs=0.01)
+        assert min(shown) == pytest.approx(own[:600].min(), abs=0.01)
+        assert min(session.state.waveform_plot["data"][1]["y"]) >= 0, "a squared drive only pushes"
+    with session.state:
+        session.state.published = False
+    assert named()[:1] == ["kernel, same load, Pa"]
+
+
+def test_scenes_and_addresses_of_earlier_versions_load(request):
+    text = '[focus]\ndrive = "linear"\nprofile = "main_lobe"\n[body]\nkind = "none"\n'
+    values = scenes.values_of(loads(text))
+    assert (values["drive"], values["profile"], values["body"]) == ("linear", "main_lobe", "none")
+    assert controls.from_query("body=paper-sheet&drive=linear&am=80")[1] == ()
+
+
+def test_a_main_lobe_on_a_slab_is_refused_rather_than_answered_as_a_gaussian():
+    scene = scenes.scene_of(STARTS | {"profile": "main_lobe", "duration": 0.1})
+    with pytest.raises(ValueError, match="'main_lobe' has no wavenumber integral on a slab"):
+        waves.Waves()(scene, nothing)
+
+
 # What is shown
 
 
@@ -272,7 +327,7 @@ def test_what_is_shown_is_what_simulate_answers():
     scene = scenes.scene_of(STARTS)
     shown, alone = model.kernel(scene), compute(scene, "point-kernel")
     f, amplitude = spectrum(alone)
-    plot = plots.spectrum_plot(shown, None, (), highest=600)["data"][0]
+    plot = plots.spectrum_plot(plots.Curves(kernel=shown), highest=600)["data"][0]
     assert plot["x"] == pytest.approx(f[f <= 600])
     assert plot["y"] == pytest.approx(amplitude[f <= 600, 0], abs=1e-4 * amplitude.max())
     named = {line.name: line for line in shown.lines}
@@ -315,14 +370,40 @@ def test_the_influenced_area_ends_a_main_lobe_from_the_path():
 
 
 def test_the_carrier_is_shown_where_it_can_be_resolved():
-    tacton = scenes.scene_of(STARTS).tacton
-    t, p, resolved = model.commanded_curve(tacton, 0.001, 0.002)
-    assert resolved
-    assert p == pytest.approx(commanded(tacton, t))
-    t, p, resolved = model.commanded_curve(tacton, 0, 1)
-    assert not resolved
-    assert len(t) <= model.MOST_SHOWN
-    assert p.max() == pytest.approx(1, abs=0.05)
+    pressure = scenes.scene_of(STARTS | {"drive": "linear"}).pressure
+    found = model.commanded_curve(pressure, 0.001, 0.002)
+    assert found.carrier
+    assert found.largest == pytest.approx(commanded(pressure.tacton, found.times))
+    found = model.commanded_curve(pressure, 0, 0.06)
+    assert not found.carrier
+    assert len(found.times) <= model.MOST_SHOWN
+    assert found.largest.max() == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("drive", controls.CHOICES["drive"])
+def test_the_square_of_the_commanded_sound_is_what_pushes(drive):
+    values = STARTS | {"drive": drive, "am2": 90, "ratio": "0.5:0.5", "amplitude": 60}
+    pressure = scenes.scene_of(values | {"pulses": "20/10"}).pressure
+    t = np.linspace(0, 0.1, 999)
+    pushed = pressure.gain(t) / pressure.peak_pressure
+    sound = model.sound_amplitude(pressure, t)
+    assert (sound if drive == "linear" else sound**2) == pytest.approx(pushed)
+
+
+@pytest.mark.parametrize(("am", "envelope", "duration"), [(500, 0, 10), (499, 3, 1), (140, 0, 2)])
+def test_the_commanded_signal_has_its_true_envelope_however_long(am, envelope, duration):
+    values = STARTS | {"am": am, "envelope": envelope, "duration": duration}
+    pressure = scenes.scene_of(values).pressure
+    found = model.commanded_curve(pressure, 0, duration)
+    width = found.times[1] - found.times[0]
+    within = np.linspace(-0.5, 0.5, 2000) * width
+    for k in range(0, len(found.times), 37):
+        true = np.abs(model.sound_amplitude(pressure, found.times[k] + within))
+        assert found.largest[k] == pytest.approx(true.max(), abs=0.02)
+        assert found.least[k] == pytest.approx(true.min(), abs=0.02)
+    plot = plots.commanded_plot(pressure, 0, duration)
+    assert "largest and least" in plot["title"]
+    assert "pressure squared" in plot["title"]
 
 
 def test_a_thinned_curve_keeps_its_peaks():
@@ -355,6 +436,43 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
     shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
     exact = compute(scene, "flat-body").displacement[:, 0]
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("height", [0.02, 0.09, 0.2, 0.6])
+@pytest.mark.parametrize("body", [BODIES["skin-slab"], Body(depth=np.inf), Body(depth=0.004)])
+def test_one_grid_of_wavenumbers_serves_every_height(body, height):
+    table = slabs.tabulate(slabs.wavenumbers(body, nothing), height)
+    some = slice(None, None, 37)
+    w, distances = 2 * np.pi * table.frequencies[some], table.distances
+    exact = point_response(compliance(body), distances, w, spot_width(height))
+    assert np.abs(table.g[some] - exact).max() < 3e-5 * np.abs(exact).max()
+
+
+def test_another_height_evaluates_no_compliance_anew(scene, monkeypatch):
+    answered = waves.Waves()
+    answered(scene, nothing)
+    monkeypatch.setattr(slabs, "compliance", None)
+    higher = replace(scene, pressure=replace(scene.pressure, height=0.23))
+    shown = answered(higher, nothing).response.displacement[:, 0]
+    exact = compute(higher, "flat-body").displacement[:, 0]
+    assert np.linalg.norm(shown - exact) < 2e-3 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}, {"shape": "point", "am": 0}])
+@pytest.mark.parametrize("moving", [False, True])
+def test_silence_moves_nothing_and_is_drawn_as_zero(more, moving):
+    given = STARTS | {"body": "skin-slab", "amplitude": 0, "duration": 0.1} | more
+    scene = scenes.scene_of(given)
+    kernel, shown = model.kernel(scene), waves.Waves()(scene, nothing, moving)
+    assert not shown.response.displacement.any()
+    assert (shown.lines, shown.map.felt) == ((), ())
+    assert not shown.map.rms.any()
+    assert (shown.moving is not None) == moving
+    curves = plots.Curves(kernel=kernel, waves=shown)
+    for plot in (plots.spectrum_plot(curves), plots.waveform_plot(curves, (0.0, 0.06))):
+        ranges = [plot[axis]["range"] for axis in ("y", "y2")]
+        assert np.isfinite(ranges).all()
+        assert all(low < high for low, high in ranges)
 
 
 @pytest.mark.parametrize("more", [{}, {"pulses": "30/20"}])
@@ -585,10 +703,8 @@ def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
 
 
 def test_waves_are_stale_until_they_are_answered(session):
-    with session.state:
-        session.state.body = "skin-slab"
     assert session.state.waves_stale
-    assert [d["name"] for d in session.state.waveform_plot["data"]] == ["point kernel, Pa"]
+    assert [d["name"] for d in session.state.waveform_plot["data"]] == ["kernel, same load, Pa"]
     answer = waves.Waves()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number - 1, answer)
@@ -615,6 +731,21 @@ def test_waves_are_stale_until_they_are_answered(session):
     assert not session.state.busy
 
 
+def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
+    answer = waves.Waves()(session.scene, nothing)
+    effort = replace(
+        answer.response.effort, warnings=("wrong by about 18 %", "wrong by about 18 %")
+    )
+    answer = replace(answer, response=replace(answer.response, effort=effort))
+    assert session.state.warnings == []
+    with session.state:
+        told(session, "answer", session.number, answer)
+    assert session.state.warnings == ["wrong by about 18 %"]
+    with session.state:
+        session.state.am = 150
+    assert session.state.warnings == [], "they are of another answer"
+
+
 def test_a_held_frequency_and_a_preset(session):
     with session.state:
         session.state.hold = True
@@ -635,17 +766,28 @@ def test_a_held_frequency_and_a_preset(session):
 def test_pinning_keeps_and_exchanges(session):
     with session.state:
         moves.pin(session)
-        session.state.am = 90
-    assert any(d["name"] == "pinned kernel, Pa" for d in session.state.spectrum_plot["data"])
+        session.state.update({"am": 90, "body": "none"})
+    shown, pinned, _ = session.state.spectrum_plot["data"]
+    assert [shown["name"], pinned["name"]] == [
+        "B: kernel, same load, Pa",
+        "A: kernel, same load, Pa",
+    ]
+    assert shown["role"] != pinned["role"]
+    assert session.state.differs == [
+        {"name": "AM frequency", "a": "140 Hz", "b": "90 Hz"},
+        {"name": "Body", "a": "skin-slab", "b": "none"},
+    ]
     with session.state:
         moves.exchange(session)
     assert session.state.am == 140
+    assert session.state.differs[0] == {"name": "AM frequency", "a": "90 Hz", "b": "140 Hz"}
     with session.state:
         moves.exchange(session)
     assert session.state.am == 90
     with session.state:
         moves.pin(session)
     assert len(session.state.waveform_plot["data"]) == 1
+    assert session.state.differs == []
 
 
 def test_foci_follow_paths_of_their_own(session):
@@ -837,9 +979,10 @@ def test_what_of_a_scene_is_beyond_its_control_is_left_out_and_said(request):
     from skinwave.web.serve import session_of
 
     server = get_server(request.node.name, client_type="vue3")
-    text = dumps(scenes.scene_of(STARTS | {"x": 150.0, "speed": 45.0, "am": 90.0}))
+    given = STARTS | {"body": "none"}
+    text = dumps(scenes.scene_of(given | {"x": 150.0, "speed": 45.0, "am": 90.0}))
     session = session_of(server, text)
-    assert session.values == STARTS | {"am": 90.0}
+    assert session.values == given | {"am": 90.0}
     assert "x: 150 mm is outside -50 to 50 mm" in session.state.problem
     assert "speed: 45 m/s is outside 0 to 40 m/s" in session.state.problem
 
@@ -928,7 +1071,7 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
         moves.restart(again, first.state.query)
     assert again.scene.body == Body(depth=0.008)
     lost = session_of(server, "", query)
-    assert lost.state.body == "none"
+    assert lost.state.body == STARTS["body"]
     assert "the scene that it came from is not open" in lost.state.problem
 
 

@@ -191,6 +191,20 @@ def test_the_spectrum_on_the_page_is_what_simulate_answers(page):
     photographed(page, "kernel")
 
 
+def test_it_opens_with_the_skin_slab_and_its_body_first(page):
+    assert page.locator(".v-field:has(#body)").inner_text().strip().endswith("skin-slab")
+    first = page.locator("#controls input, #controls [role=slider]").first
+    assert first.get_attribute("id") == "body"
+    page.wait_for_function("() => window.trame.state.get('wave_map').picture")
+    page.locator("#published").check()
+    page.wait_for_function(
+        "() => window.trame.utils.plots.shown.waveform_plot.figure.data.length === 3"
+    )
+    assert drawn(page, "waveform_plot")[0]["name"] == "kernel, as published, Pa"
+    photographed(page, "published")
+    page.locator("#published").uncheck()
+
+
 @pytest.mark.parametrize("key", [key for key in NUMBERS if key not in ("ramp", "drawn")])
 def test_a_slider_and_a_field_turn_each_number(page, key):
     number, row = NUMBERS[key], page.locator(f".sw-row:has(#{key}-field)")
@@ -223,8 +237,8 @@ def test_a_number_can_be_typed_digit_by_digit(page):
 def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
     choose(page, "ratio", "0.25:0.75")
     query_has(page, "ratio=0.25:0.75")
-    choose(page, "drive", "pressure squared")
-    query_has(page, "drive=pressure_squared")
+    choose(page, "drive", "linear")
+    query_has(page, "drive=linear")
     page.locator("#foci-field").fill("3")
     choose(page, "sharing", "in turn")
     query_has(page, "sharing=time_multiplexed")
@@ -351,7 +365,6 @@ def test_foci_follow_paths_of_their_own(page, tmp_path):
     page.wait_for_selector("#paths-error", state="detached")
     page.locator("#pulses-field").fill("100/50")
     query_has(page, "pulses=100/50")
-    choose(page, "body", "skin-slab")
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     photographed(page, "own-paths")
     kept = state(page, "query")
@@ -381,8 +394,14 @@ def test_presets_undo_redo_pin_and_looks(page):
     query_has(page, "size=30")
     page.locator("#pin").click()
     page.locator("#undo").click()
-    page.wait_for_function("() => window.trame.state.get('spectrum_plot').data.length === 3")
-    assert drawn(page, "spectrum_plot")[0]["name"] == "pinned kernel, Pa"
+    state_becomes(page, "query", "")
+    names = [curve["name"] for curve in drawn(page, "spectrum_plot")]
+    assert "A: kernel, same load, Pa" in names
+    assert "B: kernel, same load, Pa" in names
+    names, a, b = (row.split("\t") for row in page.locator("#differs tr").all_inner_texts())
+    assert names[1:] == ["AM frequency", "Size", "Drawing speed"]
+    assert a == ["A, pinned", "80 Hz", "30 mm", "18 m/s"]
+    assert b == ["B, shown", "140 Hz", "20 mm", "12 m/s"]
     page.locator("#swap").click()
     query_has(page, "size=30")
     photographed(page, "pinned")
@@ -406,6 +425,172 @@ def test_a_click_or_a_key_on_the_map_selects(page):
     before = state(page, "x")
     area.press("ArrowRight")
     page.wait_for_function("x => window.trame.state.get('x') > x + 0.9", arg=before)
+
+
+def test_every_press_on_the_map_counts_however_fast(page):
+    page.locator("#kernel-map").evaluate(
+        """map => {
+          for (const [key, count] of [['Right', 9], ['Up', 7], ['Left', 2]])
+          for (let k = 0; k < count; k++)
+            map.dispatchEvent(
+              new KeyboardEvent('keydown', {key: 'Arrow' + key, bubbles: true})) }"""
+    )
+    state_becomes(page, "x", STARTS["x"] + 7)
+    query_has(page, "x=17&y=7")
+
+
+NAMED = """() => {
+  const plot = window.trame.utils.plots.shown.spectrum_plot, { box, figure } = plot, crossed = [];
+  const of = (axis) => figure[axis].range, [from, to] = plot.zoom || figure.x.range;
+  const over = (a, b) =>
+    a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
+  for (const [k, one] of plot.named.entries()) {
+    const out = one.y < box.y || one.x < box.x || one.x + one.w > box.x + box.w;
+    if (out || plot.named.some((other, n) => n !== k && over(one, other)))
+      crossed.push(['a name or the edge', one.said]);
+    for (const curve of figure.data) for (let n = 0; n < curve.y.length; n++) {
+      const [low, high] = of(curve.axis), x = box.x + box.w * (curve.x[n] - from) / (to - from);
+      const y = box.y + box.h * (1 - (curve.y[n] - low) / (high - low));
+      if (over(one, { x, y, w: 0, h: 0 })) crossed.push([curve.name, one.said]);
+    }
+  }
+  return [plot.named.length, crossed] }"""
+
+
+@pytest.mark.parametrize(
+    "query", ["", "body=none", "am=80&size=30", "am=37&am2=55&ratio=0.5:0.5", "drive=linear"]
+)
+def test_names_of_lines_are_on_no_peak_and_on_no_other_name(page, query):
+    page.evaluate("q => window.trame.trigger('restart', [q])", query)
+    state_becomes(page, "query", query)
+    state_becomes(page, "waves_stale", False)
+    for step in ("pinned", "published"):
+        count, crossed = page.evaluate(NAMED)
+        assert count >= 3
+        assert crossed == []
+        if step == "pinned":
+            page.locator("#pin").click()
+            page.locator("#published").check()
+            page.wait_for_function(
+                "() => window.trame.utils.plots.shown.spectrum_plot.figure.data[0].role"
+                " === 'published'"
+            )
+    photographed(page, "names")
+    page.locator("#published").uncheck()
+
+
+def test_no_name_of_a_curve_is_on_a_curve(page):
+    state_becomes(page, "waves_stale", False)
+    page.locator("#pin").click()
+    page.locator("#am-field").fill("99")
+    query_has(page, "am=99")
+    state_becomes(page, "waves_stale", False)
+    for plot in ("waveform_plot", "spectrum_plot"):
+        shown = f"window.trame.utils.plots.shown.{plot}"
+        lowest = page.evaluate(f"() => Math.max(...{shown}.entries.map(({{ y }}) => y + 6))")
+        assert lowest > 28, "there are too many for one row"
+        assert lowest <= page.evaluate(f"() => {shown}.box.y")
+
+
+def test_colours_have_a_bar_with_unit_and_sign(page):
+    state_becomes(page, "waves_stale", False)
+    bars = page.locator(".sw-ends")
+    assert re.fullmatch(r"0\s+[\d.]+\s+[\d.]+ Pa", bars.nth(0).inner_text())
+    assert re.fullmatch(r"0\s+[\d.]+\s+[\d.]+ µm", bars.nth(1).inner_text())
+    assert "linear-gradient" in page.locator(".sw-colours").nth(0).evaluate(
+        "bar => getComputedStyle(bar).backgroundImage"
+    )
+    page.locator("#solid").click()
+    page.wait_for_function("() => window.trame.state.get('body_motion').frames")
+    low, _, high = page.locator(".sw-ends").nth(1).inner_text().splitlines()
+    assert re.fullmatch(r"[\d.]+ µm out of the body", low)
+    assert re.fullmatch(r"[\d.]+ µm into the body", high)
+    page.locator("#solid").click()
+
+
+def test_warnings_stand_at_the_top_as_text(page):
+    said = "a <b>linear</b> sheet <img src=x onerror='window.hurt = 1'>"
+    page.evaluate("said => window.trame.state.set('warnings', [said])", said)
+    page.wait_for_selector("#warnings")
+    assert page.locator("#warnings").inner_text() == f"Warning: {said}"
+    assert page.evaluate("window.hurt") is None
+    top = page.locator("#warnings").bounding_box()
+    assert top["y"] + top["height"] <= page.locator("#kernel-map").bounding_box()["y"]
+    page.evaluate("() => window.trame.state.set('warnings', [])")
+
+
+TOLD = """() => {
+  const light = ([r, g, b]) => [r, g, b].map((c) => c / 255)
+    .map((c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, c, k) => sum + c * [0.2126, 0.7152, 0.0722][k], 0);
+  const canvas = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+  const rgba = (said) => { canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = said;
+    canvas.fillRect(0, 0, 1, 1); const c = canvas.getImageData(0, 0, 1, 1).data;
+    return [c[0], c[1], c[2], c[3] / 255]; };
+  const mixed = (over, under) => [0, 1, 2].map((k) => over[3] * over[k] + (1 - over[3]) * under[k]);
+  const found = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const at = walk.currentNode.parentElement;
+    if (!walk.currentNode.data.trim() || !at?.checkVisibility({ opacityProperty: true })
+        || at.closest('[aria-hidden=true], :disabled, .v-btn--disabled, script, style, title, svg'))
+      continue;
+    const chain = [];
+    for (let e = at; e; e = e.parentElement) chain.unshift(e);
+    let under = [255, 255, 255], text = null;
+    for (const e of chain) {
+      const style = getComputedStyle(e), faded = Number(style.opacity);
+      const back = rgba(style.backgroundColor);
+      back[3] *= faded;
+      under = mixed(back, under);
+      text = [...rgba(style.color)];
+    }
+    text[3] *= chain.reduce((all, e) => all * Number(getComputedStyle(e).opacity), 1);
+    const [a, b] = [light(mixed(text, under)), light(under)].sort((x, y) => y - x);
+    const ratio = (a + 0.05) / (b + 0.05);
+    if (ratio < 4.5) found.push([walk.currentNode.data.trim().slice(0, 40), ratio.toFixed(2)]);
+  }
+  return found }"""
+
+
+@pytest.mark.parametrize("theme", ["as it opens", "the other"])
+def test_text_stands_out_from_what_is_behind_it(page, theme):
+    if theme == "the other":
+        page.locator("#theme").click()
+    page.locator("#pin").click()
+    page.locator("#size-field").fill("900")
+    page.wait_for_selector("#size-error")
+    page.wait_for_timeout(500)  # colours change little by little
+    faint = page.evaluate(TOLD)
+    if theme == "the other":
+        photographed(page, "dark")
+        page.locator("#theme").click()
+    assert faint == []
+
+
+def test_toggles_say_whether_they_are_pressed(page):
+    state_becomes(page, "waves_stale", False)
+    for name in ("pin", "solid", "theme"):
+        button = page.locator(f"#{name}")
+        before, said = button.get_attribute("aria-pressed"), button.inner_text()
+        assert before in ("true", "false")
+        button.click()
+        page.wait_for_function(
+            "([id, before]) => document.getElementById(id).ariaPressed !== before",
+            arg=[name, before],
+        )
+        assert button.inner_text() == said, "what is pressed keeps its name"
+        button.click()
+    for one, other in (("follow-one", "follow-own"), ("shape-circle", "shape-square")):
+        assert page.locator(f"#{one}").get_attribute("aria-pressed") == "true"
+        assert page.locator(f"#{other}").get_attribute("aria-pressed") == "false"
+
+
+def test_a_page_has_one_heading_of_the_first_level_and_can_be_zoomed(page):
+    assert page.locator("h1").count() == 1
+    assert page.locator("h1").inner_text() == "skinwave"
+    viewport = page.locator("meta[name=viewport]").get_attribute("content")
+    assert viewport.startswith("width=device-width")
+    assert not re.search("maximum-scale|minimum-scale|user-scalable", viewport)
 
 
 def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
@@ -442,7 +627,6 @@ def test_curves_are_drawn_read_and_zoomed_by_keys(page):
 
 
 def test_the_body_moves_in_three_dimensions(page):
-    choose(page, "body", "skin-slab")
     page.locator("#solid").click()
     page.wait_for_function("() => window.trame.state.get('body_motion').frames")
     play, now = page.locator("#body-play"), page.locator("#body-now")
@@ -490,16 +674,18 @@ def test_what_is_saved_opens_again(page, tmp_path):
 
 
 def test_plots_follow_a_slider_and_waves_come_with_a_body(page):
+    choose(page, "body", "none")
+    query_has(page, "body=none")
     kernel = latencies(page, "am", 8, "true")
     choose(page, "body", "skin-slab")
     state_becomes(page, "waves_stale", False)
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     shown = drawn(page, "waveform_plot")
-    assert [curve["name"] for curve in shown] == ["point kernel, Pa", "waves (flat-body), µm"]
+    assert [curve["name"] for curve in shown] == ["kernel, same load, Pa", "waves (flat-body), µm"]
     current = "data.some(d => d.name === 'waves (flat-body), µm')"
     overlay = latencies(page, "am", 8, current)
     photographed(page, "waves")
-    for what, times in (("point kernel", kernel), ("waves", overlay)):
+    for what, times in (("kernel", kernel), ("waves", overlay)):
         print(f"{what}: median {statistics.median(times):.3f} s, largest {times.max():.3f} s")
     assert statistics.median(kernel) < 3  # other work may have most of the machine
     assert statistics.median(overlay) < 5

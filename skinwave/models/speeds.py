@@ -9,34 +9,8 @@ from fem.materials import Material
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.compliance import AIR_DENSITY
+from simple_model.tacton import pattern_period, repeated
 from skinwave.scene import Body
-
-try:
-    from simple_model.tacton import pattern_period, repeated  # type: ignore[attr-defined]
-except ImportError:  # a Tacton does not know its own period yet
-
-    def repeated(tacton: Tacton) -> dict[str, float]:
-        """Names and frequencies in Hz of what a Tacton repeats, but for its rhythm and signal."""
-        w1, w2 = tacton.superposition
-        found = {
-            "f_AM": tacton.am_frequency * (w1 > 0),
-            "f_AM2": tacton.second_am_frequency * (w2 > 0),
-            "f_e": tacton.envelope_frequency,
-            "f_d": tacton.drawing_frequency,
-        }
-        return {name: f for name, f in found.items() if f > 0}
-
-    def pattern_period(tacton: Tacton) -> float:
-        """The period in s of the whole pattern; the duration if it has none within that."""
-        found = repeated(tacton).values()
-        if not found:
-            return tacton.duration
-        for turns in range(1, int(tacton.duration * min(found) + SAME) + 1):
-            whole = [f * turns / min(found) for f in found]
-            if all(abs(n - round(n)) <= SAME * n for n in whole):
-                return turns / min(found)
-        return tacton.duration
-
 
 FEWEST, MOST = 40, 256  # frames of what pictures play
 EACH = 8  # frames to a period of the fastest line that counts

@@ -10,6 +10,7 @@ from math import isfinite
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
+from simple_model import MovingPressure
 from simple_model.choices import choose
 from simple_model.drive import DRIVES
 from simple_model.tacton import SHARINGS, SUPERPOSITIONS
@@ -59,6 +60,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "ratio": tuple(RATIOS),
     "shape": SHAPES,
     "drive": tuple(DRIVES),
+    "profile": ("gaussian", "main_lobe"),
     "body": (*BODIES, OWN_BODY),
     "sharing": SHARINGS,
 }
@@ -66,14 +68,26 @@ STARTS = {
     **{key: number.start for key, number in NUMBERS.items()},
     "ratio": "1:0",
     "shape": "circle",
-    "drive": "linear",
-    "body": "none",
+    "drive": MovingPressure.drive,
+    "profile": MovingPressure.focus,
+    "body": "skin-slab",
     "sharing": "simultaneous",
     "pulses": "",
     "phases": "",
     "paths": "",
 }
 KEYS = tuple(STARTS)
+NAMES = {key: number.label for key, number in NUMBERS.items()} | {
+    "ratio": "Superposition ratio",
+    "shape": "Shape of the path",
+    "drive": "Drive law",
+    "profile": "Focus profile",
+    "body": "Body",
+    "sharing": "Several foci",
+    "pulses": "Rhythm, ms",
+    "phases": "Phases, %",
+    "paths": "Paths",
+}
 MOST_PULSES = 64
 
 
@@ -186,6 +200,18 @@ def from_query(query: str, own: bool = False) -> tuple[Values, tuple[str, ...]]:
         except ValueError as error:
             refused.append(f"left out of the address: {key}: {error}")
     return values, tuple(refused)
+
+
+def values_in(query: str) -> Values:
+    """The values that `to_query` wrote, of a page that has them still."""
+    return from_query(query, own=True)[0]
+
+
+def said(key: str, value: Any) -> str:
+    """A value as it is read, with its unit."""
+    if key not in NUMBERS:
+        return str(value).replace("_", " ") or "none"
+    return f"{value:g} {NUMBERS[key].unit}".strip()
 
 
 def in_range(values: Mapping[str, Any]) -> tuple[Values, tuple[str, ...]]:

@@ -12,7 +12,7 @@ from typing import Any
 
 from simple_model.response import step
 from skinwave.exports import sampled, write_table
-from skinwave.pictures.figures import colour, drawn
+from skinwave.pictures.figures import colour, drawn, label
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
@@ -125,6 +125,12 @@ def _body_of(scene: Scene, answer: Answer) -> str:
     return next((n for n, body in BODIES.items() if body == scene.body), scene.body.kind)
 
 
+def _column(scene: Scene, answer: Answer) -> str:
+    """What tables and figures know an answer by, as `Run.column`."""
+    name = _body_of(scene, answer)
+    return answer.response.model if name == "none" else name
+
+
 def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
     """Maps, waveform and spectrum; `kind` is "svg" or "png"."""
     from matplotlib.figure import Figure
@@ -132,7 +138,7 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
     for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
         unit, per = ("Pa", 1.0) if answer.response.unit == "Pa" else ("µm", 1e6)
-        edge, line_style = 1e3 * REACH, {"lw": 1, "color": colour(_body_of(scene, answer))}
+        edge, line_style = 1e3 * REACH, {"lw": 1, "color": colour(_column(scene, answer))}
         image = row[0].imshow(
             per * answer.map.rms, extent=(-edge, edge, -edge, edge), origin="lower", cmap="cividis"
         )
@@ -144,7 +150,7 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
         for line in answer.map.felt:
             row[0].plot(*(1e3 * line.T), color="#ff2fd0", lw=1)
         row[0].plot(*(1e3 * answer.response.probes.T), "x", color="white")
-        row[0].set(xlabel="x, mm", ylabel="y, mm", title=answer.response.model)
+        row[0].set(xlabel="x, mm", ylabel="y, mm", title=label(_column(scene, answer)))
         shown = answer.response.times <= 0.06
         row[1].plot(1e3 * answer.response.times[shown],
                     per * answer.response.displacement[shown, 0], **line_style)  # fmt: skip

@@ -13,6 +13,11 @@ from simple_model import Tacton
 from simple_model.joined import parted
 from skinwave.web.model import Answer, Map
 
+# Of 255; red into the body and blue out of it, as in the pictures of a report. Also in body.js.
+INTO, OUT, STILL = (
+    np.array(c) for c in ((178.5, 22.95, 43.35), (33.15, 102.0, 170.85), (247.35,) * 3)
+)
+
 
 def picture(found: Map) -> str:
     """RMS of a map as the address of a PNG, from dark (none) to light (its largest)."""
@@ -43,9 +48,12 @@ def speeds(tacton: Tacton) -> str:
     return f"{', '.join(each)} m/s"
 
 
-def shown_value(value: float, unit: str) -> str:
-    """A value as a text with its unit, Pa or m in micrometre."""
-    return f"{value:.3g} Pa" if unit == "Pa" else f"{1e6 * value:.3g} µm"
+def ends(largest: float, unit: str) -> list[str]:
+    """What the left end, the middle and the right end of a colour bar stand for: 0 to `largest`,
+    Pa or m in micrometre.
+    """
+    value, said = (largest, "Pa") if unit == "Pa" else (1e6 * largest, "µm")
+    return ["0", f"{value / 2:.3g}", f"{value:.3g} {said}"]
 
 
 def rows(kernel: Answer, waves: Answer | None) -> list[dict[str, str]]:
@@ -76,9 +84,27 @@ def written(name: str) -> str:
     return name
 
 
+def _gradient(colours: Floats, places: Floats) -> str:
+    """Colours of 0..255 at places 0..1 from left to right, as CSS."""
+    stops = [f"rgb({r:.0f} {g:.0f} {b:.0f}) {100 * place:.1f}%"
+             for (r, g, b), place in zip(colours, places, strict=True)]  # fmt: skip
+    return f"linear-gradient(to right, {', '.join(stops)})"
+
+
 @cache
 def _shades() -> NDArray[np.float64]:
     """Colours (256, 3) from least to most, told apart by every kind of colour vision."""
     from matplotlib import colormaps
 
     return np.asarray(np.round(255 * colormaps["cividis"](np.arange(256))[:, :3]))
+
+
+def _signed_shades() -> str:
+    """As body.js colours motion: by the root of its share of the largest."""
+    part = np.linspace(-1, 1, 41)
+    way = np.where(part[:, None] > 0, INTO, OUT)
+    return _gradient(STILL + np.sqrt(np.abs(part))[:, None] * (way - STILL), (part + 1) / 2)
+
+
+SEQUENTIAL = _gradient(_shades()[::15], np.linspace(0, 1, 18))
+SIGNED = _signed_shades()

@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import sys
 import uuid
 from collections.abc import Callable
@@ -24,6 +25,7 @@ LARGEST = 2**26  # bytes of a message
 # For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
 # limit to what was freed once, and a process that answers for hours fills with gaps.
 RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
+VIEWPORT = re.compile(r'width=device-width,[^"]*')  # with what keeps a reader from zooming in
 
 
 class Front:
@@ -170,6 +172,7 @@ async def _alive(_: web.Request) -> web.Response:
 def _page(folder: str) -> Any:
     text = Path(folder, "index.html").read_text(encoding="utf-8")
     text = text.replace("<title>trame is built by Kitware</title>", "<title>skinwave</title>")
+    text = VIEWPORT.sub("width=device-width, initial-scale=1", text)
 
     async def page(_: web.Request) -> web.Response:
         return web.Response(text=text, content_type="text/html")

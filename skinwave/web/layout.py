@@ -8,7 +8,7 @@ from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import client, html
 from trame.widgets import vuetify3 as v3
 
-from skinwave.web import controls, moves, panels
+from skinwave.web import controls, drawings, moves, panels
 from skinwave.web.plots import SPANS
 from skinwave.web.session import Session
 from skinwave.web.shown import HIGHEST
@@ -26,7 +26,7 @@ LOST = """
 </div>
 """
 PLOTS = {
-    "commanded_plot": "The commanded Tacton over time",
+    "commanded_plot": "The commanded signal over time",
     "waveform_plot": "Waveform at the selected point",
     "spectrum_plot": "Spectrum at the selected point, with its lines and what is felt of them",
 }
@@ -59,14 +59,18 @@ def lay_out(session: Session) -> None:
             panels.control_panel(session)
         panels.about()
         with v3.VMain(), html.Div(classes="sw-page", id="ready"):
+            with html.Div(classes="sw-above"):
+                panels.warnings()
+                panels.differences()
             _maps(session)
             _plots(session)
 
 
 def _bar(session: Session) -> None:
     with v3.VAppBar(density="compact", flat=True, border=True, height=48):
-        _button("mdi-menu", "Show or hide the control panel", "drawer = !drawer")
-        v3.VAppBarTitle("skinwave", style="flex: 0 0 auto; min-width: 90px")
+        _button("mdi-menu", "Control panel", "drawer = !drawer", 'aria-expanded="String(!!drawer)"')
+        with v3.VAppBarTitle(style="flex: 0 0 auto; min-width: 90px"):
+            html.H1("skinwave", classes="sw-title")
         with v3.VMenu():
             with v3.Template(v_slot_activator="{ props }"):
                 v3.VBtn("Presets", v_bind="props", append_icon="mdi-menu-down", id="presets")
@@ -82,14 +86,17 @@ def _bar(session: Session) -> None:
         _button(
             "mdi-redo", "Redo", partial(moves.redo, session), id="redo", disabled=("!redoable",)
         )
-        v3.VBtn("{{ pinned ? 'Unpin' : 'Pin' }}", prepend_icon="mdi-pin",
+        v3.VBtn("Pin", prepend_icon="mdi-pin",
                 click=partial(moves.pin, session),
-                id="pin", title="Keep what is shown as dotted curves, to compare with")  # fmt: skip
+                id="pin", raw_attrs=[':aria-pressed="String(pinned)"'],
+                title="Keep what is shown as A, to compare with B, what is shown then")  # fmt: skip
         v3.VBtn("A/B", click=partial(moves.exchange, session), disabled=("!pinned",), id="swap",
-                title="Exchange what is shown and what is pinned")  # fmt: skip
+                title="Exchange A, which is pinned, and B, which is shown")  # fmt: skip
         _save_menu()
-        _button("mdi-theme-light-dark", "Light or dark", "dark = !dark", id="theme")
-        _button("mdi-information-outline", "About this model", "about = !about", id="about")
+        _button("mdi-theme-light-dark", "Dark", "dark = !dark", 'aria-pressed="String(dark)"',
+                id="theme")  # fmt: skip
+        _button("mdi-information-outline", "About this model", "about = !about",
+                'aria-expanded="String(about)"', id="about")  # fmt: skip
 
 
 def _save_menu() -> None:
@@ -104,35 +111,43 @@ def _save_menu() -> None:
                 )  # fmt: skip
 
 
-def _button(icon: str, said: str, click: Any, **more: Any) -> None:
+def _button(icon: str, said: str, click: Any, state: str = "", **more: Any) -> None:
+    """A button with an icon; `state` is the attribute that says whether it is pressed, if it is
+    one that stays so.
+    """
+    told = [f":{state}"] if state else []
     v3.VBtn(icon=icon, click=click, title=said, density="comfortable",
-            raw_attrs=[f'aria-label="{said}"'], **more)  # fmt: skip
+            raw_attrs=[f'aria-label="{said}"', *told], **more)  # fmt: skip
 
 
 def _maps(session: Session) -> None:
     with html.Div(classes="sw-maps"):
         with html.Div():
-            html.Div(
-                "<b>Point kernel</b>, RMS pressure: up to {{ kernel_map.largest }}",
-                classes="sw-caption",
-            )
-            panels.area("kernel_map", "kernel-map", "point kernel")
+            html.Div("<b>Kernel, same load</b>: RMS pressure, Pa", classes="sw-caption")
+            panels.area("kernel_map", "kernel-map", "kernel, same load")
+            panels.colour_bar("kernel_map.ends", drawings.SEQUENTIAL)
         with html.Div(v_if="body != 'none'", classes=("{ 'sw-stale': waves_stale }",)):
             with html.Div(classes="sw-caption sw-which"):
                 html.Span(
-                    "<b>Waves</b>, {{ solid ? 'moving' : 'RMS displacement' }}: up to "
-                    "{{ (solid ? body_motion.largest : wave_map.largest) || '…' }}"
+                    "<b>Waves</b>: {{ waves_stale ? 'being computed' : solid ? "
+                    "'displacement, µm' : 'RMS displacement, µm' }}"
                 )
-                html.Button("{{ solid ? 'map' : '3-D' }}", click="solid = !solid", id="solid",
-                            title="The body in three dimensions, or its map")  # fmt: skip
+                html.Button(
+                    "3-D", click="solid = !solid", id="solid",
+                    title="The body in three dimensions, moving, instead of its map",
+                    raw_attrs=[':aria-pressed="String(solid)"'],
+                )  # fmt: skip
             panels.area("wave_map", "wave-map", "waves in the body", "!solid")
+            with html.Div(v_if="!solid"):
+                panels.colour_bar("wave_map.ends", drawings.SEQUENTIAL)
             panels.body()
         with html.Div(style="grid-column: 1 / -1"):
             html.Div(
-                "<span><b style='color:#56B4E9'>━</b> path, foci</span> "
-                "<span>┄ border of the influence</span> "
-                "<span><b style='color:#CC4FA0'>━</b> of what can be felt</span> "
-                "<span><b style='color:#D55E00'>✕</b> selected</span>",
+                "<span><b aria-hidden='true' style='color:#56B4E9'>━</b> path, foci</span> "
+                "<span><b aria-hidden='true'>┄</b> border of the influence</span> "
+                "<span><b aria-hidden='true' style='color:#CC4FA0'>━</b> of what can be felt"
+                "</span> "
+                "<span><b aria-hidden='true' style='color:#D55E00'>✕</b> selected</span>",
                 classes="sw-caption sw-legend",
             )
             v3.VSlider(
@@ -146,7 +161,7 @@ def _maps(session: Session) -> None:
 def _plots(session: Session) -> None:
     with html.Div(classes=("['sw-plots', `sw-of-${body}`]",)):
         for name, said in PLOTS.items():
-            with html.Div(classes=("{ 'sw-stale': stale }",)):
+            with html.Div():
                 html.Canvas(id=name, raw_attrs=[
                     'tabindex="0"', 'role="img"',
                     f'aria-label="{said}; plus and minus zoom, arrow keys move, Home shows all"',

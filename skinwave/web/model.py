@@ -13,19 +13,20 @@ from simple_model import (
     Response,
     Tacton,
     Trajectory,
-    commanded,
     evenly,
     line_table,
     modulation,
+    published,
     resolved_lines,
     sensation_level,
     spectrum,
 )
+from simple_model.drive import DRIVES
 from simple_model.focus import lobe_width
 from simple_model.joined import parted
 from simple_model.line_names import level_factor
 from simple_model.steady import along_path, load_lines, path_knots
-from simple_model.tacton import CARRIER, level
+from simple_model.tacton import CARRIER, level, tones
 from skinwave.run import JUDGED, is_skin
 from skinwave.scene import Scene
 from skinwave.simulation import compute
@@ -43,6 +44,7 @@ HIGHEST = 1000.0  # Hz of spectra
 FAINTEST = 1e-3  # of the strongest line: weaker ones are not named
 UNTRUSTED = 0.5  # of a response: lines that what is left cannot tell apart are not named
 RESOLVED = 10  # samples of a period of the carrier
+SMOOTH = 16  # and of the fastest modulation, whose peaks are then within 2 %
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,9 +84,28 @@ class Answer:
     moving: Moving | None = None
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Commanded:
+    """A commanded signal at `times` (t,) in s, as a share of full drive: with its `carrier` or the
+    `largest` amplitude (t,) about each time and, if it changes in between, the `least` (t,).
+    """
+
+    times: Floats
+    largest: Floats
+    least: Floats | None = None
+    carrier: bool = False
+
+
 def kernel(scene: Scene) -> Answer:
-    """The point kernel's answer to a scene of one probe."""
+    """The point kernel's answer to a scene of one probe, under the load that a body receives."""
     return answer_of(scene, compute(scene, "point-kernel"), kernel_map(scene.pressure))
+
+
+def as_published(scene: Scene) -> Answer:
+    """The point kernel's answer under the published load, whatever load the scene has."""
+    return answer_of(
+        scene, compute(scene, "point-kernel-published"), kernel_map(published(scene.pressure))
+    )
 
 
 def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:
@@ -209,18 +230,39 @@ def _influenced(path: Trajectory, n_paths: int, height: float) -> tuple[Floats, 
     return borderline(away.reshape(FINE_SIDE, FINE_SIDE), lobe_width(height))
 
 
-def commanded_curve(tacton: Tacton, start: float, end: float) -> tuple[Floats, Floats, bool]:
-    """Times (t,) in s and the commanded Tacton between two times in s.
+def commanded_curve(pressure: MovingPressure, start: float, end: float) -> Commanded:
+    """The commanded signal between two times in s, as the drive law makes it.
 
-    With the carrier, if `MOST_SHOWN` points resolve it; else its upper envelope, and False.
+    With the carrier, if `MOST_SHOWN` points resolve it; else its amplitude, if they resolve its
+    modulation; else the largest and the least amplitude of each of `MOST_ENVELOPE` parts.
     """
+    tacton = pressure.tacton
     start, end = max(0.0, start), min(end, tacton.duration)
-    needed = (end - start) * CARRIER * RESOLVED
-    if needed <= MOST_SHOWN:
+    if (needed := (end - start) * CARRIER * RESOLVED) <= MOST_SHOWN:
         t = np.linspace(start, end, max(2, int(needed) + 1))
-        return t, commanded(tacton, t), True
-    t = np.linspace(start, end, MOST_ENVELOPE)
-    return t, np.asarray(tacton.amplitude * level(tacton, t) * np.abs(modulation(tacton, t))), False
+        wave = sound_amplitude(pressure, t) * np.sin(2 * np.pi * CARRIER * t)
+        return Commanded(times=t, largest=wave, carrier=True)
+    needed = (end - start) * SMOOTH * sum(tones(tacton))  # no line of a product is above the sum
+    if needed <= MOST_SHOWN:
+        t = np.linspace(start, end, max(MOST_ENVELOPE, int(needed)))
+        return Commanded(times=t, largest=np.abs(sound_amplitude(pressure, t)))
+    width = (end - start) / MOST_ENVELOPE
+    middles = np.asarray(start + (np.arange(MOST_ENVELOPE) + 0.5) * width, np.float64)
+    within = np.linspace(-0.5, 0.5, int(np.ceil(needed / MOST_ENVELOPE)) + 1) * width
+    amplitude = np.abs(sound_amplitude(pressure, middles[:, None] + within))
+    return Commanded(times=middles, largest=amplitude.max(axis=1), least=amplitude.min(axis=1))
+
+
+def sound_amplitude(pressure: MovingPressure, t: Floats) -> Floats:
+    """Amplitude (...) of the sound at a focus at times (...) in s, as a share of full drive.
+
+    Its square is what pushes, so that it is the root of what the drive law makes; but for the
+    linear law, by which, as published, the skin feels the signal itself, with its sign.
+    """
+    tacton = pressure.tacton
+    shown, envelope = modulation(tacton, t), tacton.amplitude * level(tacton, t)
+    driven = DRIVES[pressure.drive](envelope, shown, pressure.depth_of_modulation)
+    return np.asarray(driven if pressure.drive == "linear" else np.sqrt(driven))
 
 
 def thinned(x: Floats, y: Floats, most: int = MOST_SHOWN) -> tuple[Floats, Floats]:

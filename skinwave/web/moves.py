@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from skinwave.scene_file import loads
-from skinwave.web import controls, scenes, shown
+from skinwave.web import controls, model, scenes, shown
 from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, Values
 from skinwave.web.downloads import offered
 from skinwave.web.history import History
@@ -25,7 +25,7 @@ def connect(session: Session) -> None:
     """Have a page's session follow what is done on it, and answer it for the first time."""
     watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
         (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest")), (phase, ("phase",)),
-        (solid, ("solid",)), (opened, ("opened",)),
+        (solid, ("solid",)), (opened, ("opened",)), (published, ("published",)),
     )  # fmt: skip
     for answered, keys in watched:
         session.state.change(*keys)(_without_state(answered, session))
@@ -157,7 +157,7 @@ def exchange(session: Session) -> None:
     back, kept = session.state.pinned_query, controls.to_query(session.values)
     session.pinned = session.answers
     session.state.pinned_query = kept
-    take(session, controls.from_query(back, session.own is not None)[0])
+    take(session, controls.values_in(back))
 
 
 def cancel(session: Session) -> None:
@@ -191,6 +191,13 @@ def hold(session: Session) -> None:
 def phase(session: Session) -> None:
     """The foci are to be seen elsewhere on their path."""
     shown.foci(session.state, session.scene)
+
+
+def published(session: Session) -> None:
+    """The kernel as published is to be seen beside the others, or is not."""
+    wanted = session.state.published and session.scene
+    session.published = model.as_published(session.scene) if wanted else None
+    draw(session)
 
 
 def look(session: Session) -> None:

@@ -119,9 +119,17 @@ def sent_motion(moving: Moving, pressure: MovingPressure) -> dict[str, Any]:
         "count": len(t), "period": 1e3 * moving.period, "drawn": drawn,
         "path": _on(points, sides).tobytes(),
         "foci": _on(points, np.stack(at, axis=1).reshape(-1, 2)).tobytes(),
-        "largest": f"{1e6 * largest:.3g} µm", "times": f"{drawn / (1e3 * largest):,.0f}",
+        "ends": signed_ends(largest), "times": f"{drawn / (1e3 * largest):,.0f}",
         "repeats": moving.repeats,
     }  # fmt: skip
+
+
+def signed_ends(largest: float) -> list[str]:
+    """What the left end, the middle and the right end of a colour bar stand for, of motion up to
+    `largest` metre about its mean.
+    """
+    value = f"{1e6 * largest:.3g} µm"
+    return [f"{value} out of the body", "0", f"{value} into the body"]
 
 
 def _on(points: Floats, places: Floats) -> Any:

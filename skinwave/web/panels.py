@@ -6,7 +6,8 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 from trame_client.widgets.core import HtmlElement
 
-from skinwave.web.controls import CHOICES
+from skinwave.web import drawings
+from skinwave.web.controls import CHOICES, NUMBERS
 from skinwave.web.fields import choice, heading, number
 from skinwave.web.moves import cancel
 from skinwave.web.session import Session
@@ -18,9 +19,18 @@ DRIVES = {
     "pressure_squared": "pressure squared: usual AM",
     "force_corrected": "force corrected: square root first",
 }
+PROFILES = {
+    "gaussian": "Gaussian, of the half width and force of the array's",
+    "main_lobe": "main lobe (sinc²), as published",
+}
+REACH_MM = NUMBERS["x"].high
 LEFT_OUT = (
     "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): a skin point feels the pressure of the "
-    "focus where it is, weighted by distance. Nothing propagates, no body gives way.",
+    "focus where it is, weighted by distance. Nothing propagates, no body deflects. <i>Kernel, "
+    "same load</i> has the drive law and focus profile that are chosen, as every body has; "
+    "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. What "
+    "drive and profile change is the one against the other; what propagation changes is the waves "
+    "against the kernel under the same load.",
     "<b>Skin slab</b>: exact waves of an endless flat layer of soft tissue of 15 mm on bone; no "
     "sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
@@ -29,13 +39,12 @@ LEFT_OUT = (
     "as far as the area goes; its sides are drawn straight down to the bone.",
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
     "pressure, 50 Pa at full drive, is uncertain by a factor of 2. Air is left out.",
-    "With a body the focus is a Gaussian of the same width as the main lobe that the point kernel "
-    "alone has. Side lobes, and what several simultaneous foci do to each other, are left out: "
+    "Side lobes of the focus, and what several simultaneous foci do to each other, are left out: "
     "simultaneous and time-multiplexed foci push alike here, devices differ.",
     "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
     "polygon, nowhere further from it than 0.01 mm.",
     "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
-    "above the threshold for a focal spot; point kernel: 4.4 Pa, just felt with AM at 200 Hz. "
+    "above the threshold for a focal spot; kernel: 4.4 Pa, just felt with AM at 200 Hz. "
     "Maps of a rhythm are those of its pulses while they are on.",
     "Weights of the superposition multiply the two "
     "AM sinusoids; a frequency of 0 is a factor of 1.",
@@ -45,6 +54,8 @@ LEFT_OUT = (
 def control_panel(session: Session) -> None:
     """All that can be turned."""
     with html.Div(classes="sw-controls", id="controls"):
+        v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
+                   hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
         heading("In time")
         for key in ("amplitude", "am"):
             number(session, key)
@@ -57,8 +68,11 @@ def control_panel(session: Session) -> None:
         heading("On the skin")
         number(session, "height")
         choice("drive", "Drive law", [{"title": DRIVES[d], "value": d} for d in CHOICES["drive"]])
-        v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
-                   hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
+        choice("profile", "Focus profile",
+               [{"title": PROFILES[p], "value": p} for p in CHOICES["profile"]])  # fmt: skip
+        v3.VCheckbox(v_model=("published", False), density="compact", hide_details=True,
+                     id="published", label="show the kernel as published, too")  # fmt: skip
+        html.Div("that is, under its own load: linear drive, main lobe", classes="sw-note")
         for key in ("x", "y"):
             number(session, key)
         heading("Scene file")
@@ -68,8 +82,11 @@ def control_panel(session: Session) -> None:
 
 def area(name: str, marked: str, said: str, shown: str = "true") -> None:
     """A map of the area with path, foci, borderlines and the selected point, which it selects."""
-    steps = {"left": "x - 1, y", "right": "x + 1, y", "up": "x, y + 1", "down": "x, y - 1"}
-    keys = [f"@keydown.{key}.prevent=\"trigger('select', [{at}])\"" for key, at in steps.items()]
+    steps = {"left": "-1, 0", "right": "1, 0", "up": "0, 1", "down": "0, -1"}
+    keys = [
+        f'@keydown.{key}.prevent="utils.skinwave.step({by}, {REACH_MM:g})"'
+        for key, by in steps.items()
+    ]
     drag = "trigger('select', utils.skinwave.place($event))"
     HtmlElement(
         "svg", v_if=shown, classes="sw-map", id=marked, children=[
@@ -121,6 +138,38 @@ def body() -> None:
             "after which it jumps a little' }}",
             v_if="body_motion.times", classes="sw-caption",
         )  # fmt: skip
+        colour_bar("body_motion.ends || []", drawings.SIGNED)
+
+
+def differences() -> None:
+    """What is pinned and what is shown: where the two sets of values differ."""
+    columns = "<td v-for='row in differs' :key='row.name'>{{ row.%s }}</td>"
+    HtmlElement("table", v_if="pinned", classes="sw-differs", id="differs", children=[
+        "<tr><th scope='col'>{{ differs.length ? '' : 'A and B are the same' }}</th>"
+        "<th v-for='row in differs' :key='row.name' scope='col'>{{ row.name }}</th></tr>"
+        "<tr v-if='differs.length'><th scope='row' class='sw-a'>A, pinned</th>"
+        + columns % "a" + "</tr><tr v-if='differs.length'><th scope='row'>B, shown</th>"
+        + columns % "b" + "</tr>"
+    ])  # fmt: skip
+
+
+def warnings() -> None:
+    """What is less than was asked for, and how wrong the answer may be: as text, for sentences may
+    quote what came from a file.
+    """
+    with html.Div(v_if="warnings.length || expected", classes="sw-warnings", id="warnings",
+                  raw_attrs=['role="status"', 'aria-label="Warnings of this answer"']):  # fmt: skip
+        html.P("Warning: {{ said }}", v_for="said in warnings", key="said")
+        html.P("{{ expected }}", v_if="expected", id="expected")
+
+
+def colour_bar(ends: str, shades: str) -> None:
+    """The colours of a map and what they stand for; `ends` is an expression of texts, evenly
+    spaced.
+    """
+    html.Div(classes="sw-colours", style=f"background: {shades}", raw_attrs=['aria-hidden="true"'])
+    with html.Div(classes="sw-ends"):
+        html.Span("{{ end }}", v_for=f"(end, k) in {ends}", key="k")
 
 
 def line_table() -> None:

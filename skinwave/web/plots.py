@@ -6,14 +6,16 @@ which is the page's own. Zooming is forgotten when `kept` changes.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Tacton, threshold
+from simple_model import MovingPressure, threshold
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, pressure_threshold
+from skinwave.pictures.figures import LABELS
 from skinwave.web.drawings import written
 from skinwave.web.model import Answer, commanded_curve, thinned
 
@@ -22,7 +24,22 @@ STALE = 0.2  # opacity of an answer that is not that of the controls
 NAMED = 6  # lines with a name in the plot
 SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (-0.06, 0.0),
          "all": (0.0, np.inf)}  # fmt: skip
+ROOM = 1.4  # of the tallest line of a spectrum, for names above it
+KERNEL = f"{LABELS['point-kernel']}, Pa"
 Plot = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curves:
+    """What is drawn in one plot: the `kernel` under the load that the `waves` answer to, as well,
+    which are of other controls while `stale`; the kernel as `published`; and what is `pinned`.
+    """
+
+    kernel: Answer
+    waves: Answer | None = None
+    published: Answer | None = None
+    pinned: Sequence[Answer] = ()
+    stale: bool = False
 
 
 def numbers(values: Floats) -> list[float]:
@@ -42,31 +59,40 @@ def span_of(name: str, duration: float) -> tuple[float, float]:
     return start, min(end, duration)
 
 
-def commanded_plot(tacton: Tacton, start: float, end: float) -> Plot:
-    """The commanded Tacton between two times in s, with its carrier if that can be resolved."""
-    t, p, resolved = commanded_curve(tacton, start, end)
-    curve = {
-        "role": "kernel", "axis": "y", "name": "carrier" if resolved else "envelope",
-        "x0": 1e3 * float(t[0]), "dx": 1e3 * float(t[1] - t[0]), "y": numbers(100 * p),
-    }  # fmt: skip
-    shown = "with its 40 kHz carrier" if resolved else "envelope of the carrier; zoom in to see it"
+def commanded_plot(pressure: MovingPressure, start: float, end: float) -> Plot:
+    """The commanded signal between two times in s: with its carrier or, where that cannot be
+    resolved, its envelope.
+    """
+    found = commanded_curve(pressure, start, end)
+    t = 1e3 * found.times
+    curve = {"role": "kernel", "axis": "y", "x0": float(t[0]), "dx": float(t[1] - t[0])}
+    name = "carrier" if found.carrier else "envelope" if found.least is None else "largest"
+    data = [curve | {"name": name, "y": numbers(100 * found.largest),
+                     "mirrored": not found.carrier}]  # fmt: skip
+    if found.carrier:
+        shown = "with its 40 kHz carrier"
+    elif found.least is None:
+        shown = "envelope of the carrier; zoom in to see it"
+    else:
+        shown = "largest and least amplitude; zoom in to see it"
+        least = numbers(100 * found.least)
+        data.append(curve | {"name": "least", "y": least, "mirrored": True, "role": "published"})
+    law = pressure.drive.replace("_", " ")
     return {
-        "title": f"Commanded Tacton, {shown}", "data": [curve | {"mirrored": not resolved}],
-        "x": {"said": "time, ms", "range": [1e3 * float(t[0]), 1e3 * float(t[-1])]},
+        "title": f"Commanded signal, {law}, {shown}", "data": data,
+        "x": {"said": "time, ms", "range": [1e3 * max(0.0, start),
+                                            1e3 * min(end, pressure.tacton.duration)]},
         "y": {"said": "% of full drive", "range": [-108.0, 108.0]},
         "asks": True,
     }  # fmt: skip
 
 
-def waveform_plot(
-    kernel: Answer, waves: Answer | None, pinned: Sequence[Answer], span: tuple[float, float],
-    *, stale: bool = False,
-) -> Plot:  # fmt: skip
+def waveform_plot(curves: Curves, span: tuple[float, float]) -> Plot:
     """Pressure by the point kernel and displacement of the body at the selected point, between two
     times in s.
     """
     data = []
-    for answer, style in _styled(kernel, waves, pinned, stale):
+    for answer, style in _styled(curves):
         times = answer.response.times
         shown = (times >= span[0]) & (times <= span[1] + 0.5 * step(times))
         t, y = thinned(times[shown], answer.response.displacement[shown, 0])
@@ -74,26 +100,24 @@ def waveform_plot(
     return {
         "title": "Waveform at the point", "data": data, "kept": f"{span}", "legend": True,
         "x": {"said": "time, ms", "range": [1e3 * float(end) for end in span]},
-        **_axes(data),
+        **_axes(data, "into the body, µm"),
     }  # fmt: skip
 
 
-def spectrum_plot(
-    kernel: Answer, waves: Answer | None, pinned: Sequence[Answer], *,
-    stale: bool = False, highest: float = 600.0,
-) -> Plot:  # fmt: skip
+def spectrum_plot(curves: Curves, highest: float = 600.0) -> Plot:
     """The spectra at the selected point, their lines named, and what is felt of them."""
-    data = []
-    for answer, style in _styled(kernel, waves, pinned, stale):
+    data, waves = [], curves.waves
+    for answer, style in _styled(curves):
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
     data.append(_pressure_curve(highest) if waves is None else _threshold_curve(highest))
-    named = waves if waves is not None and not stale else kernel
+    named = waves if waves is not None and not curves.stale else curves.kernel
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
-        "names": _names(named, highest), **_axes(data, _tallest(waves, highest), 1.25),
+        "names": _names(named, highest),
+        **_axes(data, "displacement, µm", _tallest(waves, highest), ROOM),
     }  # fmt: skip
 
 
@@ -101,20 +125,29 @@ def _in_unit(answer: Answer) -> float:
     return 1e6 if answer.response.unit == "m" else 1.0
 
 
-def _styled(
-    kernel: Answer, waves: Answer | None, pinned: Sequence[Answer], stale: bool
-) -> list[tuple[Answer, dict[str, Any]]]:
-    """What is drawn, the pinned first, each with its style."""
+def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
+    """What is drawn, in the order of its names: kernels, waves, and all that is pinned, as A."""
+    shown = "B: " if curves.pinned else ""
     found: list[tuple[Answer, dict[str, Any]]] = []
-    for answer in pinned:
-        name = "pinned kernel, Pa" if answer.response.unit == "Pa" else "pinned waves, µm"
-        found.append((answer, {"role": "pinned", "name": name, "dash": "dot"}))
-    found.append((kernel, {"role": "kernel", "name": "point kernel, Pa"}))
-    if waves is not None:
-        name = f"waves ({waves.response.model}), µm" + (" — being computed" if stale else "")
-        style = {"role": "waves", "name": name, "opacity": STALE if stale else 1.0}
-        found.append((waves, style))
+    if curves.published is not None:
+        name = f"{LABELS['point-kernel-published']}, Pa"
+        found.append((curves.published, {"role": "published", "name": name, "width": 0.8}))
+    found.append((curves.kernel, {"role": "kernel", "name": shown + KERNEL}))
+    if curves.waves is not None:
+        style = {"role": "waves", "name": shown + waves_name(curves.waves, curves.stale),
+                 "opacity": STALE if curves.stale else 1.0}  # fmt: skip
+        found.append((curves.waves, style))
+    for answer in curves.pinned:
+        of_kernel = answer.response.unit == "Pa"
+        name = KERNEL if of_kernel else waves_name(answer)
+        style = {"role": "pinned", "name": f"A: {name}", "dash": "dot" if of_kernel else "dash"}
+        found.append((answer, style))
     return [(a, style | {"axis": "y2" if a.response.unit == "m" else "y"}) for a, style in found]
+
+
+def waves_name(answer: Answer, stale: bool = False) -> str:
+    """The name of waves in every legend, with their unit."""
+    return f"waves ({answer.response.model}), µm" + (" — being computed" if stale else "")
 
 
 def _threshold_curve(highest: float) -> dict[str, Any]:
@@ -162,11 +195,13 @@ def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _axes(data: Sequence[Plot], most: float | None = None, room: float = 1.08) -> dict[str, Any]:
-    """Both axes with one zero; `most` is the largest that the second has to show, `room` what
-    there is above the largest, over it.
+def _axes(
+    data: Sequence[Plot], second: str, most: float | None = None, room: float = 1.08
+) -> dict[str, Any]:
+    """Both axes with one zero; `second` is what the second shows and `most` the largest that it has
+    to show, `room` what there is above the largest, over it.
     """
-    said = {"y": "pressure, Pa", "y2": "displacement, µm"}
+    said = {"y": "pressure, Pa", "y2": second}
     ends = {}
     for name in said:
         values = [v for curve in data if curve["axis"] == name for v in curve["y"]]

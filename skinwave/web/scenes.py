@@ -8,7 +8,16 @@ import numpy as np
 from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, evenly, joined
 from simple_model.trajectory import SHAPES
 from skinwave.scene import BODIES, Body, Scene
-from skinwave.web.controls import OWN_BODY, RATIOS, STARTS, Values, checked, phases_of, pulses_of
+from skinwave.web.controls import (
+    CHOICES,
+    OWN_BODY,
+    RATIOS,
+    STARTS,
+    Values,
+    checked,
+    phases_of,
+    pulses_of,
+)
 from skinwave.web.paths import paths_in, paths_of, text_of
 
 
@@ -37,7 +46,7 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
     pressure = MovingPressure(
         tacton=tacton,
-        focus=_profile(body),
+        focus=values["profile"],
         drive=values["drive"],
         height=values["height"] / 1e3,
     )
@@ -65,11 +74,6 @@ def _own_paths(values: Mapping[str, Any]) -> tuple[Trajectory, tuple[float, ...]
     return joined(paths, values["drawn"]), evenly(len(paths))
 
 
-def _profile(body: Body) -> str:
-    """The published model has the main lobe; exact waves and elements a Gaussian of its width."""
-    return "main_lobe" if body.kind == "none" else "gaussian"
-
-
 def values_of(scene: Scene) -> Values:
     """The controls' values that give a scene, probed at its first probe; name and further probes
     are not asked for.
@@ -93,7 +97,7 @@ def values_of(scene: Scene) -> Values:
         != MovingPressure.peak_pressure,
         f"a depth_of_modulation of {pressure.depth_of_modulation:g}": pressure.drive != "linear"
         and pressure.depth_of_modulation != MovingPressure.depth_of_modulation,
-        f"profile = {pressure.focus} of the focus": pressure.focus != _profile(scene.body),
+        f"profile = {pressure.focus} of the focus": pressure.focus not in CHOICES["profile"],
     }  # fmt: skip
     if said := [what for what, holds in beyond.items() if holds]:
         raise ValueError(f"{' and '.join(said)} cannot be turned here; use skinwave run")
@@ -113,6 +117,7 @@ def values_of(scene: Scene) -> Values:
         ),
         "height": 1e3 * scene.pressure.height,
         "drive": scene.pressure.drive,
+        "profile": scene.pressure.focus,
         "body": known.get(scene.body, OWN_BODY),
         "foci": len(tacton.foci),
         "sharing": tacton.sharing,

@@ -8,7 +8,7 @@ import asyncio
 from typing import Any
 
 from skinwave.scene import Body
-from skinwave.web import controls, model, scenes, shown
+from skinwave.web import controls, model, plots, scenes, shown
 from skinwave.web.controls import KEYS, STARTS, Values
 from skinwave.web.history import History
 from skinwave.web.model import Answer
@@ -31,6 +31,7 @@ class Session:
         self.scene: Any = None
         self.kernel: Answer | None = None
         self.waves: Answer | None = None
+        self.published: Answer | None = None
         self.pinned: tuple[Answer, ...] = ()
         self.number = 0
         self.zoomed: tuple[float, float] | None = None
@@ -92,6 +93,7 @@ def refresh(session: Session) -> None:
     try:
         session.scene = scenes.scene_of(session.good, session.own)
         session.kernel = model.kernel(session.scene)
+        session.published = model.as_published(session.scene) if state.published else None
     except ValueError as error:
         state.update({"problem": str(error), "stale": True})
         return
@@ -143,4 +145,12 @@ def draw(session: Session) -> None:
     if session.kernel is not None:
         shown.commanded(session.state, session.scene, session.zoomed)
         shown.foci(session.state, session.scene)
-        shown.answers(session.state, session.scene, session.kernel, session.waves, session.pinned)
+        shown.answers(session.state, session.scene, plots.Curves(
+            kernel=session.kernel, waves=session.waves, published=session.published,
+            pinned=session.pinned, stale=bool(session.state.waves_stale),
+        ))  # fmt: skip
+        session.state.differs = (
+            shown.differs(controls.values_in(session.state.pinned_query), session.good)
+            if session.pinned
+            else []
+        )

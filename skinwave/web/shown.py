@@ -7,8 +7,9 @@ import numpy as np
 
 from skinwave.scene import Body, Scene
 from skinwave.web import drawings, model, moving, plots
-from skinwave.web.controls import CHOICES, OWN_BODY
+from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.model import Answer
+from skinwave.web.plots import Curves
 
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
 
@@ -25,23 +26,22 @@ def first(own: Body | None) -> dict[str, Any]:
         "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
-        "pinned": False, "pinned_query": "", "query": "", "undoable": False, "redoable": False,
+        "warnings": [], "expected": "", "published": False,
+        "pinned": False, "pinned_query": "", "differs": [],
+        "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "untold": "",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
 
-def answers(
-    state: Any, scene: Scene, kernel: Answer, waves: Answer | None, pinned: Sequence[Answer]
-) -> None:
-    """Plots, maps and table of answers; waves are of other controls while `waves_stale`."""
-    stale, tacton = bool(state.waves_stale), scene.tacton
-    given = (kernel, waves, pinned)
+def answers(state: Any, scene: Scene, curves: Curves) -> None:
+    """Plots, maps and table of answers."""
+    kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
     span = plots.span_of(state.span, tacton.duration)
     state.update({
-        "waveform_plot": plots.waveform_plot(*given, span, stale=stale),
-        "spectrum_plot": plots.spectrum_plot(*given, stale=stale, highest=state.highest),
+        "waveform_plot": plots.waveform_plot(curves, span),
+        "spectrum_plot": plots.spectrum_plot(curves, state.highest),
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
@@ -49,6 +49,8 @@ def answers(
         "rows": drawings.rows(kernel, None if stale else waves),
         "untold": untold(len(model.untold_lines(scene, kernel.response)), tacton.duration),
     })  # fmt: skip
+    told = [kernel] if waves is None or stale else [kernel, waves]
+    state.update({"warnings": warnings(told), "expected": expected(told[-1])})
     seen = waves.moving if waves else None
     if seen is not None and not stale:
         state.update({
@@ -57,6 +59,26 @@ def answers(
         })  # fmt: skip
     elif seen is None and state.body_motion:
         state.update({"body_shape": {}, "body_motion": {}})
+
+
+def warnings(answers: Sequence[Answer]) -> list[str]:
+    """What answers say is less than was asked for, each sentence once."""
+    return list(dict.fromkeys(s for answer in answers for s in answer.response.effort.warnings))
+
+
+def expected(answer: Answer) -> str:
+    """How wrong an answer is expected to be, in words, if it says so."""
+    error = getattr(answer.response, "expected_error", None)
+    return "" if not error else f"Expected numerical error: {100 * error:.2g} %"
+
+
+def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
+    """What differs between two sets of values, as a table: A is pinned, B is what is shown."""
+    return [
+        {"name": NAMES[key], "a": said(key, pinned[key]), "b": said(key, values[key])}
+        for key in KEYS
+        if pinned[key] != values[key]
+    ]
 
 
 def untold(count: int, duration: float) -> str:
@@ -70,7 +92,7 @@ def untold(count: int, duration: float) -> str:
 def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> None:
     """The commanded Tacton between two times in s, or in the span that is chosen."""
     between = zoom or plots.span_of(state.span, scene.tacton.duration)
-    state.commanded_plot = plots.commanded_plot(scene.tacton, *between)
+    state.commanded_plot = plots.commanded_plot(scene.pressure, *between)
 
 
 def foci(state: Any, scene: Scene) -> None:
@@ -83,10 +105,10 @@ def foci(state: Any, scene: Scene) -> None:
 
 def _map(answer: Answer | None) -> dict[str, Any]:
     if answer is None:
-        return {"picture": "", "felt": "", "largest": ""}
+        return {"picture": "", "felt": "", "ends": []}
     found, unit = answer.map, answer.response.unit
     return {
         "picture": drawings.picture(found),
         "felt": drawings.drawn(found.felt),
-        "largest": drawings.shown_value(float(np.nanmax(found.rms, initial=0.0)), unit),
+        "ends": drawings.ends(float(np.nanmax(found.rms, initial=0.0)), unit),
     }

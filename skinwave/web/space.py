@@ -32,8 +32,10 @@ def in_space(session: Session) -> None:
         update_modelValue=(partial(follow, session), "[$event]"), variant="outlined",
         id="follow", classes="sw-follow", raw_attrs=['aria-label="What the foci follow"'],
     ):  # fmt: skip
-        v3.VBtn("one path", value="one", id="follow-one", size="small")
-        v3.VBtn("paths of their own", value="own", id="follow-own", size="small")
+        v3.VBtn("one path", value="one", id="follow-one", size="small",
+                raw_attrs=[':aria-pressed="String(!paths)"'])  # fmt: skip
+        v3.VBtn("paths of their own", value="own", id="follow-own", size="small",
+                raw_attrs=[':aria-pressed="String(!!paths)"'])  # fmt: skip
     with html.Div(v_if="!paths"):
         _one_path(session)
     with html.Div(v_if="paths"):
@@ -96,5 +98,7 @@ def _shapes() -> None:
             v3.VBtn(
                 f'<svg viewBox="0 0 24 24" aria-hidden="true"><path d="{path}" '
                 'stroke-linecap="round"/></svg>',
-                value=name, title=name, id=f"shape-{name}", raw_attrs=[f'aria-label="{name}"'],
+                value=name, title=name, id=f"shape-{name}",
+                raw_attrs=[f'aria-label="{name}"',
+                           f""":aria-pressed="String(shape === '{name}')" """],
             )  # fmt: skip

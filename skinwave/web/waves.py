@@ -1,7 +1,7 @@
 """What a body makes of a Tacton, quickly enough to follow a slider.
 
-Slab: exact waves of an endless one. A table of g(r, w), tabulated once for a body and a height,
-carries every path; a probe's motion from rest is then a sum over harmonics of the path, as in
+Slab: the wavenumber integral of an infinite one. A table of g(r, w) for a height carries every
+path (`slabs`); a probe's motion from rest is then a sum over harmonics of the path, as in
 `simple_model.flat_body`, and a line's motion of the whole area
 
     u_f(x) = sum_k g(|x - X_k|, f) w_k(f),   w_k(f) = 1/K sum_n c_fn exp(-2 pi i n a_k)
@@ -22,8 +22,6 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats, Ints, TetMesh
 from simple_model import Effort, MovingPressure, Response, sensation_level
-from simple_model.flat_body import point_response
-from simple_model.focus import spot_width
 from simple_model.response import step
 from simple_model.steady import (
     along_path,
@@ -33,7 +31,7 @@ from simple_model.steady import (
     path_knots,
 )
 from skinwave.effort import Progress
-from skinwave.models.bodies import air, build, compliance, has_exact_waves, operators, surface_load
+from skinwave.models.bodies import air, build, has_exact_waves, operators, surface_load
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
 from skinwave.run import is_skin
@@ -50,11 +48,9 @@ from skinwave.web.model import (
     places,
 )
 from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
+from skinwave.web.slabs import FURTHEST, HIGHEST, Table, tabulate, wavenumbers
 
-HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
-SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
 TAIL = 0.4  # s that motion may last after the Tacton
-FURTHEST = 0.145  # m: from a path in one corner of the area to the other
 FINER = 4  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
@@ -65,15 +61,6 @@ BAND = 1000.0  # Hz
 # Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
 KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Table:
-    """g (f, r) in m/Pa at `frequencies` (f,) in Hz and `distances` (r,) in metre."""
-
-    frequencies: Floats
-    distances: Floats
-    g: fem.Complex
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -101,19 +88,23 @@ class Waves:
     """Answers with a body; keeps what the next answer can use."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, dict[Any, Any]] = {"table": {}, "body": {}, "reduced": {}}
+        self._kept: dict[str, dict[Any, Any]] = {
+            "known": {}, "table": {}, "body": {}, "reduced": {}
+        }  # fmt: skip
 
     def __call__(self, scene: Scene, progress: Progress, moving: bool = False) -> Answer:
         """The answer to a scene of one probe, with the motion of the whole body if `moving`;
         raises what `simulate` does.
         """
         if has_exact_waves(scene.body):
-            flat = (scene.body, scene.pressure.height)
-            table = self._keep("table", flat, lambda: tabulate(*flat, progress))
+            gaussian_only(scene.pressure)
+            height = scene.pressure.height
+            known = self._keep("known", scene.body, lambda: wavenumbers(scene.body, progress))
+            table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
             return flat_answer(table, scene, moving)
         tacton = scene.tacton
         places_only = at_any_speed(tacton.trajectory), tacton.n_paths
-        key = (scene.body, places_only, scene.pressure.height)
+        key = (scene.body, places_only, scene.pressure.height, scene.pressure.focus)
         body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
         return reduced_answer(body, scene, moving)
 
@@ -130,14 +121,19 @@ class Waves:
         return found
 
 
-def tabulate(body: Body, height: float, progress: Progress) -> Table:
-    """The table of a flat body and a height in metre."""
-    progress("exact waves of the slab", 0.0)
-    width = spot_width(height)
-    distances = np.linspace(0, FURTHEST, int(np.ceil(6 * FURTHEST / width)))
-    frequencies = np.arange(0.0, HIGHEST + SPACING, SPACING)
-    g = point_response(compliance(body), distances, 2 * np.pi * frequencies, width)
-    return Table(frequencies=frequencies, distances=distances, g=g)
+def gaussian_only(pressure: MovingPressure) -> None:
+    """Refuse what a table of a Gaussian spot cannot answer.
+
+    Raises
+    ------
+    ValueError
+        If the focus is another.
+    """
+    if pressure.focus != "gaussian":
+        raise ValueError(
+            f"focus profile '{pressure.focus}' has no wavenumber integral on a slab; choose "
+            "'gaussian', which has the same half width and force"
+        )
 
 
 def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
@@ -153,7 +149,10 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     index = np.rint(away / fine[1]).astype(np.int32)
     of_lines = CubicSpline(table.frequencies, table.g, axis=0)(f)
     of_lines = CubicSpline(table.distances, of_lines, axis=1)(fine).astype(np.complex64)
-    motion = np.array([g[index] @ weights for g, weights in zip(of_lines, w, strict=True)])
+    # Silence has no lines, and moves nothing: the shape is not left to what there is.
+    motion = np.zeros((len(f), SIDE**2), np.complex128)
+    for line, g, weights in zip(motion, of_lines, w, strict=True):
+        line[:] = g[index] @ weights
     seen = None
     if moving:
         shape = slab_shape(scene.body, places())

@@ -12,13 +12,13 @@
       gl_Position = vec4(at.xy * size, -at.z * 0.004, 1.0);
       gl_PointSize = 9.0;
     }`;
-  // Blue into the body, red out of it, as in the pictures of a report.
+  // Red into the body, blue out of it, as in the pictures of a report; drawings.py has them, too.
   const FRAGMENT = `#version 300 es
     precision highp float;
     in float motion; in vec3 seen; uniform vec4 own; out vec4 colour;
     void main() {
       if (own.a > 0.0) { colour = own; return; }
-      vec3 still = vec3(0.97), way = motion > 0.0 ? vec3(0.70, 0.09, 0.17) : vec3(0.13, 0.40, 0.67);
+      vec3 still = vec3(0.97), way = motion < 0.0 ? vec3(0.70, 0.09, 0.17) : vec3(0.13, 0.40, 0.67);
       vec3 facing = normalize(cross(dFdx(seen), dFdy(seen)));
       float light = 0.45 + 0.55 * max(0.0, dot(facing, normalize(vec3(-0.4, 0.5, 0.8))));
       colour = vec4(mix(still, way, min(1.0, sqrt(abs(motion)))) * light, 1.0);

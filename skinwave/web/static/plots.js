@@ -2,6 +2,7 @@
 (() => {
   const EDGE = { left: 56, right: 56, top: 22, bottom: 34 };
   const FONT = "Roboto, sans-serif";
+  const PALE = 0.25; // opacity of curves that are not of what the controls say
   const LEAST_DRAG = 6; // pixels that are no click any more
   const shown = {}; // by id of the canvas: { canvas, figure, zoom, drag, at }
 
@@ -31,8 +32,8 @@
   function scales(plot) {
     const { figure, canvas } = plot;
     const w = canvas.clientWidth, h = canvas.clientHeight;
-    const box = { x: EDGE.left, y: EDGE.top, w: w - EDGE.left - EDGE.right,
-                  h: h - EDGE.top - EDGE.bottom };
+    const top = plot.top ?? EDGE.top;
+    const box = { x: EDGE.left, y: top, w: w - EDGE.left - EDGE.right, h: h - top - EDGE.bottom };
     const range = plot.zoom || figure.x.range;
     const to = { x: (v) => box.x + ((v - range[0]) / (range[1] - range[0])) * box.w };
     for (const axis of ["y", "y2"]) {
@@ -89,30 +90,36 @@
     }
   }
 
-  // Names of curves on the right of the title or, where there is no room, below it.
-  function legend(g, { box, w }, figure, colours, ink, paper) {
+  // Where names of curves are: right of the title or, where there is no room, in rows below it; and
+  // how much of the canvas is above the plot then, so that no curve is behind a name.
+  function entries(g, figure, w) {
+    g.font = `500 12px ${FONT}`;
+    let x = 4 + g.measureText(figure.title).width + 16, y = 11;
+    if (figure.data.length < 2 && !figure.legend) return { placed: [], top: EDGE.top };
+    g.font = `11px ${FONT}`;
+    const widths = figure.data.map((curve) => g.measureText(curve.name).width + 34);
+    const all = widths.reduce((a, b) => a + b, 0), below = w - 6 - all < x;
+    x = below ? EDGE.left + 4 : w - 6 - all;
+    if (below) y += 16;
+    const placed = figure.data.map((curve, k) => {
+      if (below && x > EDGE.left + 4 && x + widths[k] > w) {
+        x = EDGE.left + 4;
+        y += 16;
+      }
+      x += widths[k];
+      return { curve, x: x - widths[k], y, wide: widths[k] };
+    });
+    return { placed, top: below ? y + 12 : EDGE.top };
+  }
+
+  function legend(g, { placed }, figure, colours, ink) {
     g.textAlign = "left";
     g.textBaseline = "middle";
     g.fillStyle = ink;
     g.font = `500 12px ${FONT}`;
     g.fillText(figure.title, 4, 11);
-    const after = 4 + g.measureText(figure.title).width + 16;
-    if (figure.data.length < 2 && !figure.legend) return;
     g.font = `11px ${FONT}`;
-    const widths = figure.data.map((curve) => g.measureText(curve.name).width + 34);
-    let x = w - 6 - widths.reduce((a, b) => a + b, 0), y = 11;
-    const below = x < after;
-    if (below) {
-      x = box.x + 4;
-      y = box.y + 10;
-    }
-    for (const [k, curve] of figure.data.entries()) {
-      if (below && x > box.x + 4 && x + widths[k] > w) {
-        x = box.x + 4;
-        y += 16;
-      }
-      g.fillStyle = paper;
-      if (below) g.fillRect(x - 2, y - 8, widths[k], 16);
+    for (const { curve, x, y } of placed) {
       line(g, curve, colours);
       g.beginPath();
       g.moveTo(x, y);
@@ -122,31 +129,89 @@
       g.fillStyle = ink;
       g.fillText(curve.name, x + 24, y);
       g.setLineDash([]);
-      x += widths[k];
     }
   }
+
+  const stale = () => window.trame.state.get("stale");
 
   function line(g, curve, colours) {
     g.strokeStyle = g.fillStyle = colours[curve.role];
-    g.lineWidth = 1.4;
+    g.lineWidth = curve.width ?? 1.4;
     g.setLineDash({ dash: [6, 4], dot: [1.5, 3] }[curve.dash] || []);
-    g.globalAlpha = curve.opacity ?? 1;
+    g.globalAlpha = (curve.opacity ?? 1) * (stale() ? PALE : 1);
   }
 
-  // Names over lines of a spectrum, moved down where they would leave the plot.
-  function names(g, { box, range, to }, figure, ink, paper) {
-    for (const { x, y, axis, said } of figure.names || []) {
+  // The corners of all curves in pixels, with those between which one rises by more than a step.
+  function corners({ box, range, to }, figure) {
+    const found = [];
+    for (const curve of figure.data) {
+      let before = null;
+      for (let k = 0; k < curve.y.length; k++) {
+        const value = xOf(curve, k);
+        if (value < range[0] || value > range[1]) continue;
+        const here = [to.x(value), Math.max(box.y, to[curve.axis](curve.y[k]))];
+        const steps = before ? Math.ceil(Math.hypot(here[0] - before[0], here[1] - before[1]) / 4) : 1;
+        for (let n = 1; n <= steps; n++) {
+          const part = before ? n / steps : 1, from = before || here;
+          found.push([from[0] + part * (here[0] - from[0]), from[1] + part * (here[1] - from[1])]);
+        }
+        before = here;
+      }
+    }
+    return found;
+  }
+
+  const over = (a, b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
+
+  // The place for a name of this size that is nearest to its line and on no curve and no other name;
+  // null if there is none.
+  function place(at, [x, y], [w, h], points, placed) {
+    const { box } = at, found = [];
+    for (let up = 4; y - up - h >= box.y + 1; up += 4)
+      for (let aside = 0; aside <= 72; aside += 6)
+        for (const way of aside ? [-1, 1] : [1]) found.push([up, way * aside]);
+    // The lowest line may have room only beside it.
+    for (let aside = w / 2 + 4; aside <= w / 2 + 76; aside += 6)
+      for (const way of [1, -1])
+        for (let up = -h; up <= 0; up += 6) found.push([up, way * aside]);
+    found.sort((a, b) => Math.hypot(...a) - Math.hypot(...b));
+    for (const [up, aside] of found) {
+      const one = { x: x + aside - w / 2, y: y - up - h, w, h };
+      const within = one.x >= box.x && one.x + w <= box.x + box.w && one.y >= box.y
+        && one.y + h <= box.y + box.h - 2;
+      if (!within || placed.some((other) => over(one, other))) continue;
+      const on = ([px, py]) => px > one.x - 1 && px < one.x + w + 1 && py > one.y - 1 && py < one.y + h + 1;
+      if (!points.some(on)) return one;
+    }
+    return null;
+  }
+
+  // Names beside lines of a spectrum, the strongest first, joined to their line where they are away.
+  function names(g, at, figure, ink) {
+    const { range, to } = at, placed = [], wanted = figure.names || [];
+    const points = wanted.length ? corners(at, figure) : [];
+    for (const { x, y, axis, said } of wanted) {
       if (x < range[0] || x > range[1]) continue;
       const widths = said.map((part) => text(g, part, 11)), wide = Math.max(...widths);
-      const left = Math.min(to.x(x) - wide / 2, box.x + box.w - wide);
-      const top = Math.max(box.y + 2, to[axis](y) - 13 * said.length - 4);
-      g.fillStyle = paper;
-      g.fillRect(left - 2, top, wide + 4, 13 * said.length);
-      g.fillStyle = ink;
+      const peak = [to.x(x), to[axis](y)];
+      const one = place(at, peak, [wide + 2, 13 * said.length], points, placed);
+      if (!one) continue;
+      placed.push({ ...one, said });
+      g.fillStyle = g.strokeStyle = ink;
       g.textAlign = "left";
       g.textBaseline = "middle";
-      said.forEach((part, k) => text(g, part, 11, [left + (wide - widths[k]) / 2, top + 7 + 13 * k]));
+      said.forEach((part, k) =>
+        text(g, part, 11, [one.x + 1 + (wide - widths[k]) / 2, one.y + 7 + 13 * k]));
+      const end = [Math.min(Math.max(peak[0], one.x), one.x + one.w),
+                   Math.min(Math.max(peak[1], one.y), one.y + one.h)];
+      if (Math.hypot(end[0] - peak[0], end[1] - peak[1]) < 9) continue;
+      g.lineWidth = 0.6;
+      g.beginPath();
+      g.moveTo(...peak);
+      g.lineTo(...end);
+      g.stroke();
     }
+    return placed;
   }
 
   // The value of each curve where the pointer is.
@@ -159,7 +224,7 @@
         if (xOf(curve, middle) > value) high = middle; else low = middle;
       }
       const k = value - xOf(curve, low) < xOf(curve, high) - value ? low : high;
-      return `${curve.name.split(",")[0]} ${curve.y[k].toPrecision(4)}`;
+      return `${curve.name} ${curve.y[k].toPrecision(4)}`;
     });
     g.fillStyle = ink;
     g.fillRect(plot.at, box.y, 1, box.h);
@@ -180,8 +245,10 @@
     const style = getComputedStyle(canvas), own = (name) => style.getPropertyValue(name).trim();
     const ink = own("--sw-ink"), faint = own("--sw-grid"), paper = own("--sw-paper");
     const colours = Object.fromEntries(
-      ["kernel", "waves", "pinned", "felt"].map((role) => [role, own(`--sw-${role}`)]));
-    const at = scales(plot), { box } = at, g = canvas.getContext("2d");
+      ["kernel", "published", "waves", "pinned", "felt"].map((role) => [role, own(`--sw-${role}`)]));
+    const g = canvas.getContext("2d"), said = entries(g, figure, canvas.clientWidth);
+    plot.top = said.top;
+    const at = scales(plot), { box } = at;
     if (canvas.width !== Math.round(at.w * ratio)) canvas.width = Math.round(at.w * ratio);
     if (canvas.height !== Math.round(at.h * ratio)) canvas.height = Math.round(at.h * ratio);
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -197,8 +264,9 @@
       stroke(g, curve, at.to);
     }
     g.restore();
-    names(g, at, figure, ink, paper);
-    legend(g, at, figure, colours, ink, paper);
+    plot.named = names(g, at, figure, ink);
+    [plot.box, plot.entries] = [box, said.placed];
+    legend(g, said, figure, colours, ink);
     if (plot.at !== null && !plot.drag) readout(g, at, plot, ink, paper);
     if (plot.drag) {
       g.fillStyle = faint;
@@ -274,6 +342,8 @@
         draw(plot);
       });
     }
+    document.fonts?.ready.then(() => Object.values(shown).forEach(draw));
+    state.watch(["stale"], () => Object.values(shown).forEach(draw));
     state.watch(["dark"], () => setTimeout(() => Object.values(shown).forEach(draw), 50));
   }
 

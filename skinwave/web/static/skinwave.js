@@ -10,6 +10,16 @@ window.trame.utils.skinwave = {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix);
     return [at.x, -at.y];
   },
+  // Move the selected point: every press counts, however many come before an answer does.
+  step(dx, dy, limit) {
+    const { state } = window.trame;
+    const moved = (key, by) => {
+      const value = Math.round(100 * (state.get(key) + by)) / 100;
+      state.set(key, Math.min(limit, Math.max(-limit, value)));
+    };
+    if (dx) moved("x", dx);
+    if (dy) moved("y", dy);
+  },
   prefersDark: () => window.matchMedia("(prefers-color-scheme: dark)").matches,
   // Curves and address follow the state by themselves: nothing else of the page has to for them.
   begin(state, plots) {

@@ -1,0 +1,113 @@
+"""The wavenumber integral of a flat body as a table, made anew for a height within a slider's step.
+
+    g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
+
+of which only the spot S depends on the height: G, which takes the time, is kept on one grid of
+wavenumbers that is fine and wide enough for the narrowest spot. As in `simple_model.flat_body` the
+path of integration runs above the real axis, away from the poles of waves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import jv
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model.compliance import Compliance
+from simple_model.flat_body import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
+from simple_model.focus import spot_width
+from skinwave.effort import Progress
+from skinwave.models.bodies import compliance
+from skinwave.scene import Body
+
+HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
+SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
+FURTHEST = 0.145  # m: from a path in one corner of the area to the other
+LOWEST = 0.02  # m: the height whose spot is the narrowest
+ORDER = 16  # of Gauss and Legendre's rule on each panel
+FEWEST_NODES = 512  # of the wavenumber grid
+LOOKED = 16  # every so many frequencies and distances the grid is checked at
+PHASE = "wavenumber integral of the slab"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """g (f, r) in m/Pa at `frequencies` (f,) in Hz and `distances` (r,) in metre."""
+
+    frequencies: Floats
+    distances: Floats
+    g: fem.Complex
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wavenumbers:
+    """A body's compliance G (f, k) in m/Pa at `frequencies` (f,) in Hz on the path of integration
+    `k` (k,) in 1/m with the `weights` (k,) of its nodes, whose real parts are `along` (k,).
+    """
+
+    frequencies: Floats
+    along: Floats
+    k: fem.Complex
+    weights: fem.Complex
+    G: fem.Complex
+
+
+def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
+    """The compliance of a flat body on a grid that serves every height.
+
+    Raises
+    ------
+    ArithmeticError
+        If no grid is fine enough.
+    """
+    progress(PHASE, 0.0)
+    answer, frequencies = compliance(body), np.arange(0.0, HIGHEST + SPACING, SPACING)
+    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(LOWEST)[::LOOKED]
+    coarse = _tabulated(_on_grid(answer, some, n), LOWEST, at)
+    while n < MOST_NODES:
+        fine = _tabulated(_on_grid(answer, some, 2 * n), LOWEST, at)
+        if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
+            return _on_grid(answer, frequencies, n)
+        coarse, n = fine, 2 * n
+    raise ArithmeticError(UNRESOLVED)
+
+
+def tabulate(known: Wavenumbers, height: float) -> Table:
+    """The table of a flat body for a height in metre."""
+    distances = _distances(height)
+    return Table(
+        frequencies=known.frequencies, distances=distances, g=_tabulated(known, height, distances)
+    )
+
+
+def _distances(height: float) -> Floats:
+    return np.linspace(0, FURTHEST, int(np.ceil(6 * FURTHEST / spot_width(height))))
+
+
+def _tabulated(known: Wavenumbers, height: float, distances: Floats) -> fem.Complex:
+    """g (f, r) at the distances (r,) in metre."""
+    width = spot_width(height)
+    counts = known.along <= 6.5 / width  # beyond, the spot has nothing
+    k = known.k[counts]
+    spot = width**2 * np.exp(-((k * width) ** 2) / 2)
+    carried = known.G[:, counts] * (spot * k * known.weights[counts])
+    return np.asarray(carried @ jv(0, k[:, None] * distances))
+
+
+def _on_grid(answer: Compliance, frequencies: Floats, n: int) -> Wavenumbers:
+    w = 2 * np.pi * frequencies.astype(np.complex128)
+    lift = min(1.5 / FURTHEST, answer.clearance(w))  # J0 grows by e^1.5 at most
+    if not lift > 0:
+        raise ArithmeticError(UNRESOLVED)
+    nodes, weights = np.polynomial.legendre.leggauss(ORDER)
+    # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
+    edges = 6.5 / spot_width(LOWEST) * np.linspace(0, 1, n // ORDER + 1) ** 2
+    half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
+    along = (middle[:, None] + half[:, None] * nodes).ravel()
+    ramp = np.tanh(along / lift)
+    k = along + 1j * lift * ramp
+    return Wavenumbers(
+        frequencies=frequencies, along=along, k=k, G=answer(k, w[:, None]),
+        weights=(half[:, None] * weights).ravel() * (1 + 1j * (1 - ramp**2)),
+    )  # fmt: skip
