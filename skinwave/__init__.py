@@ -20,8 +20,8 @@ _HOMES = {
     "SkinwaveWarning": "effort",
     "Plan": "planning.plan",
     "plan": "planning.plan",
-    "Field": "pictures.motion",
-    "field": "pictures.motion",
+    "Field": "fields",
+    "field": "fields",
     "Agreement": "comparison",
     "compare": "comparison",
 }

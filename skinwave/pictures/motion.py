@@ -3,7 +3,6 @@
 u(x, t) = basis [Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)]
 """
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,26 +13,12 @@ from meshes import TetMesh, part
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.steady import path_knots
-from skinwave.effort import Clock, Progress, SkinwaveWarning, peak_memory, silent, versions
+from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.models.bodies import air, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.models.prepared import BAND, reduced_lines, sample_times
-from skinwave.planning.assessment import told
 from skinwave.scene import Scene
 from skinwave.simulation import check_knobs
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Field:
-    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s, and the relative
-    error that is expected of the probes' waveforms, nan if unknown.
-    """
-
-    mesh: TetMesh
-    times: Floats
-    displacement: Floats
-    effort: Effort
-    expected_error: float = np.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,38 +38,6 @@ class Waves:
     effort: Effort
 
 
-def field(
-    scene: Scene,
-    times: Floats,
-    tolerance: float = 0.02,
-    progress: Progress | None = None,
-    *,
-    h: float | None = None,
-    solver: str = "auto",
-) -> Field:
-    """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
-
-    The body is reduced to the subspace of the load along the path: what it takes grows with the
-    length of the path, and another path needs another reduction. What is less than was asked for,
-    by a coarser mesh beside this one, is told in `effort.warnings`, and each sentence is a
-    `SkinwaveWarning` once.
-
-    Raises
-    ------
-    ValueError
-        If the scene has no body, a number is out of range or the tolerance is out of reach.
-    """
-    moved = waves(scene, tolerance, progress, h=h, solver=solver)
-    displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
-    at_probes = assessed_probes(scene, moved, h, tolerance, solver)
-    for sentence in at_probes.effort.warnings:
-        warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
-    return Field(
-        mesh=moved.mesh, times=times, displacement=displacement, effort=at_probes.effort,
-        expected_error=at_probes.expected_error,
-    )  # fmt: skip
-
-
 def probe_response(scene: Scene, moved: Waves) -> Response:
     """What the probes of a scene see of its body's motion."""
     times, points = sample_times(scene), scene.probe_points
@@ -95,18 +48,6 @@ def probe_response(scene: Scene, moved: Waves) -> Response:
     )  # fmt: skip
 
 
-def assessed_probes(
-    scene: Scene, moved: Waves, h: float | None, tolerance: float, solver: str
-) -> Response:
-    """`probe_response` with its expected error and all warnings, by a coarser mesh beside this."""
-    found = probe_response(scene, moved)
-    if scene.body.is_held:
-        return told(scene, found, found.displacement, h, tolerance, solver)
-    read = fem.probe_operator(moved.mesh, scene.probe_points) @ moved.basis
-    lines = moved.lines[moved.frequencies > 0] @ read.T
-    return told(scene, found, lines, h, tolerance, solver)
-
-
 def waves(
     scene: Scene,
     tolerance: float = 0.02,
@@ -115,7 +56,7 @@ def waves(
     h: float | None = None,
     solver: str = "auto",
 ) -> Waves:
-    """What `field` is made of, for as many times as one likes; raises what `field` does."""
+    """What `skinwave.field` is made of, for as many times as one likes; raises what it does."""
     check_knobs(solver, h=h)
     clock, report = Clock(), progress or silent
     build = meshed(scene.body, h, clock, report)

@@ -16,10 +16,11 @@ from simple_model import Effort, Response, published
 from simple_model.choices import choose
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
+from skinwave.fields import assessed_probes
 from skinwave.files import fill, write_lines
 from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
-from skinwave.pictures.motion import Waves, assessed_probes, waves
+from skinwave.pictures.motion import Waves, waves
 from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run

@@ -5,12 +5,15 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
 from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
+from skinwave.pictures.maps import Raster, sampler
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
 from skinwave.reports.album import Album, open_album
@@ -18,7 +21,8 @@ from skinwave.reports.gallery import Gallery, pictures, run_figures, tactons
 from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
-from skinwave.studies import tables
+from skinwave.studies import summary, tables
+from skinwave.studies.changes import Drawn, beside_kernels, shown
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import (
     SPOTS,
@@ -30,6 +34,7 @@ from skinwave.studies.description import (
     tones_of,
     untold,
 )
+from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
@@ -46,7 +51,7 @@ def write_report(
 ) -> None:
     """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder.
 
-    No model is run.
+    No model of a body is run.
 
     Raises
     ------
@@ -56,19 +61,20 @@ def write_report(
     album = open_album(results)
     (out / "pictures").mkdir()
     gallery = Gallery(folder=out / "pictures", style=style, formats=formats)
-    shown = pictures(album, gallery, progress)
+    views = pictures(album, gallery, progress)
     drawn = run_figures(album, gallery, progress)
     progress("write data", 0.0)
     _write_data(out / "data", album)
     groups = tactons(album)
     names = _names(album.runs)
     parts = [
+        *_first_screen(album, gallery),
         document.warnings_banner(
             (name, run.response.effort) for name, run in zip(names, album.runs, strict=True)
         ),
         _asked(album),
         document.section("What was modelled, and what was left out", *_modelled(album)),
-        document.section("What comes out", *shown),
+        document.section("What comes out", *views),
         document.section("What the probes see", *drawn, *map(_lines, groups.values())),
         document.section("How far the models agree", *_comparison(album)),
         document.section("Effort", _effort(album)),
@@ -82,6 +88,34 @@ def _names(runs: Sequence[Run]) -> list[str]:
     """What runs are called where one is named: by body and, if there are several, by Tacton."""
     several = len({run.tacton for run in runs}) > 1
     return [f"{run.tacton} on {run.body}" if several else run.body for run in runs]
+
+
+def _first_screen(album: Album, gallery: Gallery) -> list[str]:
+    """What propagation changes of the first Tacton, with maps where views are kept."""
+    groups = {name: _with_kernels(runs) for name, runs in tactons(album).items()}
+    first = shown(groups, lambda run: _maps(album, run))
+    if first is None:
+        return []
+    name = first.kernel.tacton * (len(groups) > 1)
+    return summary.top(first, lambda f, text: gallery.figure("propagation", f, text), name)
+
+
+def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
+    """Runs of one Tacton with both point kernels, which are formulas, where they are not kept."""
+    bodies = [run for run in runs if run.response.unit == "m"]
+    return [*beside_kernels(bodies[0])[:2], *bodies] if bodies else runs
+
+
+def _maps(album: Album, run: Run) -> Drawn:
+    """A body's map as its view has it, and the kernel's."""
+    view = album.views.get(run.column)
+    if view is None or view.scene.pressure != run.scene.pressure:
+        return ()
+    x, y = grid(run.scene)
+    carried = sampler(view, Raster(x=x, y=y))
+    level = carried(np.maximum(view.sensation, SILENT))
+    surface = SurfaceMap(x=x, y=y, rms=carried(view.rms), level=level, unit="m")
+    return surface, kernel_map(run.scene.pressure, x, y)
 
 
 def _write_data(folder: Path, album: Album) -> None:

@@ -189,8 +189,8 @@ def _write_page(
     drawn = partial(_picture, folder, "propagation")
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
-        *_introduction(outcome, groups),
         document.warnings_banner(_efforts(runs)),
+        *_introduction(outcome, groups),
         *map(document.paragraph, untold(runs)),
         _picture(folder, "overview", overview, OVERVIEW_CAPTION),
         document.section("What propagation changes", summary.per_tacton(changes(groups))),

@@ -1,0 +1,72 @@
+"""Motion of a whole body, with its expected error and all warnings."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+import fem
+from meshes import TetMesh
+from meshes.tetmesh import Floats
+from simple_model import Effort, Response
+from skinwave.effort import Progress, SkinwaveWarning
+from skinwave.pictures.motion import Waves, from_rest, probe_response, waves
+from skinwave.planning.assessment import told
+from skinwave.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Field:
+    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s, and the relative
+    error that is expected of the probes' waveforms, nan if unknown.
+    """
+
+    mesh: TetMesh
+    times: Floats
+    displacement: Floats
+    effort: Effort
+    expected_error: float = np.nan
+
+
+def field(
+    scene: Scene,
+    times: Floats,
+    tolerance: float = 0.02,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> Field:
+    """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
+
+    The body is reduced to the subspace of the load along the path: what it takes grows with the
+    length of the path, and another path needs another reduction. What is less than was asked for,
+    by a coarser mesh beside this one, is told in `effort.warnings`, and each sentence is a
+    `SkinwaveWarning` once.
+
+    Raises
+    ------
+    ValueError
+        If the scene has no body, a number is out of range or the tolerance is out of reach.
+    """
+    moved = waves(scene, tolerance, progress, h=h, solver=solver)
+    displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
+    at_probes = assessed_probes(scene, moved, h, tolerance, solver)
+    for sentence in at_probes.effort.warnings:
+        warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
+    return Field(
+        mesh=moved.mesh, times=times, displacement=displacement, effort=at_probes.effort,
+        expected_error=at_probes.expected_error,
+    )  # fmt: skip
+
+
+def assessed_probes(
+    scene: Scene, moved: Waves, h: float | None, tolerance: float, solver: str
+) -> Response:
+    """`probe_response` with its expected error and all warnings, by a coarser mesh beside this."""
+    found = probe_response(scene, moved)
+    if scene.body.is_held:
+        return told(scene, found, found.displacement, h, tolerance, solver)
+    read = fem.probe_operator(moved.mesh, scene.probe_points) @ moved.basis
+    lines = moved.lines[moved.frequencies > 0] @ read.T
+    return told(scene, found, lines, h, tolerance, solver)
