@@ -20,22 +20,26 @@ from fem.relaxation import Branch
 from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
+ROUND_OFF = 1e-6  # of the power that goes to and fro
+
 
 @dataclass(frozen=True, kw_only=True)
 class Spent:
     """Work of a load in J (or its mean power in W), what of it was lost in the material, and what
-    left through absorbing ends.
+    left through absorbing ends; and for mean powers what only went to and fro.
     """
 
     work: float = 0.0
     dissipated: float = 0.0
     radiated: float = 0.0
+    exchanged: float = 0.0
 
     def __add__(self, other: "Spent") -> "Spent":
         return Spent(
             work=self.work + other.work,
             dissipated=self.dissipated + other.dissipated,
             radiated=self.radiated + other.radiated,
+            exchanged=self.exchanged + other.exchanged,
         )
 
     @property
@@ -100,8 +104,11 @@ def stored(operators: Operators, state: State) -> float:
 
 
 def imbalance(spent: Spent, stored: float = 0.0) -> float:
-    """Energy that is missing or too much, relative to all that went round; `stored` in J since."""
-    size = max(abs(spent.work), abs(stored) + spent.lost)
+    """Energy that is missing or too much, relative to all that went round; `stored` in J since.
+
+    Where nothing is lost, round-off of what goes to and fro is no imbalance.
+    """
+    size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
     return abs(spent.work - stored - spent.lost) / size if size > 0 else 0.0
 
 
@@ -123,7 +130,8 @@ def mean_power(
     branches : what relaxes, of (n, n) each
     """
     w = 2 * np.pi * frequencies
-    supplied = float(w @ np.imag(forces * motion.conj()).sum(axis=1)) / 2
+    apparent = w * (forces * motion.conj()).sum(axis=1) / 2
+    supplied = float(apparent.imag.sum())
     velocity = w[:, None] * motion
 
     def taken(D: Floats, lag: Floats) -> float:
@@ -136,4 +144,5 @@ def mean_power(
     radiated = taken(R, always)
     relaxed = sum(taken(b.K, b.time / (1 + (w * b.time) ** 2)) for b in branches)
     dissipated = taken(C, always) - radiated + relaxed
-    return Spent(work=supplied, dissipated=dissipated, radiated=radiated)
+    exchanged = float(np.abs(apparent).sum())
+    return Spent(work=supplied, dissipated=dissipated, radiated=radiated, exchanged=exchanged)

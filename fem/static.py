@@ -1,11 +1,18 @@
 """Rest and free vibration: K u = f, and K u = w^2 M u."""
 
+from collections.abc import Iterator
+
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from fem.assembly import Operators
-from fem.linear_solver import factorise
+from fem.linear_solver import Factor, factorise
+from fem.transient import Diverged
 from meshes.tetmesh import Floats
+
+FLOATING = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency: shifts of free bodies
+RIGID = 1e-14  # of it: a motion below is rigid
+MOST_RESTARTS = 40  # of Lanczos' method
 
 
 def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floats:
@@ -29,13 +36,45 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
     """The n lowest natural frequencies (n,) in Hz and mass-normalised shapes (3 n, n).
 
     Rigid motions of a free body come out near 0 Hz. Damping is left out.
+
+    Raises
+    ------
+    Diverged
+        If they do not converge.
     """
-    # A shift well below the first bending mode of any body worth meshing, yet far enough from 0
-    # for a body that floats: (1e-3)^2 of the highest frequency of the mesh.
-    shift = 1e-6 * operators.K.trace() / operators.M.trace()
-    factor = factorise(operators.K + shift * operators.M, backend=solver)
-    inverse = LinearOperator(operators.K.shape, factor.solve, dtype=np.float64)
-    squares, shapes = eigsh(operators.K, n, M=operators.M, sigma=-shift, OPinv=inverse)
-    order = np.argsort(squares)
-    frequencies = np.sqrt(np.maximum(squares[order], 0)) / (2 * np.pi)
-    return frequencies, operators.expand(shapes[:, order])
+    K, M = operators.K, operators.M
+    for shift, factor in _inverses(operators, solver):
+        inverse = LinearOperator(K.shape, factor.solve, dtype=np.float64)
+        try:
+            squares, shapes = eigsh(K, n, M=M, sigma=-shift, OPinv=inverse, maxiter=MOST_RESTARTS)
+        except ArpackNoConvergence:
+            continue
+        order = np.argsort(squares)
+        frequencies = np.sqrt(np.maximum(squares[order], 0)) / (2 * np.pi)
+        return frequencies, operators.expand(shapes[:, order])
+    raise Diverged(
+        f"the {n} lowest modes did not converge in {MOST_RESTARTS} restarts: the body is so thin "
+        "that round-off hides them; hold it, ask for more modes, or mesh a thicker equivalent"
+    )
+
+
+def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor]]:
+    """Shifts s and factorised K + s M: 0 where the body is held; where it floats, smaller and
+    smaller parts of the square of the mesh's highest frequency, which only a solid body's first
+    modes are above.
+    """
+    K, M = operators.K, operators.M
+    scale = K.trace() / M.trace()
+    try:
+        factor = factorise(K, backend=solver)
+    except ValueError:
+        held = False
+    else:
+        # An inverse iteration ends near a rigid motion if there is one, whose K is round-off.
+        u = factor.solve(M @ np.random.default_rng(0).standard_normal(len(operators.free)))
+        held = bool(u @ (K @ u) > RIGID * scale * (u @ (M @ u)))
+    if held:
+        yield 0.0, factor
+        return
+    for part in FLOATING:
+        yield part * scale, factorise(K + part * scale * M, backend=solver)

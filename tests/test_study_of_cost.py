@@ -12,7 +12,14 @@ from meshes import cache
 from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
-from skinwave.models.bodies import cell_layers, check_mesh, coarsest_size, default_size
+from skinwave.models.bodies import (
+    cell_layers,
+    check_mesh,
+    coarsest_size,
+    default_size,
+    has_exact_waves,
+)
+from skinwave.models.full import harmonic_answer
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.cautions import other_loss
 from skinwave.planning.estimates import is_flat, motion_lines, returned_and_start
@@ -41,6 +48,30 @@ def test_the_plan_takes_exact_waves_where_there_are_any():
     assert plan(loads(SHORT)).model == "flat-body"
     assert plan(loads("[body]\nkind = 'none'")).model == "point-kernel"
     assert plan(loads("[body]\ndepth_mm = inf")).model == "flat-body"
+
+
+LOSSLESS = (
+    "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.4999, viscosity_pa_s=VISCOUS}"
+)
+
+
+@pytest.mark.parametrize("viscosity", ["0", "1e-6"])
+def test_a_slab_that_loses_nothing_is_planned(viscosity):
+    text = SHORT.replace("[body]", f"[body]\n{LOSSLESS}")
+    scene = loads(text.replace("VISCOUS", viscosity))
+    for required in (plan(scene), plan(scene, model="flat-body")):
+        assert required.model == "flat-body"
+        assert required.error < 0.05
+        assert required.warnings == ()
+    assert np.isfinite(simulate(scene).displacement).all()
+
+
+def test_elements_of_a_body_that_loses_nothing_balance_their_energy():
+    text = SHORT.replace("[body]", f"[body]\nsides = 'clamped'\n{LOSSLESS}")
+    scene = loads(text.replace("VISCOUS", "0"))
+    times = np.arange(500) / 1e4
+    found = harmonic_answer(scene, times, lambda what, done: None, h=0.01)
+    assert found.effort.energy_imbalance < 0.01
 
 
 @pytest.mark.parametrize(
@@ -204,7 +235,8 @@ def test_a_body_without_loss_is_judged_by_its_load():
     scene = loads(SHORT.replace("width_mm = 60", f"width_mm = 30\n{lossless}"))
     frequencies, _ = motion_lines(scene, 0.05)
     assert 140 in frequencies
-    assert not is_flat(scene)
+    assert is_flat(scene)  # from rest
+    assert not has_exact_waves(scene.body)  # that have gone on for ever
 
 
 def test_exact_waves_are_not_planned_for_what_has_none():

@@ -282,8 +282,15 @@ def has_exact_waves(body: Body) -> bool:
 
     Without any loss a slab's resonances have no limit.
     """
+    return is_plain_layer(body) and body.solid.has_loss
+
+
+def is_plain_layer(body: Body) -> bool:
+    """Whether a body is a half-space or a slab on a rigid base, of one material, across the beam:
+    if nothing is lost in it, it has exact waves from rest, but no steady state.
+    """
     layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
-    return layer and body.is_plain and body.solid.has_loss
+    return layer and body.is_plain
 
 
 def exact_waves(body: Body, model: str) -> Compliance:

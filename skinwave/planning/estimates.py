@@ -9,9 +9,9 @@ from meshes.tetmesh import Floats
 from simple_model import Trajectory
 from simple_model.flat_body import flat_body, point_response, steady_lines, steady_state
 from simple_model.focus import spot_width
-from simple_model.steady import load_lines, summed
+from simple_model.steady import Complex, load_lines, summed
 from simple_model.trajectory import BY_POINTS
-from skinwave.models.bodies import compliance, has_exact_waves
+from skinwave.models.bodies import compliance, is_plain_layer
 from skinwave.scene import Body, Scene
 
 REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
@@ -34,17 +34,24 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     elif not body.solid.has_loss or (
         body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped")
     ):
-        lines = load_lines(scene.pressure, tolerance / 100)
-        f, a = summed(lines.frequencies, lines.coefficients[:, None])
+        f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
         if pressure.focus != "gaussian":  # of the same width; only which lines matter is asked
             pressure = replace(pressure, focus="gaussian")
-        f, a = steady_lines(
-            compliance(body), pressure, scene.probe_points, threshold=tolerance / 100
-        )
+        try:
+            f, a = steady_lines(
+                compliance(body), pressure, scene.probe_points, threshold=tolerance / 100
+            )
+        except ArithmeticError:  # next to no loss
+            f, a = _lines_of_load(scene, tolerance)
     power = np.abs(a) ** 2 * np.where(f > 0, 0.5, 1.0)[:, None]
     return f, power / np.maximum(power.sum(axis=0), 1e-300)
+
+
+def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
+    lines = load_lines(scene.pressure, tolerance / 100)
+    return summed(lines.frequencies, lines.coefficients[:, None])
 
 
 def highest_line(frequencies: Floats, shares: Floats, tolerance: float) -> float:
@@ -55,12 +62,13 @@ def highest_line(frequencies: Floats, shares: Floats, tolerance: float) -> float
 
 def is_flat(scene: Scene) -> bool:
     """Whether there are exact waves for the scene, but for what its sides send back."""
-    return has_exact_waves(scene.body) and scene.pressure.focus == "gaussian"
+    return is_plain_layer(scene.body) and scene.pressure.focus == "gaussian"
 
 
 def returned_and_start(scene: Scene) -> tuple[float, float]:
     """What the sides send back to the probes over their motion in an endless body, and what of that
-    motion is not its steady state; at most 1 each. Both are followed for the first `FOLLOWED`.
+    motion is not its steady state; at most 1 each. Both are followed for the first `FOLLOWED`. What
+    loses nothing, or next to nothing, has no steady state, and all of its motion counts.
 
     What a side sends back to a probe is what an endless body would have at the probe's mirror
     image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
@@ -82,7 +90,10 @@ def returned_and_start(scene: Scene) -> tuple[float, float]:
     back = min(1.0, IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share)
     if tacton.is_sampled or tacton.trajectory.shape == "recorded":
         return back, 1.0
-    steady = steady_state(compliance(body), scene.pressure, probes, times).displacement
+    try:
+        steady = steady_state(compliance(body), scene.pressure, probes, times).displacement
+    except ArithmeticError:
+        return back, 1.0
     left = (u[:, : len(probes)] - steady) ** 2
     # What is left at the end of that time is taken to last: it is less.
     lasting = left[-len(left) // 4 :].mean(axis=0) * (tacton.duration - len(times) / FOLLOWED_AT)
@@ -101,7 +112,7 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     """Steady motion that absorbing sides `half` (2,) metre away send back, over the probes' own.
 
     By mirror images of the focus in the four sides and the exact waves of the endless body, for
-    the lines that the load is made of.
+    the lines that the load is made of. 1, for unknown, of a body that loses too little for that.
     """
     body, width = scene.body, spot_width(scene.pressure.height)
     path = _along(scene.tacton.trajectory)
@@ -114,7 +125,10 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     frequencies, which = np.unique(lines.frequencies[kept], return_inverse=True)
     strength = np.bincount(which, lines.strengths[kept] ** 2)
     table = np.arange(0.0, FAR, width / 2)
-    g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
+    try:
+        g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
+    except ArithmeticError:
+        return 1.0
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
     share = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
     return min(1.0, REFLECTED * float(np.sqrt(share.max())))
