@@ -312,7 +312,7 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
     table = line_table(pressure, point_kernel(pressure, outermost[::7], times))
     level = [sensation_level(table.amplitudes[name], f, unit="Pa")
              for name, f in table.frequencies.items()]  # fmt: skip
-    assert np.max(level, axis=0) == pytest.approx(0, abs=0.3)
+    assert np.max(level, axis=0) == pytest.approx(0, abs=1.0)
 
 
 def test_nothing_is_felt_of_what_does_not_vibrate_nor_on_paper():

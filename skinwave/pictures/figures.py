@@ -104,15 +104,18 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         style: dict[str, Any] = {"color": colour(run.body), "marker": marker(run.body), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
         labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
-    for kind in dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+    kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
+    if kinds:
         style = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        labels.append(f"open: {kind}")
+        labels.append(f"open: {', '.join(kinds)}")
     figure.legend(
         handles,
         labels,
         loc="outside upper center" if figure.get_layout_engine() else "upper center",
         ncols=len(labels),
+        fontsize="small" if kinds else None,
+        columnspacing=1.2,
         frameon=False,
     )
 
