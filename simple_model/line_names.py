@@ -34,6 +34,7 @@ MOST = 200  # lines
 SAME = 1e-3  # over the duration: lines as near to each other in Hz coincide
 TWICE = 1.5  # periods: what is repeated less often makes no line of its own
 PULSED = 2**14  # samples of a period of a rhythm or signal
+ROUND_OFF = 1e-10  # of the strongest harmonic of the path, its mean
 MOST_HARMONICS = 400  # of a path that are combined with the others
 MOST_PRODUCTS = 4000  # orders of the gain that are combined with the path's
 
@@ -147,7 +148,7 @@ def _orders(name: str) -> Orders:
 def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
     """Orders (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
     tacton = pressure.tacton
-    n, share = path_strengths(pressure, 1e-3 * threshold)
+    n, share = path_strengths(pressure, ROUND_OFF)
     share = share * np.abs(foci_harmonics(pressure, n))
     gain, c = _gain_products(pressure, 1e-3 * threshold)
     of_tacton = symbols(tacton)

@@ -219,8 +219,11 @@ def _table(
     wanted |= found.strengths == 0
     listed = fit.resolved & wanted
     lost = wanted & ~fit.resolved & ~_near(f, f[fit.resolved], least)
+    bin_width = 1 / (step(response.times) * len(response.times))
     mixed = fit.fitted & ~fit.resolved & (found.strengths > 0) & (relative > SEEN)
-    alone = [peak for peak in peaks if not _near(np.array([peak.frequency]), f[mixed], least)[0]]
+    mixed &= f >= LOBE * bin_width
+    alone = [x for x in peaks
+             if not _near(np.array([x.frequency]), f[lost], LOBE * bin_width)[0]]  # fmt: skip
     unnamed = [*_mixed(response, f[mixed]), *alone]
     unnamed.sort(key=lambda peak: -float((peak.amplitudes / loudest).max()))
     return LineTable(

@@ -15,8 +15,8 @@ from simple_model import (
     flat_body,
     joined,
     lines,
+    named_lines,
     point_kernel,
-    tacton_lines,
 )
 from simple_model.compliance import half_space
 from simple_model.joined import parted
@@ -112,10 +112,10 @@ def test_bodies_answer_them_by_lines_as_by_time_steps(more):
 
 def test_lines_have_the_names_of_the_common_frequency():
     load = together(STRAIGHT, am_frequency=83.0, duration=0.2)
-    names = tacton_lines(load.tacton)
+    names = named_lines(load)
     assert load.tacton.drawing_frequency == pytest.approx(FREQUENCY)
-    assert [name for name in names if name.endswith("f_d")] == ["f_d", *(f"{k}f_d" for k in
-                                                                         range(2, 6))]  # fmt: skip
+    assert [name for name in names if name.endswith("f_d")][:5] == ["f_d", "2f_d", "3f_d", "4f_d",
+                                                                    "5f_d"]  # fmt: skip
     assert names["f_d"] == pytest.approx(FREQUENCY)
     assert names["2f_d-f_AM"] == pytest.approx(2 * FREQUENCY - 83)
     # A quarter of it cancels between them and is named by nothing.
@@ -129,8 +129,8 @@ def test_lines_have_the_names_of_the_common_frequency():
 
 def test_a_recording_that_is_run_through_once_has_no_drawing_frequency():
     once = together(STRAIGHT, duration=1 / FREQUENCY)
-    assert not tacton_lines(once.tacton)
-    assert tacton_lines(together(STRAIGHT, duration=2 / FREQUENCY).tacton)
+    assert not named_lines(once)
+    assert named_lines(together(STRAIGHT, duration=2 / FREQUENCY))
 
 
 def test_each_path_is_there_again_among_the_parts():

@@ -132,10 +132,11 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         style: dict[str, Any] = {"color": colour(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
         labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
-    for kind in dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+    kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
+    if kinds:
         style = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        labels.append(f"open: {kind}")
+        labels.append(f"open: {', '.join(kinds)}")
     figure.legend(
         handles,
         labels,

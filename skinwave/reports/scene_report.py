@@ -213,15 +213,16 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
 
 
 def _unnamed_rows(runs: Sequence[Run], probe: int) -> list[list[str]]:
-    """A row for each peak that is no single line of the load, in the column of its run."""
+    """A row for each peak that is no single line of the load, those of all runs together."""
+    found = {(peak.kind, round(peak.frequency, 1)) for run in runs for peak in run.unnamed[:TABLED]}
     rows = []
-    for run in runs:
-        for peak in run.unnamed[:TABLED]:
-            row = [peak.kind, f"{peak.frequency:.2f}"]
-            for other in runs:
-                size = _size(run, float(peak.amplitudes[probe])) if other is run else ""
-                row += [size, ""] if other.is_skin else [size]
-            rows.append(row)
+    for kind, frequency in sorted(found):
+        row = [kind, f"{frequency:.1f}"]
+        for run in runs:
+            sizes = [_size(run, float(peak.amplitudes[probe])) for peak in run.unnamed[:TABLED]
+                     if (peak.kind, round(peak.frequency, 1)) == (kind, frequency)]  # fmt: skip
+            row += [*(sizes[:1] or [""]), *([""] if run.is_skin else [])]
+        rows.append(row)
     return rows
 
 
