@@ -1,7 +1,7 @@
 """A scene's answers by every model that pictures put side by side, kept in a folder.
 
 scene.toml  plan.json  trust.json  lines.csv
-BODY/scene.toml  response.npz  lines.csv  effort.json  view.npz  probes.csv  probes.npz
+BODY/scene.toml  responses.npz  lines.csv  effort.json  view.npz  probes.csv  probes.npz
 """
 
 import json
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import Effort, Response, point_kernel
+from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.files import fill, write_lines
@@ -88,7 +89,7 @@ def make(
     runs = []
     for view, run in answers(scene, progress, h=h, solver=solver, frames=frames):
         (folder / run.body).mkdir()
-        fill(folder / run.body, run)
+        fill(folder / run.body, run, by="waves")
         save(folder / run.body / "view.npz", view)
         runs.append(run)
     write_lines(folder / "lines.csv", runs)
@@ -174,9 +175,13 @@ def open_album(folder: Path) -> Album:
     ValueError
         If there is no result in it.
     """
-    runs = [_run(path) for path in sorted(folder.rglob("response.npz"), key=_order)]
+    scenes = (path.parent for path in folder.rglob("scene.toml"))
+    found = [path for path in map(record.responses, scenes) if path]
+    runs = [_run(path) for path in sorted(found, key=_order)]
     if not runs:
-        raise ValueError(f"{folder} holds no response.npz; give a scene file or a result folder")
+        raise ValueError(
+            f"{folder} holds no {record.RESPONSES[0]}; give a scene file or a result folder"
+        )
     views = {path.parent.name: load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)}
     own = folder / "scene.toml"
     scene = read(own) if own.exists() else runs[-1].scene
@@ -200,11 +205,12 @@ def _run(path: Path) -> Run:
             times, probes, motion = file["t"], file["probes"], file[model]
     except (OSError, ValueError, KeyError, StopIteration) as error:
         raise ValueError(f"{path} is no result ({error}); run its scene again") from None
-    effort = _json(path.parent / "effort.json")
+    effort, kept = _json(path.parent / "effort.json"), _json(path.parent / record.FILE) or {}
     response = Response(
         model=model, times=times, probes=probes, displacement=motion,
         unit="Pa" if model == "point-kernel" else "m",
         effort=Effort(**effort) if effort else Effort(),
+        expected_error=np.nan if kept.get("expected_error") is None else kept["expected_error"],
     )  # fmt: skip
     known = (name for name, body in BODIES.items() if body == scene.body)
     return Run(tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response)
