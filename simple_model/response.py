@@ -24,7 +24,8 @@ class Effort:
     """What an answer cost, and how it was found.
 
     `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
-    process in bytes; `solver` used; `estimate` of the relative error of the reduction;
+    process in bytes; element size `h` in metre and time step `dt` in s, 0 where there are none;
+    SHA-256 of the `mesh`; `solver` used; `estimate` of the relative error of the reduction;
     `energy_imbalance`, relative, between the work of the load and what has become of it, and the
     share that was `radiated` through absorbing ends of all that was lost;
     `versions` of what computed it; `warnings`, sentences on what is less than was asked for.
@@ -35,6 +36,9 @@ class Effort:
     steps: int = 0
     reduced_dofs: int = 0
     peak_memory: int = 0
+    h: float = 0.0
+    dt: float = 0.0
+    mesh: str = ""
     solver: str = "none"
     estimate: float = 0.0
     energy_imbalance: float = 0.0

@@ -13,12 +13,20 @@ from skinwave.commands import COMMANDS
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
-UNCACHED = ("convert", "doctor", "plot", "tradeoff")  # which compute nothing, or always anew
+UNCACHED = (
+    "convert",
+    "doctor",
+    "plot",
+    "same",
+    "tradeoff",
+)  # which compute nothing, or always anew
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
-    options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    typed = list(sys.argv[1:] if arguments is None else arguments)
+    options = parser().parse_args(_joined(typed))
+    options.typed = typed
     try:
         with _cache_as_asked(options):
             return int(options.command(options))
@@ -60,7 +68,8 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     return found
 
 
-def _parser() -> argparse.ArgumentParser:
+def parser() -> argparse.ArgumentParser:
+    """The parser of all commands; its results have `command`, which does it, and its name."""
     parser = argparse.ArgumentParser(
         prog="skinwave",
         description="Waves in skin and paper under mid-air ultrasound haptics.",
@@ -72,5 +81,5 @@ def _parser() -> argparse.ArgumentParser:
         module.options(command)
         if name not in UNCACHED:
             command.add_argument("--no-cache", action="store_true", help=NO_CACHE)
-        command.set_defaults(command=module.run)
+        command.set_defaults(command=module.run, command_name=name)
     return parser

@@ -16,6 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from simple_model import Effort
+from skinwave import record
 from skinwave.run import Run
 from skinwave.scene_file import dumps
 from skinwave.studies.claims import Verdict
@@ -141,12 +142,16 @@ def write_run(folder: Path, run: Run) -> None:
     os.replace(aside, folder)
 
 
-def fill(folder: Path, run: Run) -> None:
-    """scene.toml, response.npz, lines.csv and effort.json of one run, into an empty folder."""
+def fill(folder: Path, run: Run, *, by: str = "compute") -> None:
+    """scene.toml, responses.npz, lines.csv, effort.json and record.json of one run, into an empty
+    folder; `by` is how its model was computed, as in `record.of_model`.
+    """
     (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
-    write_responses(folder / "response.npz", {"displacement": run, run.model: run})
+    write_responses(folder / record.RESPONSES[0], {"displacement": run, run.model: run})
     write_lines(folder / "lines.csv", [run])
     write_effort(folder / "effort.json", run.response.effort)
+    command = record.of_model(run, by)
+    record.write(folder, command, scene=run.scene, response=run.response)
 
 
 def write_responses(path: Path, runs: Mapping[str, Run]) -> None:

@@ -378,7 +378,8 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(tmp_pat
 
 def test_what_is_seen_of_a_body_is_not_the_layer_around_it():
     times = np.arange(20) / 1000
-    seen = skinwave.field(SKIN, times, 0.2, h=0.01)
+    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 10 mm"):
+        seen = skinwave.field(SKIN, times, 0.2, h=0.01)
     assert np.abs(seen.mesh.points[:, :2]).max() == pytest.approx(0.03)
     assert seen.displacement.shape == (20, len(seen.mesh.points), 3)
     top = seen.mesh.facets["top"]

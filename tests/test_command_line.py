@@ -23,7 +23,7 @@ def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
     assert main(["run", str(scene), "--out", "first", *fem, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["model"] == "fem"
     assert main(["run", "first/scene.toml", "--out", "second", *fem, "--quiet"]) == 0
-    first, second = (np.load(f"{folder}/response.npz") for folder in ("first", "second"))
+    first, second = (np.load(f"{folder}/responses.npz") for folder in ("first", "second"))
     assert first["displacement"].shape == (500, 2)
     np.testing.assert_array_equal(first["fem"], first["displacement"])
     np.testing.assert_allclose(first["displacement"], second["displacement"], rtol=1e-9)
@@ -62,7 +62,7 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
     claims = table(folder / "claims.csv")
     assert list(claims[0]) == ["claim", "body", "model", "holds", "value", "bar", "sentence"]
     assert (folder / "short/slab/scene.toml").exists()
-    assert (folder / "short/none/response.npz").exists()
+    assert (folder / "short/none/responses.npz").exists()
     assert (folder / "figures/short.png").stat().st_size > 10_000
 
 
@@ -163,7 +163,7 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
     assert process.returncode == 1
     page = (tmp_path / "cut/index.html").read_text()
     assert "Interrupted: 15 of 45 runs" in page
-    assert len(list((tmp_path / "cut").glob("*/none/response.npz"))) == 15
+    assert len(list((tmp_path / "cut").glob("*/none/responses.npz"))) == 15
     assert not os.path.exists(tmp_path / "cut.partial")
 
 

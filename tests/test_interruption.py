@@ -110,7 +110,7 @@ def test_a_killed_run_leaves_nothing_that_stops_the_next(folder, capsys):
     arguments = ["run", "good.toml", "--model", "point-kernel", "--tolerance", "0.9", "--quiet"]
     for left in ("out.partial", "out.partial.part", "out.partial/small"):
         (folder / left).mkdir(parents=True)
-        (folder / left / "response.npz").write_bytes(b"half")
+        (folder / left / "responses.npz").write_bytes(b"half")
     assert main([*arguments, "--out", "out"]) == 0
     assert opens(folder / "out")
     assert not (folder / "out.partial").exists()

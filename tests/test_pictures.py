@@ -432,7 +432,7 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
-    for name in ("waves", "plan", "simulate", "answer", "kernel_view", "suite"):
+    for name in ("waves", "plan", "compute", "answer", "kernel_view", "suite"):
         monkeypatch.setattr(album, name, run)
     monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
@@ -461,7 +461,7 @@ def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
     assert "skinwave report SCENE computes it" in text
     assert main(["report", "one", "--quiet"]) == 0  # its own folder is made anew
     assert main(["report", "one/report/pictures"]) == 2
-    assert "holds no response.npz" in capsys.readouterr().err
+    assert "holds no responses.npz" in capsys.readouterr().err
     assert main(["film", "one"]) == 2
     assert "keeps no motion of whole bodies" in capsys.readouterr().err
 

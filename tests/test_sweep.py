@@ -133,13 +133,13 @@ def test_what_is_there_is_not_run_again(scene, monkeypatch, capsys):
 
 def test_bodies_are_prepared_once(scene, monkeypatch):
     prepared, inner = [], sweeping.prepare
-    counted = lambda *a, **k: prepared.append(a) or inner(*a, **k)  # noqa: E731
+    counted = lambda *a, **k: prepared.append((a, k)) or inner(*a, **k)  # noqa: E731
     monkeypatch.setattr(sweeping, "prepare", counted)
     sweeping._prepared.cache_clear()
     rows = swept("--vary", "tacton.speed_m_per_s=2:8:6", "body.depth_mm=12,13",
                  "--model", "fem", "--h", 10, "--workers", 1)  # fmt: skip
     assert {row["status"] for row in rows} == {"done"}
-    assert len(prepared) == 2
+    assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
     assert all(row["dofs"] > 1000 and row["energy_imbalance"] < 0.01 for row in rows)
 
 

@@ -13,7 +13,9 @@ from skinwave.commands import (
     plot,
     relax,
     report,
+    rerun,
     run,
+    same,
     sweep,
     tradeoff,
     verify,
@@ -34,5 +36,7 @@ COMMANDS = {
     "report": report,
     "film": film,
     "web": web,
+    "rerun": rerun,
+    "same": same,
     "doctor": doctor,
 }

@@ -31,6 +31,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
+    from skinwave import record
     from skinwave.files import folder_name, output_folder
     from skinwave.pictures.figures import label
     from skinwave.scene import with_body
@@ -40,6 +41,7 @@ def run(options: argparse.Namespace) -> int:
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)
+    asked = scene
     bodies = _chosen_body(options) if options.body else None
     if scene is None:
         scenes = paper_scenes(bodies)
@@ -59,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
             command=_again(options),
             h=metre(options.h), solver=options.solver,
         )  # fmt: skip
+        record.write(folder, record.of_command(options), scene=asked)
     warn(outcome.warnings)
     held = sum(verdict.holds for verdict in outcome.verdicts)
     summary = {

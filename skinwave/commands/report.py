@@ -30,6 +30,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
+    from skinwave import record
     from skinwave.files import output_folder
     from skinwave.pictures.styles import style
     from skinwave.reports.scene_report import write_report
@@ -56,6 +57,7 @@ def run(options: argparse.Namespace) -> int:
             folder if scene is not None else source, folder, style(options.style), progress,
             formats=options.format,
         )  # fmt: skip
+        record.write(folder, record.of_command(options), scene=scene)
         size = (folder / "index.html").stat().st_size
     summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
     summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")

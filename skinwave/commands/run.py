@@ -32,6 +32,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
+    from skinwave import record
     from skinwave.files import output_folder
     from skinwave.run import Run
     from skinwave.scene import BODIES
@@ -54,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
             tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
         )
         write_single(folder, run)
+        record.write(folder, record.of_command(options), scene=scene, response=response)
     summary = {
         "out": str(out),
         "model": response.model,

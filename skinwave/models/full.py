@@ -1,6 +1,7 @@
 """Answers without reduction: every time step, every line, and exact waves of endless bodies."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import islice
 from math import ceil
@@ -11,12 +12,13 @@ from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 import fem
+from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.sampling import resolving_step, shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import Build, operators, surface_load, vacuum_only
+from skinwave.models.bodies import Build, default_size, operators, surface_load, vacuum_only
 from skinwave.models.bodies import build as build_body
 from skinwave.scene import Body, Scene
 
@@ -95,7 +97,8 @@ def transient_answer(
         )
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
-    return _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
+    found = _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
+    return discretised(found, build, h or default_size(scene.body), dt)
 
 
 def marched(
@@ -189,7 +192,8 @@ def harmonic_answer(
     displacement = played(frequencies[below], amplitudes[below], times)
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
-    return _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
+    found = _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
+    return discretised(found, build, h or default_size(scene.body))
 
 
 def _line(
@@ -205,6 +209,12 @@ def _line(
     u = fem.harmonic(ops, force, frequency, solver=solver)
     line = force[None, free], u[:, free], np.array([frequency])
     return S @ u[0], fem.mean_power(ops.C, ops.R, *line, ops.branches)
+
+
+def discretised(response: Response, build: Build, h: float, dt: float = 0.0) -> Response:
+    """A response that tells its element size in metre, time step in s and mesh."""
+    mesh = cache.digest(build.mesh.points, build.mesh.tets)
+    return replace(response, effort=replace(response.effort, h=h, dt=dt, mesh=mesh))
 
 
 def _response(

@@ -13,7 +13,7 @@ from simple_model.focus import spot_reach, spot_width
 from simple_model.sampling import shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.models.bodies import Build, air, surface_load
+from skinwave.models.bodies import Build, air, default_size, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.scene import Body, Scene
 
@@ -86,7 +86,8 @@ def prepare(
     found = _from_cache(entry, probes, clock) if entry else None
     if found:
         return found
-    return _prepared_anew(body, build, probes, clock, progress or silent, solver, tolerance, name)
+    size, report = h or default_size(body), progress or silent
+    return _prepared_anew(body, build, size, probes, clock, report, solver, tolerance, name)
 
 
 def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance: float) -> str:
@@ -131,6 +132,7 @@ def _from_cache(entry: dict[str, Any], probes: Floats, clock: Clock) -> Prepared
 def _prepared_anew(
     body: Body,
     build: Build,
+    h: float,
     probes: Floats,
     clock: Clock,
     report: Progress,
@@ -166,6 +168,8 @@ def _prepared_anew(
         dofs=len(operators.free),
         reduced_dofs=len(model.K),
         peak_memory=peak_memory(),
+        h=h,
+        mesh=cache.digest(mesh.points, mesh.tets),
         solver=model.solver,
         estimate=model.estimate,
         versions=versions(),

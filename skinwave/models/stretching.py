@@ -24,7 +24,7 @@ from simple_model.sampling import resolving_step
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import Build, air, build, surface_load, vacuum_only
-from skinwave.models.full import TRANSIENT_RATE, marched, step_count
+from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
 from skinwave.models.prepared import reduced_lines
 from skinwave.models.speeds import bending_wavenumber
 from skinwave.scene import Body, Scene
@@ -128,7 +128,7 @@ def full_answer(
     P, points = surface_load(made)
     S = fem.probe_operator(made.mesh, scene.probe_points)
     dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    return _about_rest(
+    found = _about_rest(
         "fem-nonlinear-transient", scene, times, report, clock,
         body=body,
         mean=P @ mean_pressure(scene.pressure, points),
@@ -137,6 +137,7 @@ def full_answer(
         dt=dt, solver=solver,
         effort=Effort(dofs=len(body.operators.free)),
     )  # fmt: skip
+    return discretised(found, made, h or stretching_size(scene.body, reduced=False), dt)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,17 +172,19 @@ def reduced_answer(
     def force(t: float) -> Floats:
         return (np.exp(2j * pi * hz * t) @ forces).real
 
-    return _about_rest(
+    dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    found = _about_rest(
         "fem-nonlinear", scene, times, report, clock,
         body=sheet.modes.elastic,
         mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
         read=lambda z: read @ z,
-        dt=dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE), solver=solver,
+        dt=dt, solver=solver,
         effort=Effort(
             dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
         ),
     )  # fmt: skip
+    return discretised(found, sheet.made, h or stretching_size(scene.body, reduced=True), dt)
 
 
 @lru_cache(maxsize=1)

@@ -9,12 +9,12 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from meshes import TetMesh, part
+from meshes import TetMesh, cache, part
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.steady import path_knots
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.models.bodies import air, surface_load
+from skinwave.models.bodies import air, default_size, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.models.prepared import BAND, reduced_lines, sample_times
 from skinwave.scene import Scene
@@ -84,6 +84,8 @@ def waves(
         reduced_dofs=len(model.K),
         steps=len(frequencies),
         peak_memory=peak_memory(),
+        h=h or default_size(scene.body),
+        mesh=cache.digest(build.mesh.points, build.mesh.tets),
         solver=model.solver,
         estimate=model.estimate,
         energy_imbalance=imbalance,

@@ -20,6 +20,8 @@ from skinwave.planning.plan import plan
 from skinwave.planning.refinement import coarser_by, compared_with, counted, error_left
 from skinwave.scene import Body, Scene
 
+Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
+
 QUICKLY = 2.0  # times as coarse
 
 
@@ -31,17 +33,17 @@ def assessed(
     tolerance: float = 0.05,
     solver: str = "auto",
     *,
-    coarser: float | None = None,
+    compared: Coarser | None = None,
 ) -> Response:
     """The response of a reduced body with its expected error and all warnings.
 
     Parameters
     ----------
     h : float, metre, element size, the default of the body if not given
-    coarser : float, metre, element size to compare with, chosen if not given
+    compared : element size in metre to compare with, and the body with it; chosen if not given
     """
     fine = counted(prepared, scene, response)
-    return told(scene, response, fine, h, tolerance, solver, coarser=coarser)
+    return told(scene, response, fine, h, tolerance, solver, compared=compared)
 
 
 def told(
@@ -52,18 +54,21 @@ def told(
     tolerance: float = 0.05,
     solver: str = "auto",
     *,
-    coarser: float | None = None,
+    compared: Coarser | None = None,
 ) -> Response:
     """`assessed`, of what counts of any answer by linear elements: waveforms (t, p), or the lines
     (f, p) of a body that is not held.
     """
     body, size = scene.body, h or default_size(scene.body)
-    other = coarser or (compared_with(body, size) if h else _coarser(body, size))
-    compared = _prepared(body, scene.probes, other, solver, reduction_tolerance(tolerance))
-    if compared.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
+    if compared is None:
+        other = compared_with(body, size) if h else _coarser(body, size)
+        precision = reduction_tolerance(tolerance)
+        compared = other, _prepared(body, scene.probes, other, solver, precision)
+    other, coarse = compared
+    if coarse.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
         error = np.nan if body.kind == "mesh" else 1.0
     else:
-        found = counted(compared, scene, answer(compared, scene))
+        found = counted(coarse, scene, answer(coarse, scene))
         error = error_left(found, fine, coarser_by(body, other, size))
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)

@@ -1,7 +1,7 @@
 """A scene's answers by every model that pictures put side by side, kept in a folder.
 
 scene.toml  plan.json  trust.json  lines.csv
-COLUMN/scene.toml  response.npz  lines.csv  effort.json  view.npz
+COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz
 """
 
 import json
@@ -14,6 +14,7 @@ import numpy as np
 
 from simple_model import Effort, Response, published
 from simple_model.choices import choose
+from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.fields import assessed_probes
@@ -116,7 +117,7 @@ def make(
     runs = []
     for view, run in answers(scene, shown, progress, h=h, solver=solver, frames=frames):
         (folder / run.column).mkdir()
-        fill(folder / run.column, run)
+        fill(folder / run.column, run, by="waves")
         if view is not None:
             save(folder / run.column / "view.npz", view)
         runs.append(run)
@@ -210,9 +211,13 @@ def open_album(folder: Path) -> Album:
     ValueError
         If there is no result in it.
     """
-    runs = [_run(path) for path in sorted(folder.rglob("response.npz"), key=_order)]
+    scenes = (path.parent for path in folder.rglob("scene.toml"))
+    found = [path for path in map(record.responses, scenes) if path]
+    runs = [_run(path) for path in sorted(found, key=_order)]
     if not runs:
-        raise ValueError(f"{folder} holds no response.npz; give a scene file or a result folder")
+        raise ValueError(
+            f"{folder} holds no {record.RESPONSES[0]}; give a scene file or a result folder"
+        )
     views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own = folder / "scene.toml"
     scene = read(own) if own.exists() else runs[-1].scene
@@ -254,11 +259,12 @@ def _run(path: Path) -> Run:
             model = _kernel_of(path, scene, model)
     except (OSError, ValueError, KeyError, StopIteration) as error:
         raise ValueError(f"{path} is no result ({error}); run its scene again") from None
-    effort = _json(path.parent / "effort.json")
+    effort, kept = _json(path.parent / "effort.json"), _json(path.parent / record.FILE) or {}
     response = Response(
         model=model, times=times, probes=probes, displacement=motion,
         unit="Pa" if model.startswith("point-kernel") else "m",
         effort=Effort(**effort) if effort else Effort(),
+        expected_error=np.nan if kept.get("expected_error") is None else kept["expected_error"],
     )  # fmt: skip
     return Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
 

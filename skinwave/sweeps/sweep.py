@@ -272,9 +272,11 @@ def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> Response:
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
     prepared = _prepared(scene.body, scene.probes, mesh.h, knobs)
+    assert mesh.coarser is not None
+    coarse = _prepared(scene.body, scene.probes, mesh.coarser, knobs)
     return assessed(
         scene, answer(prepared, scene), prepared, mesh.h, knobs.tolerance, knobs.solver,
-        coarser=mesh.coarser,
+        compared=(mesh.coarser, coarse),
     )  # fmt: skip
 
 

@@ -1,0 +1,85 @@
+"""A result folder once more, from its record.json."""
+
+import argparse
+import shlex
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from skinwave.commands.common import add_output, progress_of, summarise
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """What a user may ask of it."""
+    parser.add_argument(
+        "folder", type=Path, metavar="DIR", help="folder that run, compare or report wrote, or a "
+        "folder of one run in it; the new one is DIR-rerun",
+    )  # fmt: skip
+    add_output(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do it; the exit code."""
+    from skinwave import record
+
+    kept = record.read(options.folder)
+    folder = options.folder.resolve()
+    out = options.out or folder.with_name(f"{folder.name}-rerun")
+    with tempfile.TemporaryDirectory() as place:
+        scene = Path(place) / "scene.toml"
+        if kept["scene"] is not None:
+            scene.write_text(kept["scene"], encoding="utf-8")
+        if kept["command"]["name"] in ("compute", "waves"):
+            return _model_again(options, kept, scene, out)
+        return _command_again(options, kept, scene, out)
+
+
+def _command_again(
+    options: argparse.Namespace, kept: dict[str, Any], scene: Path, out: Path
+) -> int:
+    """The command of the command line, with the options that it had."""
+    from skinwave.cli import parser
+
+    name, asked = kept["command"]["name"], kept["command"]["options"]
+    place = "source" if "source" in asked else "scene"
+    given = str(scene) if kept["scene"] is not None else asked.get(place)
+    try:
+        again = parser().parse_args([name, str(given)])
+    except SystemExit:
+        raise ValueError(f"the record's command '{name}' is none that can be repeated") from None
+    vars(again).update({key: value for key, value in asked.items() if key != place})
+    for key in ("overwrite", "quiet", "json", "debug"):
+        setattr(again, key, getattr(options, key))
+    again.out, again.typed = out, shlex.split(kept["command"]["typed"])[1:]
+    return int(again.command(again))
+
+
+def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path, out: Path) -> int:
+    """One model of a folder with several."""
+    from dataclasses import replace
+    from math import nan
+
+    from skinwave.files import fill, output_folder
+    from skinwave.pictures.motion import probe_response, waves
+    from skinwave.run import Run
+    from skinwave.scene_file import read
+    from skinwave.simulation import compute
+
+    asked, by = kept["command"]["options"], kept["command"]["name"]
+    its, h, solver = read(scene), asked["h"], asked["solver"]
+    with (
+        output_folder(out, overwrite=options.overwrite) as folder,
+        progress_of(options) as progress,
+    ):
+        if by == "waves":
+            moved = waves(its, progress=progress, h=h, solver=solver)
+            response = probe_response(its, moved)
+        else:
+            response = compute(its, asked["model"], 0.05, progress, h=h, dt=asked["dt"],
+                               solver=solver)  # fmt: skip
+        error = kept["expected_error"]
+        response = replace(response, expected_error=nan if error is None else error)
+        run = Run(tacton=asked["tacton"], body=asked["body"], scene=its, response=response)
+        fill(folder, run, by=by)
+    summarise(options, {"out": str(out), "model": response.model}, f"{response.model}: wrote {out}")
+    return 0

@@ -1,0 +1,120 @@
+"""What is needed to repeat a result, and what tells whether it came out again: record.json."""
+
+import json
+import shlex
+from argparse import Namespace
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes import cache
+from simple_model import Response
+from skinwave.effort import versions
+from skinwave.run import Run
+from skinwave.scene import Scene
+from skinwave.scene_file import dumps
+
+FILE, FORMAT = "record.json", 1
+RESPONSES = ("responses.npz", "response.npz")  # today's name, and that of version 0.2
+# Options that say where and how to report, not what to compute.
+REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
+             "typed")  # fmt: skip
+
+
+def of_command(options: Namespace) -> dict[str, Any]:
+    """A command of the command line: as typed, its name, and all of its options."""
+    kept = {name: value for name, value in vars(options).items() if name not in REPORTING}
+    return {
+        "typed": shlex.join(["skinwave", *options.typed]),
+        "name": options.command_name,
+        "options": {name: _plain(value) for name, value in kept.items()},
+    }
+
+
+def of_model(run: Run, name: str = "compute") -> dict[str, Any]:
+    """One model by itself, as `skinwave.simulation.compute` takes it or, with the name "waves",
+    `skinwave.pictures.motion.waves`, which keeps the motion of the whole body.
+    """
+    effort = run.response.effort
+    solver = "auto" if effort.solver == "none" else effort.solver
+    options = {
+        "tacton": run.tacton, "body": run.body, "model": run.model,
+        "h": effort.h or None, "dt": effort.dt or None, "solver": solver,
+    }  # fmt: skip
+    return {"typed": "", "name": name, "options": options}
+
+
+def write(
+    folder: Path,
+    command: Mapping[str, Any],
+    *,
+    scene: Scene | None = None,
+    response: Response | None = None,
+) -> None:
+    """record.json of a folder that has its responses already, if it has any."""
+    asked = command["options"]
+    record: dict[str, Any] = {
+        "format": FORMAT,
+        "command": command,
+        "scene": dumps(scene) if scene else None,
+        "tolerance": asked.get("tolerance"),
+        "model": {"asked": asked.get("model")},
+        "solver": {"asked": asked.get("solver")},
+        "versions": versions(),
+    }
+    meshes = {}
+    if response:
+        effort, error = response.effort, response.expected_error
+        record["model"]["used"], record["solver"]["used"] = response.model, effort.solver
+        record |= {"h_m": effort.h or None, "dt_s": effort.dt or None}
+        record["expected_error"] = error if isfinite(error) else None
+        meshes = {"mesh": effort.mesh} if effort.mesh else {}
+    record["hashes"] = meshes | {"arrays": hashes(folder)}
+    (folder / FILE).write_text(json.dumps(record, indent=1), encoding="utf-8")
+
+
+def read(folder: Path) -> dict[str, Any]:
+    """The record of a result folder.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or none that can be read.
+    """
+    path = folder / FILE
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        if record["format"] != FORMAT or not isinstance(record["command"]["options"], dict):
+            raise ValueError(f"format {record['format']}")
+    except OSError as error:
+        raise ValueError(
+            f"{path} cannot be read ({error.strerror}); name a folder that run, compare or report "
+            "wrote"
+        ) from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} is no record ({error}); make the result anew") from None
+    return dict(record)
+
+
+def responses(folder: Path) -> Path | None:
+    """The file of a folder's waveforms, by today's name or that of version 0.2."""
+    return next((folder / name for name in RESPONSES if (folder / name).is_file()), None)
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    """SHA-256 of each array, by type, shape and bytes, of a folder's waveforms."""
+    path = responses(folder)
+    if path is None:
+        return {}
+    with np.load(path) as file:
+        return {name: cache.digest(file[name]) for name in file.files}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it; the path of what exists from anywhere."""
+    if isinstance(value, Path) or (isinstance(value, str) and Path(value).is_file()):
+        return str(Path(value).resolve())
+    return value

@@ -1,0 +1,199 @@
+"""Results that say how they came about, can be had again, and are held against each other."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from simple_model import Response
+from skinwave.cli import main
+from skinwave.reports.album import open_album
+from skinwave.run import Run
+from skinwave.same import differences
+from skinwave.scene_file import loads
+
+
+def record_of(folder):
+    return json.loads((folder / "record.json").read_text())
+
+
+def same(*arguments):
+    return main(["same", *map(str, arguments), "--quiet"])
+
+
+def altered(folder, name, change):
+    """A result folder whose arrays were changed by hand."""
+    path = folder / "responses.npz"
+    with np.load(path) as file:
+        arrays = {n: file[n] for n in file.files}
+    change(arrays)
+    np.savez(path, **arrays)
+    return name
+
+
+def test_a_record_has_what_a_result_depends_on(scene):
+    assert main(["run", str(scene), "--model", "fem", "--h", "12", "--quiet"]) == 0
+    found = record_of(scene.parent / "short-out")
+    assert found["command"]["typed"] == f"skinwave run {scene} --model fem --h 12 --quiet"
+    assert found["model"] == {"asked": "fem", "used": "fem"}
+    assert found["solver"]["asked"] == "auto"
+    assert found["solver"]["used"] in ("pardiso", "cholmod", "superlu")
+    assert found["h_m"] == pytest.approx(0.012)
+    assert found["tolerance"] == 0.05
+    assert found["expected_error"] > 0
+    assert {"python", "numpy", "scipy", "skinwave", "os"} <= set(found["versions"])
+    assert len(found["hashes"]["mesh"]) == 64
+    assert set(found["hashes"]["arrays"]) == {"t", "probes", "displacement", "fem"}
+    arrays = found["hashes"]["arrays"]
+    assert arrays["fem"] == arrays["displacement"] != arrays["t"]
+
+
+def test_a_run_without_a_mesh_has_a_record_and_versions(scene):
+    assert main(["run", str(scene), "--model", "flat-body", "--quiet"]) == 0
+    folder = scene.parent / "short-out"
+    assert record_of(folder)["h_m"] is None
+    assert "mesh" not in record_of(folder)["hashes"]
+    effort = json.loads((folder / "effort.json").read_text())
+    assert effort["versions"]["numpy"] == np.__version__
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["fem", "flat-body", "point-kernel"])
+def test_a_run_is_the_same_again_on_another_number_of_threads(model, scene):
+    """In processes of their own, without the cache, so that nothing is the same by being kept."""
+    command = [sys.executable, "-m", "skinwave"]
+    asked = ["--model", model, *(["--h", "8"] if model == "fem" else []), "--quiet", "--no-cache"]
+    assert main(["run", str(scene), *asked]) == 0
+    scene.unlink()  # the record is enough
+    for threads in "12":
+        limits = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"),
+                               threads)  # fmt: skip
+        again = ["rerun", "short-out", "--out", threads, "--quiet", "--no-cache"]
+        subprocess.run([*command, *again], check=True, env=os.environ | limits)
+        assert same("short-out", threads) == 0
+    assert record_of(scene.parent / "1")["hashes"].keys() == {"arrays"} | (
+        {"mesh"} if model == "fem" else set()
+    )
+
+
+def test_a_comparison_and_its_runs_are_had_again(scene):
+    assert main(["compare", str(scene), "--h", "12", "--out", "both", "--quiet"]) == 0
+    scene.unlink()
+    assert main(["rerun", "both", "--quiet"]) == 0
+    assert same("both", "both-rerun") == 0
+    folders = sorted(path.parent for path in scene.parent.glob("both/*/*/record.json"))
+    assert len(folders) >= 2
+    for k, folder in enumerate(folders):
+        assert main(["rerun", str(folder), "--out", f"one-{k}", "--quiet"]) == 0
+        assert same(folder, f"one-{k}") == 0
+    meshes = {record_of(folder)["hashes"].get("mesh") for folder in folders}
+    assert len(meshes) == 2  # that of the slab, and none
+
+
+@pytest.mark.slow
+def test_a_report_is_had_again(scene, monkeypatch):
+    monkeypatch.setattr("skinwave.reports.album.shown_scenes", lambda scene: {"slab": scene})
+    assert main(["report", str(scene), "--h", "12", "--quiet"]) == 0
+    scene.unlink()
+    assert main(["rerun", "short-report", "--quiet"]) == 0
+    assert same("short-report", "short-report-rerun") == 0
+    assert main(["rerun", "short-report/slab", "--out", "slab", "--quiet"]) == 0
+    assert same("short-report/slab", "slab") == 0
+
+
+@pytest.fixture
+def twice(scene):
+    """Two folders of the same result."""
+    for out in ("first", "second"):
+        assert main(["run", str(scene), "--model", "point-kernel", "--out", out, "--quiet"]) == 0
+    return scene.parent / "first", scene.parent / "second"
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        (lambda a: a["displacement"].__setitem__((7, 1), 2 * np.abs(a["displacement"]).max()),
+         "'displacement' at [7, 1] is "),
+        (lambda a: a.update(t=a["t"][:-1]), "'t' has shape (499,) in one and (500,) in the other"),
+        (lambda a: a.pop("point-kernel"), "'point-kernel' is in one of them only"),
+    ],
+)  # fmt: skip
+def test_what_differs_is_said_in_a_sentence(change, part, twice, capsys):
+    altered(twice[0], "first", change)
+    assert main(["same", *map(str, twice)]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("different: ")
+    assert part in said
+    assert said.count("\n") == 1
+
+
+def test_the_worst_difference_comes_first(twice):
+    def change(arrays):
+        largest = np.abs(arrays["displacement"]).max()
+        arrays["displacement"][3, 0] += 1e-3 * largest
+        arrays["point-kernel"][5, 1] += 1e-2 * largest
+
+    altered(twice[0], "first", change)
+    found = differences(*twice, 1e-9)
+    assert ["[5, 1]" in found[0].words, "[3, 0]" in found[1].words] == [True, True]
+    assert found[0].size == pytest.approx(1e-2, rel=0.05)
+    assert same(*twice, "--rtol", "0.1") == 0
+    assert same(*twice, "--rtol", "5e-3") == 1
+
+
+def test_lines_are_compared_as_written(twice):
+    path = twice[0] / "lines.csv"
+    rows = path.read_text().splitlines()
+    strongest = max(rows[1:], key=lambda row: float(row.split(",")[-1]))
+    *before, pressure = strongest.split(",")
+
+    def written(factor):
+        cells = ",".join([*before, f"{factor * float(pressure):.6g}"])
+        path.write_text("\n".join(cells if row == strongest else row for row in rows) + "\n")
+
+    written(1 + 4e-6)
+    assert same(*twice) == 0  # the last of six digits
+    written(1.01)
+    assert same(*twice) == 1
+    path.unlink()
+    (found,) = differences(*twice, 1e-9)
+    assert found.words == f"{twice[0]} has no lines.csv"
+
+
+def test_bad_input_exits_with_two(twice, capsys):
+    first, second = twice
+    assert same(first, second / "nowhere") == 2
+    assert same(first, second, "--rtol", "-1") == 2
+    assert same(first, second, "--rtol", "nan") == 2
+    altered(first, "first", lambda a: a["displacement"].fill(np.nan))
+    assert same(first, second) == 2
+    (first / "responses.npz").write_bytes(b"spoilt")
+    assert same(first, second) == 2
+    for content in ("", "{}", '{"format": 99, "command": {"options": {}}}'):
+        (second / "record.json").write_text(content)
+        assert main(["rerun", str(second)]) == 2
+    assert main(["rerun", str(second / "nowhere")]) == 2
+    assert capsys.readouterr().err.count("skinwave: ") == 9
+
+
+def test_waveforms_under_their_old_name_are_read(twice):
+    first, second = twice
+    (first / "responses.npz").rename(first / "response.npz")
+    (first / "record.json").unlink()
+    assert same(first, second) == 0
+    (run,) = open_album(first).runs
+    assert run.model == "point-kernel"
+    assert np.isnan(run.response.expected_error)
+
+
+def test_an_opened_folder_keeps_the_expected_error(scene):
+    assert main(["run", str(scene), "--model", "fem", "--h", "12", "--quiet"]) == 0
+    folder = scene.parent / "short-out"
+    (run,) = open_album(folder).runs
+    assert isinstance(run, Run)
+    assert isinstance(run.response, Response)
+    assert run.response.expected_error == record_of(folder)["expected_error"] > 0
+    assert loads(record_of(folder)["scene"]) == run.scene
