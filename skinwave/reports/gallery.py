@@ -225,7 +225,8 @@ WAVES = (
     "outwards along x from the path's outermost point; the dashed lines are those of a surface "
     "wave of the strongest line, far from its source, in a half-space or an infinite sheet. Near "
     "the path and in thin slabs the phase runs ahead of them, in a clamped sheet waves stand, and "
-    "in the point kernel nothing propagates. Below: along the path; the focus runs along the black lines."
+    "in the point kernel nothing propagates. Below: along the path; the focus runs along the black "
+    "lines."
 )
 LOADS = (
     "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "
