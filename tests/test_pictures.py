@@ -9,7 +9,7 @@ import wave
 from dataclasses import replace
 from hashlib import sha256
 from importlib.util import find_spec
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -365,7 +365,7 @@ def test_text_of_vector_figures_is_text(page, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dressed", ["report", "print"])
+@pytest.mark.parametrize("dressed", ["report", "talk", "print"])
 def test_no_text_of_a_figure_is_cut(folder, dressed):
     kept, chosen = album.open_album(folder), style(dressed)
     shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
@@ -378,6 +378,9 @@ def test_no_text_of_a_figure_is_cut(folder, dressed):
         assert min(drawn.x0, drawn.y0) > -0.02
         assert drawn.x1 < figure.get_figwidth() + 0.02
         assert drawn.y1 < figure.get_figheight() + 0.02
+        titles = [ax.title for ax in figure.axes if ax.get_title()]
+        boxes = [title.get_window_extent(canvas.get_renderer()) for title in titles]
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
         if dressed == "print":
             assert figure.get_figwidth() in (3.5, 7.0)
 

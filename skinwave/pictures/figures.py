@@ -79,7 +79,9 @@ def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
     _legend(figure, runs, scales=True)
-    inch = 1 / figure.get_figheight()  # fixed margins: a computed layout takes twice as long
+    inch = (
+        style.zoom / figure.get_figheight()
+    )  # fixed margins: a computed layout takes twice as long
     top = 0.8 + 0.2 * (len(runs) > IN_A_ROW)
     figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
     return figure
@@ -110,6 +112,12 @@ def colour(column: str) -> str:
     return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
 
 
+def inked(column: str) -> str:
+    """The same in a style whose paper may be dark, on which black is its ink."""
+    own = colour(column)
+    return str(mpl.rcParams["text.color"]) if own == "#000000" else own
+
+
 def marker(column: str) -> str:
     """The marker of a `Run.column` in every picture."""
     return MARKERS.get(column, "^")
@@ -129,7 +137,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     """One entry a model, with what 1 on the waveform axis stands for if that is one number."""
     handles, labels = [], []
     for run in runs:
-        style: dict[str, Any] = {"color": colour(run.column), "marker": marker(run.column), "lw": 2}
+        style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
         labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
     kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
@@ -173,7 +181,7 @@ def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
         centred = _centred(run)[:, p] / _largest(run)
         times = 1e3 * run.response.times[_shown(run)]
-        ax.plot(times, centred, color=colour(run.column), lw=_width(run), zorder=_depth(run))
+        ax.plot(times, centred, color=inked(run.column), lw=_width(run), zorder=_depth(run))
     ax.margins(x=0)
     ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
     ax.set_ylim(-1.1, 1.1)
@@ -186,7 +194,7 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
         moving = f > 8.0  # the mean and its leakage are no vibration
         top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
-        style: dict[str, Any] = {"color": colour(run.column), "zorder": _depth(run)}
+        style: dict[str, Any] = {"color": inked(run.column), "zorder": _depth(run)}
         ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
         lines = [(f, run.table.amplitudes[name][p]) for name, f in run.listed.items()]
         peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
@@ -206,8 +214,8 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
             if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small",
-                        bbox={"fc": "white", "ec": "none", "pad": 0.5})  # fmt: skip
+                box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small", bbox=box)
 
 
 def _spread(ax: Axes, runs: list[Run]) -> None:
@@ -218,7 +226,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
         ax.plot(
             radius,
             decibel,
-            color=colour(run.column),
+            color=inked(run.column),
             marker=marker(run.column),
             lw=_width(run),
             ms=5,

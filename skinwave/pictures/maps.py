@@ -16,7 +16,7 @@ from meshes.tetmesh import Floats
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
 from skinwave.numbers import significant
-from skinwave.pictures.figures import colour, label
+from skinwave.pictures.figures import inked, label
 from skinwave.pictures.styles import Style
 from skinwave.pictures.views import Trace, View, path_points, spread_radius, starting_time
 
@@ -100,7 +100,7 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
             _draw_borderline(ax, raster, sampled(np.maximum(view.sensation, -100.0)))
             _draw_path(ax, view, "black")
             radii = " / ".join(f"{1e3 * spread_radius(view, d):.0f}" for d in DROPS)
-            _title(ax, view, f"spread {radii} mm at -6 / -20 dB")
+            _title(ax, view, f"spread {radii} mm")
         figure.colorbar(image, ax=list(axes), label="RMS motion, dB re the model's largest")
         entries: dict[str, dict[str, Any]] = {
             "-6 dB": {"color": "0.55", "ls": "solid"},
@@ -130,12 +130,10 @@ def difference_figure(reference: View, views: Sequence[View], style: Style) -> F
 
 
 def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Figure:
-    """The surface of each model at equal parts of a period, over its own largest motion; the last
-    view's largest is among them.
+    """The surface of each model, over its own largest motion, when the last of them moves most and
+    after equal parts of a turn of the focus or, if it rests, of a period of the strongest tone.
     """
-    raster, all_of_them = common_raster(views), len(views[0].times)
-    first = int(np.abs(views[-1].pushed).max(axis=1).argmax())
-    frames = sorted((first + k * all_of_them // count) % all_of_them for k in range(count))
+    raster, frames = common_raster(views), _shown_frames(views[-1], count)
     side = 0.8 * MAP
     with mpl.rc_context(style.rc):
         size = style.size(side * count + 2.0, side * len(views) + 1.0)
@@ -151,7 +149,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 _draw_path(ax, view, "black")
                 _draw_focus(ax, view, float(view.times[frame]))
             row[0].set_ylabel(f"{label(view.column)}\n±1 = {peak_text(view)}\ny, mm",
-                              color=_readable(view, style))  # fmt: skip
+                              color=inked(view.column))  # fmt: skip
         for frame, ax in zip(frames, axes[0], strict=True):
             ax.set_title(f"{1e3 * views[0].times[frame]:.2f} ms")
         for ax in axes[-1]:
@@ -160,6 +158,14 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                         "over the model's largest", shrink=0.6)  # fmt: skip
         _legend(figure, _focus_legend(views, style))
     return figure
+
+
+def _shown_frames(view: View, count: int) -> list[int]:
+    frequency = view.scene.tacton.trajectory.drawing_frequency or view.tone
+    turn = min(1 / frequency, view.period) if frequency else view.period
+    frames = len(view.times)
+    first, step = int(np.abs(view.pushed).max(axis=1).argmax()), frames * turn / view.period / count
+    return [(first + round(k * step)) % frames for k in range(count)]
 
 
 def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, Any]]:
@@ -179,7 +185,7 @@ def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, An
 
 def waves_figure(views: Sequence[View], style: Style) -> Figure:
     """Motion over place and time: outwards from the path after the start, and along the path."""
-    traced = [("ray", "distance outwards from the path, mm")]
+    traced = [("ray", "distance from the path, mm")]
     traced += [("track", "place along the path, mm")] if views[0].track else []
     with mpl.rc_context(style.rc):
         size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
@@ -189,7 +195,7 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
             for ax, view in zip(row, views, strict=True):
                 image = _draw_trace(ax, getattr(view, name), name)
                 ax.set_xlabel(x_label)
-                ax.set_title(label(view.column), color=_readable(view, style))
+                ax.set_title(label(view.column), color=inked(view.column))
                 _draw_world_lines(ax, view, name)
             row[0].set_ylabel("time, ms")
         bar = figure.colorbar(
@@ -221,12 +227,6 @@ def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Se
 
 def _title(ax: Axes, view: View, below: str) -> None:
     ax.set_title(f"{label(view.column)}\n{below}", fontsize="medium")
-
-
-def _readable(view: View, style: Style) -> str:
-    """The colour of a model, but for black on a dark page."""
-    own = colour(view.column)
-    return style.ink if own == "#000000" else own
 
 
 def _draw_path(ax: Axes, view: View, ink: str) -> None:
@@ -285,7 +285,7 @@ def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
             color="black",
             lw=1.1,
             ls="dashed",
-            label=f"x = {view.speed:.2g} m/s · t: surface wave, {view.tone:.0f} Hz",
+            label=f"surface wave, {view.speed:.2g} m/s",
         )
     if name == "track" and view.track is not None:
         length = 1e3 * path.length

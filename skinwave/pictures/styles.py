@@ -5,7 +5,7 @@ from typing import Any
 
 from simple_model.choices import choose
 
-ONE_COLUMN = 6.5  # inch on a screen: wider figures take two columns in print
+ONE_COLUMN = 6.5  # inch of letters of 10 points: wider figures take two columns in print
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,10 +24,15 @@ class Style:
     panel: tuple[int, int] = (480, 432)
     oversampling: int = 1
 
+    @property
+    def zoom(self) -> float:
+        """How large letters are, over those of 10 points."""
+        return self.font / 10
+
     def size(self, width: float, height: float) -> tuple[float, float]:
-        """Width and height in inch of a figure that would be so large on a screen."""
+        """Width and height in inch of a figure that would be so large with letters of 10 points."""
         if self.columns is None:
-            return width, height
+            return width * self.zoom, height * self.zoom
         column = self.columns[width > ONE_COLUMN]
         return column, column * height / width
 
@@ -45,7 +50,7 @@ class Style:
 
 STYLES = {
     "report": Style(),
-    "talk": Style(paper="#15181c", ink="#f2f2f2", font=14.0, dpi=150, panel=(640, 576)),
+    "talk": Style(paper="#15181c", ink="#f2f2f2", font=14.0, dpi=107, panel=(640, 576)),
     "print": Style(ink="#000000", font=7.5, dpi=300, columns=(3.5, 7.0), oversampling=2),
 }
 

@@ -215,16 +215,18 @@ DIFFERENCE = (
     "below -40 dB count as -40 dB."
 )
 SNAPSHOTS = (
-    "The surface at equal parts of what the film plays. Behind a focus that is faster than the "
-    "surface wave, the Mach angle asin(c/v); no clean cone forms on a circle smaller than a "
-    "wavelength."
+    "The surface when the body moves most, and a quarter, half and three quarters of a turn of the "
+    "focus later (of a period of the strongest line, if it rests). Behind a focus that is faster "
+    "than the surface wave, the Mach angle asin(c/v); no clean cone forms on a circle smaller than "
+    "a wavelength."
 )
 WAVES = (
     "Motion over place and time in the steady state, two periods of the slowest tone. Above: "
-    "outwards along x from the path's outermost point; the dashed lines x = c t are those of a "
-    "surface wave far from its source in a half-space or an infinite sheet. Near the path and in "
-    "thin slabs the phase runs ahead of them, in a clamped sheet waves stand, and in the point "
-    "kernel nothing propagates. Below: along the path; the focus runs along the black lines."
+    "outwards along x from the path's outermost point; the dashed lines are those of a surface "
+    "wave of the strongest line, far from its source, in a half-space or an infinite sheet. Near "
+    "the path and in thin slabs the phase runs ahead of them, in a clamped sheet waves stand, and "
+    "in the point kernel nothing propagates. Below: along the path; the focus runs along the black "
+    "lines."
 )
 LOADS = (
     "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "
