@@ -76,6 +76,7 @@ def prepare(
     With `symmetry`, as in `bodies.build`, once for all Tactons that have it.
     """
     clock = Clock()
+    (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
     mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
     # A file may call other facets of the same mesh its top, or hold others.
@@ -117,7 +118,6 @@ def _prepared_anew(
     tolerance: float,
     name: str,
 ) -> Prepared:
-    report("mesh", 1.0)
     mesh, operators = build.mesh, assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
