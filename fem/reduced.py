@@ -112,6 +112,8 @@ def reduce(
     K, C, M = operators.K, operators.C, operators.M
     shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift) if shift else K
     factor = factorise(shifted, backend=solver)
+    if progress:
+        progress(0.0)
     others = [C, *(branch.K for branch in branches)]
     space = _Space([M, *others], moving.shape[1] * (MOST_MOMENTS + 1))
     small = [np.empty((0, 0)) for _ in [K, *others]]

@@ -3,15 +3,18 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+from argparse import Namespace
 
 import numpy as np
 import pytest
 from corpus import SMALL
 
 from skinwave.cli import main
+from skinwave.commands.common import progress_of
 
 
 def table(path):
@@ -148,6 +151,25 @@ def test_wrong_options_exit_with_two(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["run", "x.toml", "--model", "magic"])
     assert stop.value.code == 2
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    monkeypatch.setenv("COLUMNS", "100")
+    with progress_of(Namespace(quiet=False, json=False)) as progress:
+        for phase in ("mesh", "assemble", "factorise"):
+            progress(phase, 0.0)
+        progress("reduce", 0.5)
+        progress("reduce", 0.9)
+    said = capsys.readouterr().err
+    if terminal:
+        assert re.search(r"reduce \(step 4 of 4\) +.* about 1 s left", said)
+    else:
+        assert said.splitlines() == [
+            "mesh (step 1 of 4)", "assemble (step 2 of 4)", "factorise (step 3 of 4)",
+            "reduce (step 4 of 4)",
+        ]  # fmt: skip
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")

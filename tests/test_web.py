@@ -31,6 +31,7 @@ from skinwave.models.bodies import compliance
 from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
+from skinwave.steps import PREPARING, Step, follower
 from skinwave.studies.paper15 import tactons
 from skinwave.web import (
     check_extra,
@@ -669,6 +670,38 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
     assert sent[1:] == [("answer", 2, "found")]
 
 
+def test_each_step_has_its_number_and_the_time_that_is_left():
+    now = iter(range(0, 1000, 3))
+    follow = follower(clock=lambda: next(now))
+    said = [follow("mesh", 0.0), follow("assemble", 0.0), follow("factorise", 0.0)]
+    said += [follow("reduce", part) for part in (0.0, 0.5, 1.0)]
+    assert [step.name for step in said[:3]] == [
+        "mesh (step 1 of 4)", "assemble (step 2 of 4)", "factorise (step 3 of 4)",
+    ]  # fmt: skip
+    assert [step.done for step in said] == sorted(step.done for step in said)
+    assert said[0].left is None
+    # 12 s for all but half of the last step: as long as what is left of it takes in proportion.
+    share = PREPARING["reduce"] / 2
+    assert said[4].left == pytest.approx(12 * share / (1 - share))
+    assert said[5].left == pytest.approx(0)
+    assert follow("reduce", 0.1).left is None, "another mesh, from here"
+    # One that begins later is not taken for quick because of what it has not done.
+    assert follow("skin-slab: factorise", 0.0).left is None
+    later = follow("skin-slab: reduce", 0.0)
+    assert later.name == "skin-slab: reduce (step 4 of 4)"
+    assert later.left == pytest.approx(3 * PREPARING["reduce"] / PREPARING["factorise"])
+    assert follow("write tables", 0.0) == Step(phase="write tables")
+
+
+def test_the_process_tells_the_step_it_is_at(monkeypatch):
+    sent = []
+    tell = worker._teller(Mock(send=sent.append), 7)
+    for phase in waves.STEPS:
+        tell(phase, 0.0)
+    assert [content.number for _, _, content in sent] == [1, 2, 3, 4, 5]
+    assert {(what, number, content.of) for what, number, content in sent} == {("progress", 7, 5)}
+
+
 @pytest.mark.parametrize("waits", [False, True])
 def test_a_process_that_dies_fails_the_question_that_is_awaited(waits):
     told = []
@@ -746,8 +779,10 @@ def test_waves_are_stale_until_they_are_answered(session):
         told(session, "answer", session.number - 1, answer)
     assert session.state.waves_stale, "an older answer is not shown"
     with session.state:
-        told(session, "progress", session.number, ("reduce", 0.5))
-    assert (session.state.busy, session.state.done) == ("reduce", 50)
+        step = Step(phase="reduce", number=4, of=5, done=0.5, left=21.0)
+        told(session, "progress", session.number, step)
+    assert (session.state.busy, session.state.done) == ("reduce (step 4 of 5)", 50)
+    assert session.state.left == "about 20 s left"
     with session.state:
         told(session, "answer", session.number, answer)
     assert not session.state.waves_stale
@@ -978,7 +1013,7 @@ def test_progress_that_comes_after_cancel_is_not_shown(session):
         moves.cancel(session)
     for late in (number, session.number):
         with session.state:
-            told(session, "progress", late, ("reduce", 0.5))
+            told(session, "progress", late, Step(phase="reduce", done=0.5))
     assert not session.state.busy
 
 

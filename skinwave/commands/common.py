@@ -98,17 +98,23 @@ def metre(millimetre: float | None) -> float | None:
 
 @contextmanager
 def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
-    """A bar with the phase named; on a pipe a line per phase; nothing if not wanted."""
+    """A bar with the step named and the time left; on a pipe a line per step; nothing if not
+    wanted.
+    """
     if options.quiet or options.json:
         yield lambda phase, fraction: None
         return
+    from skinwave.steps import follower
+
+    follow = follower()
     if not sys.stderr.isatty():
         phases: list[str] = []
 
         def log(phase: str, fraction: float) -> None:
-            if phase not in phases[-1:]:
-                phases.append(phase)
-                print(phase, file=sys.stderr, flush=True)
+            name = follow(phase, fraction).name
+            if name not in phases[-1:]:
+                phases.append(name)
+                print(name, file=sys.stderr, flush=True)
 
         yield log
         return
@@ -118,16 +124,15 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
         Progress,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
 
     columns = (TextColumn("{task.description:<36}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=1.0)
+    left = TextColumn("{task.fields[left]}")
+    with Progress(*columns, left, console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=1.0, left="")
 
         def show(phase: str, fraction: float) -> None:
-            if bar.tasks[task].description != phase:
-                bar.reset(task, description=phase, total=1.0)
-            bar.update(task, completed=min(max(fraction, 0.0), 1.0))
+            step = follow(phase, fraction)
+            bar.update(task, description=step.name, completed=step.done, left=step.time_left)
 
         yield show

@@ -79,6 +79,7 @@ def prepare(
     With `symmetry`, as in `bodies.build`, once for all Tactons that have it.
     """
     clock = Clock()
+    (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
     name = _entry_name(body, build, probes, solver, tolerance)
     with clock("read from cache"):
@@ -140,7 +141,6 @@ def _prepared_anew(
     tolerance: float,
     name: str,
 ) -> Prepared:
-    report("mesh", 1.0)
     mesh, operators = build.mesh, assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)

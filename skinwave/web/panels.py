@@ -192,7 +192,7 @@ def notices(session: Session) -> None:
     """What cannot be, and what is being computed."""
     v3.VAlert("{{ problem }}", v_if="problem", type="error", density="compact", id="problem")
     with v3.VAlert(v_if="busy", type="info", density="compact", id="busy"):
-        html.Div("{{ body }}: {{ busy }}")
+        html.Div("{{ body }}: {{ busy }}{{ left ? ', ' + left : '' }}", id="busy-said")
         v3.VProgressLinear(model_value=("done",), indeterminate=("!done",), height=6)
         v3.VBtn("Cancel", click=partial(cancel, session), size="small", variant="text", id="cancel")
 

@@ -108,6 +108,7 @@ def refresh(session: Session) -> None:
         "drawing_frequency": session.scene.tacton.drawing_frequency,
         "undoable": session.history.undoable, "redoable": session.history.redoable,
         "busy": (state.busy or ("" if session.waves else "starting")) if waiting else "",
+        "left": state.left if waiting and state.busy else "",
     })  # fmt: skip
     draw(session)
     if waiting:
@@ -119,8 +120,8 @@ def told(session: Session, what: str, number: int, content: Any) -> None:
     state = session.state
     if what == "progress":
         if session.good["body"] != "none":  # else told before it was cancelled
-            phase, done = content
-            state.update({"busy": phase, "done": round(100 * max(0.0, min(1.0, done)))})
+            state.update({"busy": content.name, "done": round(100 * content.done),
+                          "left": content.time_left})  # fmt: skip
     elif number != session.number:
         return  # an older question's
     elif what == "failed":

@@ -23,7 +23,8 @@ def first(own: Body | None) -> dict[str, Any]:
     """The state beside the controls before anything was answered."""
     return {
         "errors": {}, "typed": {}, "problem": "", "stale": False, "waves_stale": False,
-        "busy": "", "done": 0, "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
+        "busy": "", "done": 0, "left": "",
+        "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
         "warnings": [], "expected": "", "published": False,
@@ -68,8 +69,8 @@ def warnings(answers: Sequence[Answer]) -> list[str]:
 
 def expected(answer: Answer) -> str:
     """How wrong an answer is expected to be, in words, if it says so."""
-    error = getattr(answer.response, "expected_error", None)
-    return "" if not error else f"Expected numerical error: {100 * error:.2g} %"
+    error = getattr(answer.response, "expected_error", np.nan)
+    return f"Expected numerical error: {100 * error:.2g} %" if error > 0 else ""
 
 
 def differs(pinned: Values, values: Values) -> list[dict[str, str]]:

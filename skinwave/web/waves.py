@@ -60,6 +60,8 @@ NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 BAND = 1000.0  # Hz
 # Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
+# As in `skinwave.steps`; a body that is kept begins with the third.
+STEPS = {"mesh": 0.15, "assemble": 0.1, "factorise": 0.2, "reduce": 0.5, "read the surface": 0.05}
 KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
 
@@ -237,7 +239,8 @@ def reduced(
     knots = path_knots(pressure)
     spots = pressure.spot(points, knots[:: 1 if len(knots) < MANY else 2])
     near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
-    P, points, spots = P[:, near], points[near], spots[:, near]
+    # As columns: taken out of coordinates they take longer than the factorisation.
+    P, points, spots = P.tocsc()[:, near], points[near], spots[:, near]
     seeds = fem.load_subspace(P @ spots.T, TOLERANCE / 5)
     model = fem.reduce(
         ops, sparse.csr_array(seeds.T), BAND, TOLERANCE, added=air(body, made, ops),

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from skinwave.steps import Step, follower
+
 Told = Callable[[str, int, Any], None]  # what, number of the question, content
 LEAST_STEP = 0.02  # of progress that is told
 
@@ -16,7 +18,7 @@ LEAST_STEP = 0.02  # of progress that is told
 def answer_forever(pipe: Connection) -> None:
     """Answer questions (number, scene, moving) until the other end is closed.
 
-    Tells ("progress", number, (phase, fraction)), then ("answer", number, Answer) or
+    Tells ("progress", number, Step), then ("answer", number, Answer) or
     ("failed", number, sentence).
     """
     from skinwave.web.waves import Waves
@@ -68,13 +70,16 @@ def _end_group(process: int) -> None:
 
 
 def _teller(pipe: Connection, number: int) -> Callable[[str, float], None]:
-    last: list[tuple[str, float]] = [("", 0.0)]
+    from skinwave.web.waves import STEPS
+
+    follow, last = follower(STEPS), Step(phase="")
 
     def tell(phase: str, fraction: float) -> None:
-        before, done = last[0]
-        if phase != before or abs(fraction - done) > LEAST_STEP:
-            last[0] = (phase, fraction)
-            pipe.send(("progress", number, (phase, fraction)))
+        nonlocal last
+        step = follow(phase, fraction)
+        if phase != last.phase or abs(step.done - last.done) > LEAST_STEP:
+            last = step
+            pipe.send(("progress", number, step))
 
     return tell
 

@@ -1,0 +1,64 @@
+"""Where the preparation of a body is: step n of m, the share done, and the time left."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+# Steps in their order, each with its share of the time, as on a sheet and a palm.
+PREPARING = {"mesh": 0.15, "assemble": 0.10, "factorise": 0.20, "reduce": 0.55}
+SAME = {"march": "reduce"}  # what another model does at that step
+LEAST = 0.02  # of all, after which a time that is left can be estimated
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """A `phase` as step `number` of `of`, both 0 of what is no step; the share `done` of all steps
+    or of the phase, and the seconds `left`, None where that is not known yet.
+    """
+
+    phase: str
+    number: int = 0
+    of: int = 0
+    done: float = 0.0
+    left: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The phase with its number, such as "assemble (step 2 of 4)"."""
+        return f"{self.phase} (step {self.number} of {self.of})" if self.number else self.phase
+
+    @property
+    def time_left(self) -> str:
+        """The seconds left in words; nothing where they are not known."""
+        if self.left is None:
+            return ""
+        to = 1 if self.left < 10 else 5
+        return f"about {max(to, to * round(self.left / to))} s left"
+
+
+def follower(
+    steps: Mapping[str, float] = PREPARING, clock: Callable[[], float] = time.monotonic
+) -> Callable[[str, float], Step]:
+    """What makes a `Step` of each report of progress (phase, fraction of it done).
+
+    The time left goes by what was done since these steps began, perhaps not with the first of them.
+    """
+    names, last = list(steps), Step(phase="")
+    group, since, before = "", 0.0, 0.0  # what is followed, since when, and what was done then
+
+    def follow(phase: str, fraction: float) -> Step:
+        nonlocal last, group, since, before
+        of, _, own = phase.rpartition(": ")
+        own, share = SAME.get(own, own), min(max(fraction, 0.0), 1.0)
+        number = names.index(own) + 1 if own in steps else 0
+        done = sum(steps[name] for name in names[: number - 1]) if number else 0.0
+        done += share * steps.get(own, 1.0)
+        now, followed = clock(), f"{of}: steps" if number else phase
+        if followed != group or done < last.done:
+            group, since, before = followed, now, done
+        gained = done - before
+        left = (now - since) * (1 - done) / gained if gained > LEAST else None
+        last = Step(phase=phase, number=number, of=len(names) * bool(number), done=done, left=left)
+        return last
+
+    return follow
