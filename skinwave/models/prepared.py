@@ -78,6 +78,7 @@ def prepare(
     clock = Clock()
     build = meshed(body, h, clock, silent, symmetry)
     mesh, ends = build.mesh, (build.fixed, build.absorbing, build.drag)
+    rests = tuple(vars(build.support).values()) if build.support else ()
     # A file may call other facets of the same mesh its top, or hold others.
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     name = cache.key(
@@ -87,6 +88,7 @@ def prepare(
         *named,
         build.material,
         *ends,
+        *rests,
         body.air,
         probes,
         BAND,
