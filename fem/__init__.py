@@ -12,6 +12,7 @@ n node, p probe, t time, f frequency, l derivative along an element edge.
 from fem import nonlinear
 from fem.air import Added, added_mass
 from fem.assembly import Operators, assemble
+from fem.boundary import Support
 from fem.energy import Spent, audited, imbalance, mean_power, stored
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
@@ -48,6 +49,7 @@ __all__ = [
     "Spent",
     "State",
     "StretchingModes",
+    "Support",
     "added_mass",
     "assemble",
     "at_rest",

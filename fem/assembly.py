@@ -7,6 +7,7 @@
     R       = int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
                 (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
               + int drag rho N_a N_b dV in a layer before them
+    K      += int k delta_ij N_a N_b dA where a surface rests on springs of k per area
     K_j     = (relaxing modulus/mu) K of the elements that relax in the same time, see `relaxation`
 
 Where nu > 0.45 most of lam acts on a projection of the dilatation, see `dilatation`; without that
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from fem.boundary import dashpots, fixed_dofs
+from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.dilatation import projected_dilatation
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
@@ -66,6 +67,7 @@ def assemble(
     fixed: str | Mapping[str, str] | ArrayLike = "clamped",
     absorbing: str | Ints | None = None,
     drag: Floats | None = None,
+    support: Support | None = None,
 ) -> Operators:
     """Operators of a body.
 
@@ -77,6 +79,7 @@ def assemble(
         not, such as {"bottom": "xyz", "left": "x"}; or an (n, 3) bool array, True where fixed.
     absorbing : facets that let waves out, by the name of their set or as nodes, or None.
     drag : (m,) float, 1/s, force per momentum in each element that damps waves on their way out
+    support : springs and dashpots of a surface whose share in them is a function of place, or None
 
     Raises
     ------
@@ -95,6 +98,10 @@ def assemble(
     R = sparse.csr_array(K.shape)
     if absorbing is not None:
         R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+    if support is not None and support.stiffness.any():
+        K = (K + springs(mesh, support)).tocsr()
+    if support is not None and support.absorbed.any():
+        R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
     if drag is not None:
         R = R + _drag(mesh, pattern, _of(materials, "density")[region] * drag)
     if R.nnz:

@@ -1,17 +1,37 @@
 """What holds a body, and what lets waves leave it."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.materials import Material
-from fem.surface import facet_geometry
+from fem.surface import facet_geometry, facet_normals
 from meshes import MeshError, TetMesh, facet_set
-from meshes.tetmesh import FACES, Ints, facet_keys
+from meshes.tetmesh import FACES, Floats, Ints, facet_keys
 
 ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pin the normal motion
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Support:
+    """What a surface rests on, as a function of place: springs, and dashpots that let waves out.
+
+    Where a surface is held by whole facets, the edge of the hold follows the mesh; a stiffness that
+    is smooth in place does not.
+
+    Parameters
+    ----------
+    facets : (k, a) int, boundary facets
+    stiffness : (k q,) N/m3, traction per displacement at the points of `facet_points`
+    absorbed : (k q,) 0 to 1, what share of the surface at these points has dashpots
+    """
+
+    facets: Ints
+    stiffness: Floats
+    absorbed: Floats
 
 
 def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
@@ -32,23 +52,49 @@ def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Int
     return mask.ravel()
 
 
+def springs(mesh: TetMesh, support: Support) -> sparse.csr_array:
+    """Stiffness (3 n, 3 n) of a support: int k N_a N_b dA in every direction, a Winkler bed."""
+    held, k = _where(support.facets, support.stiffness)
+    return _over_facets(mesh, held, k[:, :, None, None] * np.eye(3))
+
+
 def dashpots(
-    mesh: TetMesh, nodes: Ints, materials: list[Material], region: Ints
+    mesh: TetMesh,
+    nodes: Ints,
+    materials: list[Material],
+    region: Ints,
+    share: Floats | None = None,
 ) -> sparse.csr_array:
-    """Lysmer-Kuhlemeyer damping (3 n, 3 n) of facets (k, a)."""
+    """Lysmer-Kuhlemeyer damping (3 n, 3 n) of facets (k, a), or of a share (k q,) of them."""
+    if share is not None:
+        nodes, share = _where(nodes, share)
     m = [materials[r] for r in region[_owners(mesh, nodes)]]
     shear = np.array([x.density * x.shear_speed for x in m])
     squared_ratio = np.array(
         [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]
     )
     pressure = shear * np.sqrt(squared_ratio)
-    N, normals = facet_geometry(mesh, nodes)
-    area = np.linalg.norm(normals, axis=2)
-    unit = normals / area[..., None]
+    unit = facet_normals(mesh, nodes).reshape(len(nodes), -1, 3)
     along = unit[..., :, None] * unit[..., None, :]
     impedance = pressure[:, None, None, None] * along
     impedance += shear[:, None, None, None] * (np.eye(3) - along)
-    local = np.einsum("eq,eqij,qa,qb->eaibj", area, impedance, N, N, optimize=True)
+    if share is not None:
+        impedance *= share[:, :, None, None]
+    return _over_facets(mesh, nodes, impedance)
+
+
+def _where(nodes: Ints, values: Floats) -> tuple[Ints, Floats]:
+    """The facets (k, a) on which values (k q,) are not all 0, and these by facet (k, q)."""
+    by_facet = values.reshape(len(nodes), -1)
+    some = by_facet.any(axis=1)
+    return nodes[some], by_facet[some]
+
+
+def _over_facets(mesh: TetMesh, nodes: Ints, traction: Floats) -> sparse.csr_array:
+    """int N_a t_ij N_b dA (3 n, 3 n) of a matrix t (k, q, i, j) at the points of facets (k, a)."""
+    N, normals = facet_geometry(mesh, nodes)
+    area = np.linalg.norm(normals, axis=2)
+    local = np.einsum("eq,eqij,qa,qb->eaibj", area, traction, N, N, optimize=True)
     dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1).astype(np.int32)
     rows = np.broadcast_to(dofs[:, :, None], (*dofs.shape, dofs.shape[1]))
     columns = rows.transpose(0, 2, 1)

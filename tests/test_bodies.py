@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,6 @@ from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare
 from skinwave.cli import main
-from skinwave.models import hands
 from skinwave.models.bodies import build, has_layer, operators, surface_load
 from skinwave.planning.plan import plan
 from skinwave.scene import Body, Layer, Placement, Relief
@@ -260,15 +260,61 @@ def test_a_mesh_in_a_file_keeps_its_own_bottom(dome, tmp_path):
         assert len(built(tmp_path, mesh).facets["bottom"]) == count
 
 
-def test_of_a_mesh_without_a_bottom_what_looks_downwards_is_taken(dome, tmp_path):
-    down = len(meshes.named(dome, down=lambda _, n: n[:, 2] < hands.DOWNWARDS).facets["down"])
+def test_a_mesh_without_a_bottom_of_its_own_rests_on_what_looks_downwards(dome, tmp_path):
     top = meshes.named(dome, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
     # What is read and written again has the bottom that reading gave it.
     meshes.write(tmp_path / "first.vtu", dome)
     again = meshes.body_from_file(tmp_path / "first.vtu", 0.005)
-    assert len(again.facets["bottom"]) > down
+    assert len(again.facets["bottom"])
     for mesh in (dome, top, again):
-        assert len(built(tmp_path, mesh).facets["bottom"]) == down
+        meshes.write(tmp_path / "body.vtu", mesh)
+        made = build(hand_in(tmp_path / "body.vtu"), 0.005)
+        assert "bottom" not in made.mesh.facets
+        downwards = -fem.facet_normals(made.mesh, made.support.facets)[:, 2]
+        assert ((made.support.stiffness > 0) == (downwards > 0.5)).all()
+        assert not made.support.absorbed.any()
+        assert (downwards > 0.9).sum() > 100
+
+
+def test_springs_and_dashpots_of_a_support_carry_what_they_should():
+    block = meshes.block((0.02, 0.03, 0.01), 0.005)
+    facets, soft = block.facets["clamped"], replace(fem.PRESETS["palm"], viscosity=0.0)
+    x = fem.facet_points(block, facets)[:, 0]
+    rest = fem.Support(facets=facets, stiffness=2e7 * (1 + 50 * x), absorbed=(x > 0).astype(float))
+    held = fem.assemble(block, soft, fixed={}, support=rest)
+    loose = fem.assemble(block, soft, fixed={})
+    impedance = soft.density * soft.shear_speed * np.array([1, 1, 11**0.5])
+    for axis in range(3):
+        moved = np.zeros_like(block.points)
+        moved[:, axis] = 1.0
+        u = moved.ravel()
+        assert u @ (loose.K @ u) < 1e-9 * 2e7
+        assert u @ (held.K @ u) == pytest.approx(2e7 * 6e-4, rel=1e-9)
+        assert u @ (held.R @ u) == pytest.approx(impedance[axis] * 3e-4, rel=1e-6)
+    assert abs(held.C - held.R).max() < 1e-12 * abs(held.R).max()  # springs lose nothing
+
+
+def test_a_support_keeps_the_balance_of_energy():
+    block = meshes.block((0.02, 0.02, 0.01), 0.005)
+    facets = block.facets["clamped"]
+    many = np.ones(len(fem.facet_points(block, facets)))
+    rest = fem.Support(facets=facets, stiffness=1e7 * many, absorbed=many)
+    ops = fem.assemble(block, fem.PRESETS["palm"], fixed={}, support=rest)
+    push = fem.load_operator(block).sum(axis=1)
+    force = lambda t: push * 100 * np.sin(2 * np.pi * 200 * t)  # noqa: E731
+    states = islice(fem.transient(ops, force, 1e-4), 40)
+    *_, (state, spent) = fem.audited(ops, states, force)
+    assert fem.imbalance(spent, fem.stored(ops, state)) < 1e-9
+    assert spent.radiated > 0.01 * spent.work
+
+
+def test_a_hand_without_ends_cannot_be_held_by_them(dome, tmp_path):
+    meshes.write(tmp_path / "body.vtu", dome)
+    for base in ("free", "absorbing"):
+        with pytest.raises(
+            ValueError, match=r"has no facets 'sides' or 'cut' to hold it by; clamp"
+        ):
+            build(replace(hand_in(tmp_path / "body.vtu"), base=base), 0.005)
 
 
 def test_regions_of_a_file_are_refused_as_they_would_not_be_used(dome, tmp_path):

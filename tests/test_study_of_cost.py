@@ -13,6 +13,7 @@ from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.comparison import compare
 from skinwave.models.bodies import (
+    build,
     cell_layers,
     check_mesh,
     coarsest_size,
@@ -253,10 +254,21 @@ def test_meshes_of_a_palm_tell_its_layers_apart():
     assert default_size(thin) == coarsest_size(thin) == 2e-3
     thick = Body(kind="palm", layers=(Layer(thickness=2.5e-3, material="dermis"),))
     assert default_size(thick) == default_size(Body(kind="palm"))
-    finest = Body(kind="palm", layers=(Layer(thickness=0.3e-3, material="epidermis"),))
-    for body, h in ((thin, 2.1e-3), (finest, default_size(finest))):
-        with pytest.raises(ValueError, match="thinner than half an element"):
+    fine = Body(kind="palm", layers=(Layer(thickness=0.6e-3, material="epidermis"),))
+    for body, h, cure in ((thin, 2.1e-3, "elements of 2 mm"), (fine, 2e-3, "elements of 1.2 mm")):
+        with pytest.raises(ValueError, match=f"thinner than half an element.*take {cure}, thicker"):
             check_mesh(body, h)
+
+
+@pytest.mark.parametrize("h", [5e-3, 0.6e-3, 0.2e-3])
+def test_a_layer_that_no_mesh_of_a_palm_resolves_is_refused_in_one_way(h):
+    """Whatever the elements: smaller ones are more than the mesher may make."""
+    thin = Body(kind="palm", layers=(Layer(thickness=0.3e-3, material="epidermis"),))
+    for do in (check_mesh, build):
+        with pytest.raises(ValueError, match="take thicker layers, or a slab") as error:
+            do(thin, h)
+        assert "elements of" not in str(error.value)
+        assert "smaller" not in str(error.value)
 
 
 @pytest.mark.parametrize("sides", ["free", "clamped"])

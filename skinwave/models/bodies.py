@@ -9,6 +9,7 @@ from scipy import sparse
 
 from fem.air import Added, added_mass
 from fem.assembly import LOSS_BAND, Operators, assemble
+from fem.boundary import Support
 from fem.materials import Material, rayleigh_damping
 from fem.surface import facet_normals, facet_points, load_operator
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
@@ -31,7 +32,9 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 LAYER_WIDTH, LAYER_DRAG = 7.0, 0.35  # of the depth; of the angular frequency of cut-on
 LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
 LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
+HAND_CELL = 5e-3  # m: 1 to 2 % from cells of 3 mm at every probe, at a fifth of the cost
 FINE_PALM = 2e-3  # m: cells of a palm with thin layers, of 300,000 unknowns; more must be asked for
+FINEST_HAND = 1e-3  # m: finer cells of a hand are more than its mesher is let make
 THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it can tell
 COMPARED = (
     4 / 3
@@ -47,13 +50,16 @@ EXACT = {"flat-body": flat_body, "flat-body-harmonic": steady_state}  # models o
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Build:
-    """How a body is meshed: arguments of `fem.assemble`; `drag` (m,) in 1/s or None."""
+    """How a body is meshed: arguments of `fem.assemble`; `drag` (m,) in 1/s, or None; `support` of
+    a hand, or None.
+    """
 
     mesh: TetMesh
     material: dict[int, Material]
     fixed: dict[str, str]
     absorbing: Ints | None
     drag: Floats | None = None
+    support: Support | None = None
     symmetry: str = ""
 
 
@@ -90,21 +96,28 @@ def build(
             depth = hands.depths(mesh)
         mesh = replace(mesh, region=np.searchsorted(starts[1:], depth, side="right"))
     ends = {"bottom": body.base, "sides": body.sides}
+    ends = {name: end for name, end in ends.items() if len(mesh.facets.get(name, ()))}
     fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
     for axis in symmetry:
         mesh = half(mesh, axis)
         fixed[f"mirror_{axis}"] = axis
     if has_layer(body):
         drag = layer_drag(body, mesh)
+    support = hands.support(body, mesh) if body.kind in hands.KINDS else None
+    if body.is_held and "xyz" not in fixed.values() and not (support and support.stiffness.any()):
+        raise ValueError(
+            f"the sides are clamped, but {body.file} has no facets 'sides' or 'cut' to hold it by; "
+            "clamp its base, or name them in the file"
+        )
     mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
-    leaky = [facets for facets in leaky if len(facets)]  # a whole hand has no ends
     return Build(
         mesh=mesh,
         material=dict(enumerate(materials)),
         fixed=fixed,
         absorbing=np.vstack(leaky) if leaky else None,
         drag=drag,
+        support=support,
         symmetry=symmetry,
     )
 
@@ -112,7 +125,12 @@ def build(
 def operators(build: Build) -> Operators:
     """Stiffness, damping and mass of a meshed body."""
     return assemble(
-        build.mesh, build.material, fixed=build.fixed, absorbing=build.absorbing, drag=build.drag
+        build.mesh,
+        build.material,
+        fixed=build.fixed,
+        absorbing=build.absorbing,
+        drag=build.drag,
+        support=build.support,
     )
 
 
@@ -229,12 +247,7 @@ def layer_drag(body: Body, mesh: TetMesh) -> Floats:
 def _checked(body: Body, h: float, slack: float = 1.0) -> float:
     if body.kind == "none":
         raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
-    if h > slack * coarsest_size(body) * (1 + 1e-9):
-        raise ValueError(
-            f"a layer of {1e3 * THINNEST * coarsest_size(body):g} mm is thinner than half an "
-            f"element of {1e3 * h:g} mm; take smaller elements, thicker layers, or a slab, whose "
-            "elements follow its layers"
-        )
+    _check_layers(body, h, slack)
     if body.kind == "mesh":
         return h
     if not isfinite(body.depth):
@@ -249,11 +262,30 @@ def _checked(body: Body, h: float, slack: float = 1.0) -> float:
     return h
 
 
+def _check_layers(body: Body, h: float, slack: float) -> None:
+    """Refuse layers that elements which do not follow them cannot resolve."""
+    coarsest = coarsest_size(body)
+    thin, slab = 1e3 * THINNEST * coarsest, "or a slab, whose elements follow its layers"
+    if coarsest < FINEST_HAND * (1 - 1e-9):
+        raise ValueError(
+            f"a layer of {thin:g} mm of a {body.kind} is thinner than half of its finest elements, "
+            f"{1e3 * THINNEST * FINEST_HAND:g} mm; take thicker layers, {slab}"
+        )
+    if h > slack * coarsest * (1 + 1e-9):
+        raise ValueError(
+            f"a layer of {thin:g} mm is thinner than half an element of {1e3 * h:g} mm; take "
+            f"elements of {1e3 * coarsest:g} mm, thicker layers, {slab}"
+        )
+
+
 def default_size(body: Body) -> float:
     """Element size in metre of a body whose user asks for none."""
     if body.kind == "sheet":
         return min(body.width, body.height) / SHEET_CELLS
-    return min(SLAB_CELL, body.depth / 2, max(coarsest_size(body), FINE_PALM))
+    if body.kind == "mesh":  # whose depth is that of its file
+        return min(HAND_CELL, max(coarsest_size(body), FINE_PALM))
+    cell = HAND_CELL if body.kind == "palm" else SLAB_CELL
+    return min(cell, body.depth / 2, max(coarsest_size(body), FINE_PALM))
 
 
 def coarsest_size(body: Body) -> float:

@@ -177,7 +177,7 @@ def harmonic_answer(
         weights = path_weights(scene.pressure)[:, None]
         spots = along_path((scene.pressure.spot(points, knots) * weights).T)
         frequencies, pressures = lines.gather(spots.T)
-        if "xyz" not in build.fixed.values():  # a mean would push what nothing holds ever further
+        if not scene.body.is_held:  # a mean would push what nothing holds ever further
             frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         total = fem.Spent()

@@ -1,35 +1,45 @@
 """Hands: a palm from its parameters, or the body in a file, meshed for the focus above it."""
 
+from collections.abc import Callable
+
 import numpy as np
 
+import fem
+from fem.surface import facet_geometry, facet_normals, facet_points
 from meshes import (
-    Grading,
     MeshError,
     TetMesh,
     body_from_file,
     boundary_facets,
-    graded,
-    named,
+    corner_volumes,
     palm_mesh,
     quadratic,
 )
 from meshes.facets import seen_from_above
-from meshes.intake import FINE_RADIUS, GROWTH
+from meshes.intake import GROWTH
+from meshes.palm import gradient
 from meshes.tetmesh import Floats, Ints
 from skinwave.scene import Body
 
 KINDS = ("palm", "mesh")
 COARSEST = 2.0  # cells far from the middle, over those of h
-DOWNWARDS = -0.7  # z of the normals of what rests on bone
+# Cells at the surface, over those of h, because the motion there has the scale of the focus; how
+# far from the middle they keep their size; and how much slower than sideways they grow downwards.
+SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
+# Cosine between the outward normal and straight down, or along the hand, where what is below the
+# surface begins to hold it, and where it does so entirely.
+BEGINS, ENTIRE = 0.5, 0.9
+# Of the shear stiffness of the whole thickness: what stands for bone. Tissue that hardly changes
+# its volume is held by it as by lam/mu = 5000: 1e4 moves a palm's waveforms by 1.7 % from those of
+# 1e7, 1e6 by 0.4 %.
+STIFFEST = 1e6
 
 
 def hand(body: Body, h: float) -> TetMesh:
     """Ten-node tetrahedra of h in metre about the middle of the palm, growing away from it.
 
-    The facet sets are those of a slab: `top`, seen from above; `bottom`, which looks downwards and
-    rests on bone; `sides`, where a palm ends at the wrist and the fingers and a body from a file
-    was cut. A mesh in a file keeps its own, but for a `bottom` of all that is not seen from above,
-    which is what `meshes.body_from_file` calls so: of that the part that looks downwards is taken.
+    The facet sets are `top`, seen from above, and of a mesh in a file its own `bottom`, and `sides`
+    where it was cut or says so. What else a hand rests on is a `support`.
 
     Raises
     ------
@@ -38,19 +48,79 @@ def hand(body: Body, h: float) -> TetMesh:
     """
     if body.kind == "palm":
         # Cells wider than the rim is round would cut it off, and waves come back from the rim.
-        coarsest = min(COARSEST * h, max(h, 2 * body.relief.edge_radius))
-        sizing = graded(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest))
-        mesh = palm_mesh(body.palm, h, sizing=sizing)
-        cut = [mesh.facets["wrist"], mesh.facets["fingers"]]
-    else:
-        mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
-        _check_regions(body.file, mesh)
-        cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
+        coarsest = min(COARSEST * h, max(h, body.relief.edge_radius))
+        mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
+        return TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
+    mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
+    _check_regions(body.file, mesh)
+    cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
     facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
-    if body.kind == "palm" or _is_rest(mesh):
-        mesh = named(mesh, bottom=lambda centroids, normals: normals[:, 2] < DOWNWARDS)
-    facets["bottom"] = mesh.facets["bottom"]
+    if not _is_rest(mesh):
+        facets["bottom"] = mesh.facets["bottom"]
     return TetMesh(points=mesh.points, tets=mesh.tets, facets=facets)
+
+
+def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
+    """Edge lengths (n,) in metre aimed at in points (n, 3): 0.8 h where the focus travels, h some
+    5 mm below it, growing further down and out.
+    """
+    slope = float(np.log(GROWTH))
+
+    def sizes(points: Floats) -> Floats:
+        beside = np.maximum(np.linalg.norm(points[:, :2], axis=1) - FINE_RADIUS, 0.0)
+        below = DOWNWARDS * np.minimum(points[:, 2], 0.0)
+        return np.minimum(SURFACE * h + slope * np.hypot(beside, below), coarsest)
+
+    return sizes
+
+
+def support(body: Body, mesh: TetMesh) -> fem.Support:
+    """What a hand rests on where no facet set says so: bone below, and at the ends of a palm what
+    it is cut from.
+
+    Of a surface whose normal leans by a cosine c towards either, a share s takes part, which rises
+    smoothly from 0 at c = 0.5 to 1 at 0.9. Where that is clamped it rests on soft tissue over
+    bone, whose thickness falls from infinite to next to nothing as the share rises: springs of
+    mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. The share of what
+    absorbs has dashpots. A palm's normals are those of its level set, others those of the facets.
+
+    Parameters
+    ----------
+    mesh : of `hand`, as it lies before it is placed
+    """
+    facets = boundary_facets(mesh.tets)
+    outward = _outward(body, mesh, facets)
+    ends = [] if "bottom" in mesh.facets else [(body.base, _share(-outward[:, 2]))]
+    if body.kind == "palm":
+        ends.append((body.sides, _share(np.abs(outward[:, 1]))))
+    stiffness, absorbed = np.zeros((2, len(outward)))
+    for end, share in ends:
+        if end == "clamped":
+            stiffness += _shear_stiffness(body, mesh) * share / (1 - share + 1 / STIFFEST)
+        elif end == "absorbing":
+            absorbed = np.maximum(absorbed, share)
+    return fem.Support(facets=facets, stiffness=stiffness, absorbed=absorbed)
+
+
+def _outward(body: Body, mesh: TetMesh, facets: Ints) -> Floats:
+    """Unit normals (k q, 3) out of the body at the points of its facets."""
+    if body.kind != "palm":
+        return facet_normals(mesh, facets)
+    slope = gradient(body.palm, facet_points(mesh, facets))
+    return np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
+
+
+def _share(cosine: Floats) -> Floats:
+    """A smooth step from 0 where nothing is held to 1 where all is."""
+    t = np.clip((cosine - BEGINS) / (ENTIRE - BEGINS), 0.0, 1.0)
+    return np.asarray(t * t * (3 - 2 * t))
+
+
+def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
+    """Shear modulus of fast motion over the mean thickness, N/m3."""
+    _, normals = facet_geometry(mesh, boundary_facets(mesh.tets))
+    thickness = corner_volumes(mesh.points, mesh.tets).sum() / np.maximum(normals[..., 2], 0).sum()
+    return float((body.solid.shear_modulus + body.solid.relaxing_modulus) / thickness)
 
 
 def _check_regions(file: str, mesh: TetMesh) -> None:

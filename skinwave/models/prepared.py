@@ -96,10 +96,11 @@ def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance
     mesh = build.mesh
     # A file may call other facets of the same mesh its top, or hold others.
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
+    rests = tuple(vars(build.support).values()) if build.support else ()
     used = fem.available()[0] if solver == "auto" else solver
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
-        build.fixed, build.absorbing, build.drag, probes, BAND, tolerance, used, versions(),
+        build.fixed, build.absorbing, build.drag, *rests, probes, BAND, tolerance, used, versions(),
     )  # fmt: skip
 
 

@@ -212,7 +212,7 @@ def _element_rows(
         Row(
             what="element size",
             value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} unknowns",
-            reason=f"{'as asked' if h else 'refined until good enough'}: those of "
+            reason=f"{_why_size(found, tolerance, h)}: those of "
             f"{1e3 * found.compared:.2f} mm differ by so much that an error of "
             f"{100 * found.error:.2g} % is left"
             if np.isfinite(found.error)
@@ -230,6 +230,14 @@ def _element_rows(
             reason=f"the last mesh{kept}; 0.05 s for each further Tacton on the same body",
         ),
     ]
+
+
+def _why_size(found: Refined, tolerance: float, h: float | None) -> str:
+    if h:
+        return "as asked"
+    if found.error > tolerance:
+        return "the finest that is tried"
+    return f"refined until less than {100 * tolerance:g} % is left"
 
 
 def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, float]:

@@ -17,11 +17,19 @@ from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.effort import Progress
 from skinwave.models import hands
-from skinwave.models.bodies import cell_layers, check_mesh, default_size
+from skinwave.models.bodies import (
+    COMPARED,
+    FINE_PALM,
+    cell_layers,
+    check_mesh,
+    coarsest_size,
+    default_size,
+)
 from skinwave.models.prepared import Prepared, answer, prepare, reduced_lines, reduction_tolerance
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two sizes next to each other
+FIRST_HAND = 1.6  # of the default element size, for hands
 ORDER = 2.25  # of a waveform's error in the element size; measured 1.9 to 3.5
 AIM = 0.6  # of the tolerance, so that one more mesh is enough
 STRIDE = 1.6  # between two sizes at most: coarse meshes make their errors out too large
@@ -52,7 +60,7 @@ def refined(
 ) -> Refined:
     """The coarsest mesh of a ladder that is right to a tolerance, or how right h is.
 
-    A mesh that is not good enough at the end of the ladder comes back with its error.
+    If the end of the ladder is not, it comes back with its error.
 
     Raises
     ------
@@ -68,8 +76,6 @@ def refined(
         return prepared, counted(prepared, scene, answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
-    if scene.body.kind in hands.KINDS:
-        h = h or default_size(scene.body)  # each mesh takes a minute: two tell how good the last is
     sizes = ladder(body)
     before = compared_with(body, h) if h else sizes[0]
     size = h or _finer(sizes, before)[0]
@@ -80,7 +86,7 @@ def refined(
             error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
         else:
             error = error_left(other, found, coarser_by(body, before, size))
-        if h or error <= tolerance or size == sizes[-1]:
+        if h or not error > tolerance or size == sizes[-1]:  # no number if a file has one mesh
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
         before, coarse, other = size, prepared, found
@@ -91,6 +97,9 @@ def refined(
 def ladder(body: Body) -> Floats:
     """Sizes (k,) in metre that a body may be meshed with, falling."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
+    if body.kind in hands.KINDS:  # whose coarser meshes cut the rim off, and layers
+        coarsest = min(FIRST_HAND * default_size(body), COMPARED * coarsest_size(body))
+        finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
         return np.geomspace(coarsest, finest, 64)
     found, layers = [body.depth], 1
