@@ -679,7 +679,7 @@ def test_each_step_has_its_number_and_the_time_that_is_left():
         "mesh (step 1 of 4)", "assemble (step 2 of 4)", "factorise (step 3 of 4)",
     ]  # fmt: skip
     assert [step.done for step in said] == sorted(step.done for step in said)
-    assert said[0].left is None
+    assert [step.left for step in said[:3]] == [None] * 3, "nothing is known yet"
     # 12 s for all but half of the last step: as long as what is left of it takes in proportion.
     share = PREPARING["reduce"] / 2
     assert said[4].left == pytest.approx(12 * share / (1 - share))
@@ -687,9 +687,9 @@ def test_each_step_has_its_number_and_the_time_that_is_left():
     assert follow("reduce", 0.1).left is None, "another mesh, from here"
     # One that begins later is not taken for quick because of what it has not done.
     assert follow("skin-slab: factorise", 0.0).left is None
-    later = follow("skin-slab: reduce", 0.0)
+    later = follow("skin-slab: reduce", 0.5)
     assert later.name == "skin-slab: reduce (step 4 of 4)"
-    assert later.left == pytest.approx(3 * PREPARING["reduce"] / PREPARING["factorise"])
+    assert later.left == pytest.approx(3 * share / (PREPARING["factorise"] + share))
     assert follow("write tables", 0.0) == Step(phase="write tables")
 
 

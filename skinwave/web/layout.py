@@ -63,7 +63,7 @@ def lay_out(session: Session) -> None:
                 panels.warnings()
                 panels.differences()
             _maps(session)
-            _plots(session)
+            _plots()
 
 
 def _bar(session: Session) -> None:
@@ -138,6 +138,8 @@ def _maps(session: Session) -> None:
                     raw_attrs=[':aria-pressed="String(solid)"'],
                 )  # fmt: skip
             panels.area("wave_map", "wave-map", "waves in the body", "!solid")
+            with html.Div(classes="sw-over", raw_attrs=['role="status"', 'aria-live="polite"']):
+                panels.computing(session)
             with html.Div(v_if="!solid"):
                 panels.colour_bar("wave_map.ends", drawings.SEQUENTIAL)
             panels.body()
@@ -158,7 +160,7 @@ def _maps(session: Session) -> None:
             panels.line_table()
 
 
-def _plots(session: Session) -> None:
+def _plots() -> None:
     with html.Div(classes=("['sw-plots', `sw-of-${body}`]",)):
         for name, said in PLOTS.items():
             with html.Div():
@@ -168,7 +170,7 @@ def _plots(session: Session) -> None:
                 ])  # fmt: skip
         with html.Div(style="position: fixed; right: 10px; top: 54px; width: 340px; z-index: 5",
                       raw_attrs=['role="status"', 'aria-live="polite"']):  # fmt: skip
-            panels.notices(session)
+            panels.notices()
 
 
 def _looks() -> None:

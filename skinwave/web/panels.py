@@ -188,10 +188,14 @@ def line_table() -> None:
     html.P("{{ untold }}", v_if="untold", id="untold", style="font-size: 0.86rem")
 
 
-def notices(session: Session) -> None:
-    """What cannot be, and what is being computed."""
+def notices() -> None:
+    """What cannot be."""
     v3.VAlert("{{ problem }}", v_if="problem", type="error", density="compact", id="problem")
-    with v3.VAlert(v_if="busy", type="info", density="compact", id="busy"):
+
+
+def computing(session: Session) -> None:
+    """What is being computed, over where it is to be seen."""
+    with html.Div(v_if="busy", id="busy", classes="sw-busy"):
         html.Div("{{ body }}: {{ busy }}{{ left ? ', ' + left : '' }}", id="busy-said")
         v3.VProgressLinear(model_value=("done",), indeterminate=("!done",), height=6)
         v3.VBtn("Cancel", click=partial(cancel, session), size="small", variant="text", id="cancel")

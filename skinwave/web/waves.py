@@ -61,7 +61,7 @@ BAND = 1000.0  # Hz
 # Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
 # As in `skinwave.steps`; a body that is kept begins with the third.
-STEPS = {"mesh": 0.15, "assemble": 0.1, "factorise": 0.2, "reduce": 0.5, "read the surface": 0.05}
+STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.15, "reduce": 0.7, "read the surface": 0.05}
 KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
 
