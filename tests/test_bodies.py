@@ -270,7 +270,7 @@ def test_a_mesh_without_a_bottom_of_its_own_rests_on_what_looks_downwards(dome, 
         made = build(hand_in(tmp_path / "body.vtu"), 0.005)
         assert "bottom" not in made.mesh.facets
         downwards = -fem.facet_normals(made.mesh, made.support.facets)[:, 2]
-        assert ((made.support.stiffness > 0) == (downwards > 0.5)).all()
+        assert ((made.support.stiffness > 0) == (downwards > 0.2)).all()
         assert not made.support.absorbed.any()
         assert (downwards > 0.9).sum() > 100
 
@@ -362,7 +362,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
         edge_radius=0.001,
     )  # fmt: skip
-    palm = simulate(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0028)
+    palm = simulate(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0035)
 
     def with_ends(body, h, symmetry):
         made = build(body, h, symmetry)
