@@ -15,7 +15,13 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import Build, operators, surface_load, vacuum_only
+from skinwave.models.bodies import (
+    Build,
+    operators,
+    surface_load,
+    surface_motion,
+    vacuum_only,
+)
 from skinwave.models.bodies import build as build_body
 from skinwave.scene import Body, Scene
 
@@ -79,7 +85,7 @@ def transient_answer(
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
-    S = fem.probe_operator(build.mesh, scene.probe_points)
+    S = surface_motion(scene.body, build, scene.probe_points)
     report("factorise", 0.0)
 
     @lru_cache(maxsize=4)
@@ -161,7 +167,7 @@ def harmonic_answer(
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
-    S = fem.probe_operator(build.mesh, scene.probe_points)
+    S = surface_motion(scene.body, build, scene.probe_points)
     with clock("lines"):
         lines, knots = load_lines(scene.pressure, threshold), path_knots(scene.pressure)
         count = len(np.unique(np.round(lines.frequencies, 9)))
