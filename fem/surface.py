@@ -75,11 +75,14 @@ def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
 
 
 def probe_operator(
-    mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top"
+    mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> sparse.csr_array:
     """S (p, 3 n): displacement into the body, in metre, at surface points (p, 2 or 3).
 
-    A point is carried along z onto the facets; positive is the way a pressure pushes.
+    A point is carried along z onto the facets; positive is the way a pressure pushes, against the
+    normal of the facet; or, with a `patch` in metre, against the mean normal of the surface,
+    weighted by a Gaussian of that standard deviation about the point. Next to a crease the facet
+    itself depends on the mesh.
 
     Raises
     ------
@@ -101,14 +104,27 @@ def probe_operator(
         )
     if mesh.order == 2:
         barycentric = _on_curved(mesh.points[nodes[owner], :2], barycentric, points)
-    normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     N = shape_functions(barycentric, nodes.shape[1])
+    if patch:
+        places = np.einsum("pa,pai->pi", N, mesh.points[nodes[owner]])
+        normals = _mean_normals(mesh, nodes, places, patch)
+    else:
+        normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     values = -np.einsum("pa,pi->pai", N, normals)
     columns = 3 * nodes[owner][:, :, None] + np.arange(3)
     rows = np.broadcast_to(np.arange(len(points))[:, None, None], columns.shape)
     shape = (len(points), mesh.n_dofs)
     return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
+    """Normals (p, 3) of facets (k, a) about places (p, 3), weighted by area and distance."""
+    at = facet_points(mesh, nodes)
+    squared = ((places[:, None] - at) ** 2).sum(axis=2)
+    nearest = squared.min(axis=1, keepdims=True)  # of facets larger than the patch one is left
+    weights = np.exp((nearest - squared) / (2 * patch**2))
+    return np.asarray(weights @ facet_geometry(mesh, nodes)[1].reshape(-1, 3))
 
 
 def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Floats, Floats]:

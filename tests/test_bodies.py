@@ -196,6 +196,23 @@ def test_a_probe_lands_on_a_curved_surface_where_it_was_asked_for():
         np.testing.assert_allclose(S @ field.ravel() / upwards, places[:, axis], atol=1e-12)
 
 
+def test_a_probe_beside_a_crease_reads_along_the_mean_normal():
+    flat = meshes.block((0.04, 0.04, 0.01), 0.005)
+    bent = flat.points + np.outer(-0.3 * np.abs(flat.points[:, 0]), [0, 0, 1])
+    sideways = np.tile([1.0, 0.0, 0.0], len(bent))
+    beside = [[-1e-5, 0.001], [1e-5, 0.001], [0.015, 0.001]]
+    roof = replace(flat, points=bent)
+    own, mean = (fem.probe_operator(roof, beside, patch=s) @ sideways for s in (0.0, 3e-3))
+    slope = np.sin(np.arctan(0.3))
+    np.testing.assert_allclose(own, [slope, -slope, -slope], rtol=1e-9)
+    np.testing.assert_allclose(mean[:2], 0, atol=0.02 * slope)
+    assert mean[2] == pytest.approx(-slope, rel=1e-3)
+    for mesh in (flat, roof):
+        level = [[0.012, 0.004]]  # a plane's own normal, however small the patch
+        same = fem.probe_operator(mesh, level, patch=1e-5) - fem.probe_operator(mesh, level)
+        assert abs(same).max() < 1e-12
+
+
 CLAMPED = Body(width=0.06, height=0.06, sides="clamped")
 
 
@@ -271,7 +288,7 @@ def test_a_mesh_without_a_bottom_of_its_own_rests_on_what_looks_downwards(dome, 
         made = build(hand_in(tmp_path / "body.vtu"), 0.005)
         assert "bottom" not in made.mesh.facets
         downwards = -fem.facet_normals(made.mesh, made.support.facets)[:, 2]
-        assert ((made.support.stiffness > 0) == (downwards > 0.5)).all()
+        assert ((made.support.stiffness > 0) == (downwards > 0.2)).all()
         assert not made.support.absorbed.any()
         assert (downwards > 0.9).sum() > 100
 
@@ -363,7 +380,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
         edge_radius=0.001,
     )  # fmt: skip
-    palm = compute(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0028)
+    palm = compute(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0035)
 
     def with_ends(body, h, symmetry):
         made = build(body, h, symmetry)

@@ -11,7 +11,7 @@ from fem.air import Added, added_mass
 from fem.assembly import LOSS_BAND, Operators, assemble
 from fem.boundary import Support
 from fem.materials import Material, rayleigh_damping
-from fem.surface import facet_normals, facet_points, load_operator
+from fem.surface import facet_normals, facet_points, load_operator, probe_operator
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
 from meshes.intake import FINE_RADIUS
 from meshes.structured import check_size, round_up, with_planes
@@ -35,6 +35,7 @@ LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet w
 HAND_CELL = 5e-3  # m: 1 to 2 % from cells of 3 mm at every probe, at a fifth of the cost
 FINE_PALM = 2e-3  # m: cells of a palm with thin layers, of 300,000 unknowns; more must be asked for
 FINEST_HAND = 1e-3  # m: finer cells of a hand are more than its mesher is let make
+NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the spot's
 THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it can tell
 COMPARED = (
     4 / 3
@@ -180,6 +181,16 @@ def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
     """
     cosine = np.maximum(facet_normals(build.mesh)[:, 2], 0.0)
     return load_operator(build.mesh) * cosine**2, facet_points(build.mesh)
+
+
+def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:
+    """S (p, 3 n): displacement into a meshed body, in metre, at probes (p, 2) in metre.
+
+    The surface in a file is made of flat triangles, at whose edges its own normals jump: there the
+    mean normal about a probe says what into the body is.
+    """
+    patch = NORMAL_PATCH if body.kind == "mesh" else 0.0
+    return probe_operator(build.mesh, probes, patch=patch)
 
 
 def check_mesh(body: Body, h: float) -> None:

@@ -18,7 +18,14 @@ from simple_model import Effort, Response
 from simple_model.sampling import resolving_step, shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import Build, default_size, operators, surface_load, vacuum_only
+from skinwave.models.bodies import (
+    Build,
+    default_size,
+    operators,
+    surface_load,
+    surface_motion,
+    vacuum_only,
+)
 from skinwave.models.bodies import build as build_body
 from skinwave.scene import Body, Scene
 
@@ -82,7 +89,7 @@ def transient_answer(
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
-    S = fem.probe_operator(build.mesh, scene.probe_points)
+    S = surface_motion(scene.body, build, scene.probe_points)
     report("factorise", 0.0)
 
     @lru_cache(maxsize=4)
@@ -165,7 +172,7 @@ def harmonic_answer(
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
-    S = fem.probe_operator(build.mesh, scene.probe_points)
+    S = surface_motion(scene.body, build, scene.probe_points)
     with clock("lines"):
         lines, knots = load_lines(scene.pressure, threshold), path_knots(scene.pressure)
         count = len(np.unique(np.round(lines.frequencies, 9)))

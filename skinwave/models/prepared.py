@@ -13,7 +13,7 @@ from simple_model.focus import spot_reach, spot_width
 from simple_model.sampling import shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.models.bodies import Build, air, default_size, surface_load
+from skinwave.models.bodies import Build, air, default_size, surface_load, surface_motion
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.scene import Body, Scene
 
@@ -142,13 +142,13 @@ def _prepared_anew(
     tolerance: float,
     name: str,
 ) -> Prepared:
-    mesh, operators = build.mesh, assembled(build, clock, report)
+    operators = assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         P, points = surface_load(build)
         model = fem.reduce(
             operators,
-            fem.probe_operator(mesh, _mirrored(probes, build.symmetry)),
+            surface_motion(body, build, _mirrored(probes, build.symmetry)),
             BAND,
             tolerance,
             loads=P @ typical_spots(body, points),
@@ -170,7 +170,7 @@ def _prepared_anew(
         reduced_dofs=len(model.K),
         peak_memory=peak_memory(),
         h=h,
-        mesh=cache.digest(mesh.points, mesh.tets),
+        mesh=cache.digest(build.mesh.points, build.mesh.tets),
         solver=model.solver,
         estimate=model.estimate,
         versions=versions(),
