@@ -7,12 +7,17 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+import skinwave
 from skinwave.commands import COMMANDS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
-    options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if list(arguments)[:1] == ["--version"]:  # looked up here, because help need not wait for it
+        print(f"skinwave {skinwave.__version__}")
+        return 0
+    options = _parser().parse_args(_joined(arguments))
     try:
         return int(options.command(options))
     except KeyboardInterrupt:
@@ -41,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="skinwave", description="Waves in skin and paper under mid-air ultrasound haptics."
     )
+    parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, help=(module.__doc__ or "").rstrip("."))
