@@ -3,6 +3,9 @@
 import difflib
 from collections.abc import Iterable
 
+NEAR = 0.6  # of difflib's ratio: 2 x letters in common over all letters
+SHORTEST, LONGEST = 3, 60  # letters: of a part of a word that is near, and that are compared
+
 
 def choose(what: str, value: str, known: Iterable[str]) -> str:
     """The value, if it is known.
@@ -10,11 +13,20 @@ def choose(what: str, value: str, known: Iterable[str]) -> str:
     Raises
     ------
     ValueError
-        With all known words and the nearest of them.
+        With all known words, and the nearest of them if it is near.
     """
     known = list(known)
     if value in known:
         return value
-    near = difflib.get_close_matches(str(value), known, 1, 0.0)
-    hint = f"; did you mean '{near[0]}'?" if near else ""
-    raise ValueError(f"{what} '{value}' is unknown, use one of {', '.join(known)}{hint}")
+    raise ValueError(
+        f"{what} '{value}' is unknown, use one of {', '.join(known)}{meant(value, known)}"
+    )
+
+
+def meant(value: object, known: Iterable[str]) -> str:
+    """The end of a sentence that suggests the nearest word, or nothing if none is near."""
+    words, said = {word.lower(): word for word in known}, str(value)[:LONGEST].lower()
+    near = difflib.get_close_matches(said, words, 1, NEAR)
+    if not near and len(said) >= SHORTEST:
+        near = [word for word in words if said in word]
+    return f"; did you mean '{words[near[0]]}'?" if near else ""

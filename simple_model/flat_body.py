@@ -29,9 +29,9 @@ from scipy.special import jv
 
 from simple_model.compliance import Complex, Compliance
 from simple_model.focus import spot_width
-from simple_model.pressure import MovingPressure
+from simple_model.pressure import MovingPressure, check_lines
 from simple_model.response import Effort, Response, step
-from simple_model.sampling import finer, highest, highest_passing, shown, transform
+from simple_model.sampling import finer, highest, reached, shown, transform
 from simple_model.steady import (
     along_path,
     foci_harmonics,
@@ -105,7 +105,7 @@ def steady_lines(
     Raises
     ------
     ValueError
-        If the focus is not Gaussian, or its path recorded.
+        If the focus is not Gaussian, or its path recorded, or as `pressure.check_lines` does.
     """
     _check(pressure)
     if pressure.tacton.trajectory.shape == "recorded":
@@ -158,7 +158,7 @@ def flat_body(
     Raises
     ------
     ValueError
-        If the focus is not Gaussian.
+        If the focus is not Gaussian, or as `pressure.check_lines` does.
     """
     _check(pressure)
     started = time.perf_counter()
@@ -245,7 +245,7 @@ def _recorded(
     table = _table(furthest, width)
     g = point_response(compliance, table, w, width, negligible=NEGLIGIBLE)
     carriers = _spline(table, np.eye(len(table)))
-    parts = finer(highest(pressure, highest_passing(pressure)), dt)
+    parts = finer(reached(pressure), dt)
 
     def load(late: float, probe: Floats) -> Floats:
         t, gain = _gain(pressure, window, dt, late, parts)
@@ -270,6 +270,7 @@ def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpli
 
 
 def _check(pressure: MovingPressure) -> None:
+    check_lines(pressure)
     if pressure.focus != "gaussian":
         raise ValueError(f"focus '{pressure.focus}' has no flat-body answer; use 'gaussian'")
 

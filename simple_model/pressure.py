@@ -117,3 +117,32 @@ class MovingPressure:
         if points.shape[1] == 3 and points[:, 2].any():
             spot *= along_axis(points[:, 2], self.height)
         return spot
+
+
+EVALUATED = ("__call__", "weight", "gain", "driven", "spot")
+
+
+def check_lines(pressure: MovingPressure) -> None:
+    """Refuse a load that a model of its lines would not honour, which takes the formulas of
+    `MovingPressure` apart and never calls it.
+
+    Raises
+    ------
+    ValueError
+        If it is a subclass with formulas of its own, or no `MovingPressure` at all.
+    """
+    kind = type(pressure)
+    own = [
+        name for name in EVALUATED if getattr(kind, name, None) is not getattr(MovingPressure, name)
+    ]
+    if not isinstance(pressure, MovingPressure):
+        found = "is no MovingPressure"
+    elif own:
+        found = f"has its own {', '.join(own)}"
+    else:
+        return
+    raise ValueError(
+        f"the load {kind.__name__} {found}, which models of a load's lines (flat-body, "
+        "flat-body-harmonic, fem, fem-harmonic, fem-nonlinear) and plans do not evaluate; use "
+        "point-kernel, or fem-transient with an element size h, which evaluate it point by point"
+    )

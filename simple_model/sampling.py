@@ -45,6 +45,12 @@ def highest_passing(pressure: MovingPressure) -> float:
     return PASSED * _speed(pressure.tacton) / spot_width(pressure.height)
 
 
+def reached(pressure: MovingPressure) -> float:
+    """Hz of the highest line of a load, wherever it is felt; 0 for unknown of a foreign one."""
+    known = isinstance(pressure, MovingPressure)
+    return highest(pressure, highest_passing(pressure)) if known else 0.0
+
+
 def finer(highest: float, dt: float) -> int:
     """How many times within dt in s a load up to `highest` Hz is sampled: once if none folds."""
     return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
@@ -67,7 +73,7 @@ def fold_parts(pressure: MovingPressure, times: Floats) -> int:
     """
     if len(times) <= 2 * REACH:
         return 1
-    return finer(highest(pressure, highest_passing(pressure)), step(times))
+    return finer(reached(pressure), step(times))
 
 
 def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
@@ -87,8 +93,8 @@ def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> F
 
 def resolving_step(pressure: MovingPressure, longest: float) -> float:
     """A time step in s, at most `longest`, at which nothing of a load folds."""
-    reached = highest(pressure, highest_passing(pressure))
-    return longest if reached < 0.5 / longest else 0.5 / reached
+    hz = reached(pressure)
+    return longest if hz < 0.5 / longest else 0.5 / hz
 
 
 def transform(

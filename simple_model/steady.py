@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from simple_model.focus import spot_width
-from simple_model.pressure import MovingPressure
+from simple_model.pressure import MovingPressure, check_lines
 from simple_model.tacton import Tacton, modulation_at_phases, tones
 from simple_model.trajectory import Floats
 
@@ -61,7 +61,13 @@ class LoadLines:
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
     """The lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
     that is silent, the mean alone.
+
+    Raises
+    ------
+    ValueError
+        As `pressure.check_lines` does.
     """
+    check_lines(pressure)
     n, of_spot = path_strengths(pressure, threshold)
     f, c = (_sampled_lines if pressure.tacton.is_sampled else _sinusoid_lines)(pressure, n)
     order = np.repeat(n, f.shape[1])

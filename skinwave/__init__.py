@@ -24,13 +24,31 @@ _HOMES = {
     "field": "fields",
     "Agreement": "comparison",
     "compare": "comparison",
+    "plan": "planning.plan",
 }
 __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name == "__version__":
+        value = _version()
+    elif name in _HOMES:
+        value = getattr(import_module(f"skinwave.{_HOMES[name]}"), name)
+    else:
         raise AttributeError(f"module 'skinwave' has no attribute '{name}'")
-    value = getattr(import_module(f"skinwave.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
+def _version() -> str:
+    """What is installed; "unknown" of sources that were never installed."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("skinwave")
+    except PackageNotFoundError:
+        return "unknown"

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+import skinwave
 from skinwave.commands import COMMANDS
 
 CACHE = "SKINWAVE_CACHE"
@@ -25,6 +26,9 @@ UNCACHED = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
+    if typed[:1] == ["--version"]:  # looked up here, because help need not wait for it
+        print(f"skinwave {skinwave.__version__}")
+        return 0
     options = parser().parse_args(_joined(typed))
     options.typed = typed
     try:
@@ -75,6 +79,7 @@ def parser() -> argparse.ArgumentParser:
         description="Waves in skin and paper under mid-air ultrasound haptics.",
         epilog=f"{CACHE}: folder where meshes and reduced bodies are cached; empty for none.",
     )
+    parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, help=(module.__doc__ or "").rstrip("."))

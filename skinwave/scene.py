@@ -111,6 +111,7 @@ class Placement:
         return points @ self.rotation.T + [*self.offset, self.lift]
 
 
+LARGEST = 2.0  # m: a body of more was meant in mm
 STEEPEST, FURTHEST_LIFT = np.pi / 3, 0.05
 FLAT = Placement()
 
@@ -124,8 +125,8 @@ class Body:
     kind : "none" (the point kernel needs no body), "sheet" (thin, bends), "slab" (thick), "palm"
         (soft tissue on bone, `depth` below the middle of the palm) or "mesh" (from a file)
     material : the name of a preset, or a Material
-    width, height, depth : float, metre, along x, y and downwards; a slab's depth may be inf,
-        a half-space, which only flat-body answers
+    width, height, depth : float, metre, along x, y and downwards, at most 2; a slab's depth may
+        be inf, a half-space, which only flat-body answers
     base, sides : "clamped", "absorbing" or "free"; of a hand the part that looks downwards, and
         the ends at the wrist and the fingers or the cuts of a file
     layers : from the surface downwards; what is below them is of `material`
@@ -164,6 +165,12 @@ class Body:
             length, endless = getattr(self, name), name == "depth" and self.kind == "slab"
             if not (length > 0 and (isfinite(length) or (endless and length == inf))):
                 raise ValueError(f"body {name} = {1e3 * length} mm must be finite and above 0")
+            if isfinite(length) and length > LARGEST:
+                raise ValueError(
+                    f"body {name} = {length:g} m is more than {LARGEST:g} m, the limit of a body; "
+                    f"lengths are in metre here and in mm in a scene file, so that "
+                    f"{length:g} mm are {name} = {length / 1e3:g}, or {name}_mm = {length:g}"
+                )
         if self.kind != "none" and self.base == self.sides == "free":
             raise ValueError("a body with free base and free sides flies away; clamp one of them")
 

@@ -1,6 +1,5 @@
 """The keys of a scene file: each with its unit, what it may hold, and the attribute behind it."""
 
-import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from math import inf, isfinite, nextafter, pi
@@ -8,6 +7,7 @@ from typing import Any
 
 from fem.materials import Material
 from simple_model import Rhythm, Signal
+from simple_model.choices import meant
 from simple_model.trajectory import Points
 from skinwave.scene import Layer, Relief
 
@@ -271,14 +271,12 @@ ONLY_OF = {"relief": "palm", "file": "mesh", "unit": "mesh", "up": "mesh", "air"
 
 
 def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by attribute name, each read by its field; the nearest valid key for a wrong one."""
+    """Values by attribute name, each read by its field; an error names keys for a wrong one."""
     values = {}
     for key, value in table.items():
         if key not in keys:
-            near = difflib.get_close_matches(key, keys, 1, 0.0)
-            raise ValueError(
-                f"{where} has the unknown key {_shown(key)}; did you mean '{near[0]}'?"
-            )
+            hint = meant(key, keys) or f"; it may have {', '.join(keys)}"
+            raise ValueError(f"{where} has the unknown key {_shown(key)}{hint}")
         field = keys[key]
         if isinstance(field, Field):
             values[field.name] = field.read(key, value)

@@ -137,10 +137,10 @@ WHOLE_FILES = {
 ABSURD = {
     "elements of a hundredth of a millimetre": ("", "width_mm = 1000", "--h", "0.01"),
     "elements of an atom": ("", "depth_mm = 6", "--h", "1e-7"),
-    "a sheet of a kilometre, a tenth of a millimetre wide": (
-        "kind = 'sheet'\n", "width_mm = 1e6\nheight_mm = 10.1", "--h", "5",
+    "a strip of two metres": (
+        "kind = 'sheet'\n", "width_mm = 2e3\nheight_mm = 10.1", "--h", "0.1",
     ),
-    "a floating kilometre": ("base = 'free'\n", "width_mm = 1e6", "--h", "5"),
+    "a floating strip of two metres": ("base = 'free'\n", "width_mm = 2e3", "--h", "0.2"),
 }  # fmt: skip
 
 

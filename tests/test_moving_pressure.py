@@ -5,6 +5,7 @@ import pytest
 
 import fem
 import meshes
+import skinwave
 from simple_model import (
     MovingPressure,
     Tacton,
@@ -132,3 +133,68 @@ def test_total_force_survives_the_quadrature_of_a_mesh(focus):
         exact = load(grid, t).sum() * 1e-8
         assert -force[2] == pytest.approx(exact, rel=0.01)
         np.testing.assert_allclose(force[:2], 0, atol=1e-12 * exact)
+
+
+class Louder(MovingPressure):
+    def __call__(self, points, t, over=0.0):
+        return 2 * super().__call__(points, t, over)
+
+
+class Wider(MovingPressure):
+    def spot(self, points, centre):
+        return np.sqrt(super().spot(points, centre))
+
+
+class Fading(MovingPressure):
+    def gain(self, t, over=0.0):
+        return np.exp(-np.asarray(t)) * super().gain(t, over)
+
+
+class Renamed(MovingPressure):
+    """Changes nothing."""
+
+
+class Foreign:
+    """Pushes alike everywhere."""
+
+    tacton = Tacton(am_frequency=140, duration=0.01)
+    focus, height = "gaussian", 0.2
+
+    def __call__(self, points, t, over=0.0):
+        t = np.asarray(t)
+        return np.sin(880 * t)[..., None] * np.ones(len(points))
+
+
+SHORT = Tacton(am_frequency=140, duration=0.01)
+SKIN = skinwave.Body(width=0.04, height=0.04, depth=0.01)
+OF_LINES = ["auto", "flat-body", "flat-body-harmonic", "fem", "fem-harmonic"]
+
+
+@pytest.mark.parametrize("model", OF_LINES)
+@pytest.mark.parametrize("load", [Louder, Wider, Fading, Foreign])
+def test_models_of_lines_refuse_a_load_with_formulas_of_its_own(load, model):
+    pressure = load() if load is Foreign else load(tacton=SHORT)
+    scene = skinwave.Scene(pressure=pressure, body=SKIN)
+    said = f"the load {load.__name__} .* use point-kernel, or fem-transient"
+    for h in (None, 0.01) if model == "fem" else (None,):
+        with pytest.raises(ValueError, match=said):
+            skinwave.simulate(scene, model, h=h)
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "fem-transient"])
+def test_models_that_evaluate_the_load_honour_its_own_formulas(model):
+    plain, louder = (
+        skinwave.simulate(skinwave.Scene(pressure=load(tacton=SHORT), body=SKIN), model, h=0.01)
+        for load in (MovingPressure, Louder)
+    )
+    np.testing.assert_allclose(louder.displacement, 2 * plain.displacement, rtol=1e-9, atol=1e-15)
+    foreign = skinwave.simulate(skinwave.Scene(pressure=Foreign(), body=SKIN), model, h=0.01)
+    assert np.abs(foreign.displacement).max() > 0
+
+
+def test_a_subclass_that_changes_no_formula_is_answered():
+    plain, renamed = (
+        skinwave.simulate(skinwave.Scene(pressure=load(tacton=SHORT), body=SKIN), "flat-body")
+        for load in (MovingPressure, Renamed)
+    )
+    np.testing.assert_array_equal(renamed.displacement, plain.displacement)

@@ -294,7 +294,7 @@ WRONG = [
     (lambda: Tacton(foci=()), "0 foci are outside 1..8"),
     (lambda: Tacton(foci=(0.0,) * 9), "9 foci are outside 1..8"),
     (lambda: Tacton(foci=(0.0, 1.5)), "focus phase 1.5"),
-    (lambda: Tacton(sharing="in turn"), "did you mean"),
+    (lambda: Tacton(sharing="in turn"), "use one of simultaneous, time_multiplexed"),
     (lambda: Tacton(trajectory=wandering(), rhythm=PULSES), "levels of its own; put"),
     (lambda: Trajectory(shape="polyline", points=((0, 0),)), "two points or more"),
     (lambda: Trajectory(shape="polyline", points=((0, 0), (0.2, 0))), "within 100 mm"),

@@ -90,6 +90,40 @@ def test_functions_are_looked_up_even_after_their_modules():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_public_names_are_listed_and_found():
+    code = (
+        "import skinwave\n"
+        "names = dir(skinwave)\n"
+        "assert {*skinwave.__all__, '__version__'} <= set(names)\n"
+        "import skinwave.planning.plan\n"
+        "assert callable(skinwave.plan) and 'plan' in names\n"
+        "assert 'scene' in skinwave.plan.__annotations__"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_version_is_what_is_installed(capsys):
+    from importlib.metadata import version
+
+    import skinwave
+    from skinwave.cli import main
+
+    assert skinwave.__version__ == version("skinwave")
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"skinwave {version('skinwave')}\n"
+
+
+def test_sources_that_are_not_installed_have_a_version_too():
+    code = (
+        "import importlib.metadata as m\n"
+        "def none(name): raise m.PackageNotFoundError(name)\n"
+        "m.version = none\n"
+        "import skinwave\n"
+        "assert skinwave.__version__ == 'unknown'"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_dependencies_have_lower_bounds_only():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = [d for group in project["optional-dependencies"].values() for d in group]

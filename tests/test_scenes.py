@@ -1,13 +1,14 @@
 """Scene files: what they default to, what they refuse, and that they come back as written."""
 
 import re
+from math import inf
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fem import Material
-from skinwave import BODIES, dumps, loads, read
+from skinwave import BODIES, Body, dumps, loads, read
 from skinwave.studies.paper15 import scenes, tactons
 
 ROOT = Path(__file__).parent.parent
@@ -96,6 +97,8 @@ WRONG = {
     "[body]\nmaterial = 'palms'": "did you mean 'palm'",
     "[body]\nbase = 'free'\nsides = 'free'": "flies away",
     "[body]\ndepth_mm = -1": "must be finite and above 0",
+    "[body]\ndepth_mm = 15000": "body depth = 15 m is more than 2 m, the limit",
+    "[body]\nwidth_mm = 1e5": "body width = 100 m is more than 2 m, the limit",
     "[body.material]\ndensity_kg_m3 = 1000": "lacks shear_modulus_pa and poisson",
     "[tacton\n": "not valid TOML",
 }
@@ -107,3 +110,32 @@ def test_wrong_scenes_are_refused_in_one_sentence(text):
         loads(text)
     assert WRONG[text] in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["width", "height", "depth"])
+def test_a_length_in_millimetre_where_metres_are_meant_is_refused(name):
+    said = rf"body {name} = 15 m .*lengths are in metre here.*15 mm are {name} = 0.015"
+    with pytest.raises(ValueError, match=said):
+        Body(**{name: 15})
+    assert getattr(Body(**{name: 2.0}), name) == 2
+    assert Body(depth=inf).depth == inf
+
+
+NONSENSE = {
+    "[tacton]\nshape = 'xyzzy'": "shape 'xyzzy' is unknown, use one of point, line,",
+    "[body]\nmaterial = 'q'": "material 'q' is unknown, use one of",
+    "[tacton]\nwwwwww = 1": "[tacton] has the unknown key 'wwwwww'; it may have amplitude_percent,",
+    "[zzz]\nsize_mm = 1": "has the unknown key 'zzz'; it may have",
+}
+
+
+@pytest.mark.parametrize("text", NONSENSE)
+def test_nothing_is_suggested_for_nonsense(text):
+    with pytest.raises(ValueError, match=re.escape(NONSENSE[text])) as error:
+        loads(text)
+    assert "did you mean" not in str(error.value)
+
+
+def test_a_word_in_capitals_is_near():
+    with pytest.raises(ValueError, match="did you mean 'palm'"):
+        loads("[body]\nmaterial = 'PALM'")

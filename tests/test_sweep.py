@@ -156,6 +156,7 @@ def test_each_row_says_how_wrong_its_mesh_is(scene):
 def test_wrong_keys_and_values_are_one_sentence(scene, capsys):
     ask = lambda *texts: refused(capsys, "sweep", scene, "--vary", *texts)  # noqa: E731
     assert "did you mean 'tacton.speed_m_per_s'" in ask("tacton.speed_m_s=1,2")
+    assert "zzzz' is no key of a scene; a key is of the form tacton.size_mm" in ask("zzzz=1")
     assert "lacks values" in ask("tacton.size_mm=")
     assert "did you mean 'square'" in ask("tacton.shape=circle,sqare")
     assert "must be a number" in ask("tacton.size_mm=wide,10")

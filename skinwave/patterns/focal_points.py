@@ -6,7 +6,6 @@ path, on which each focus runs one part ahead of the one before.
 """
 
 import csv
-import difflib
 import io
 from collections.abc import Iterator
 from math import isfinite
@@ -15,6 +14,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory, evenly
+from simple_model.choices import meant
 from simple_model.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
 from skinwave.scene import Scene
@@ -157,8 +157,8 @@ def _tidy(rows: list[tuple[int, list[str]]]) -> np.ndarray:
     header = rows[0][1]
     for name in header:
         if name not in COLUMNS:
-            near = difflib.get_close_matches(name, COLUMNS, 1, 0.0)[0]
-            raise ValueError(f"column '{name[:40]}' is unknown; did you mean '{near}'?")
+            hint = meant(name, COLUMNS) or f"; columns are {','.join(COLUMNS)}"
+            raise ValueError(f"column '{name[:40]}' is unknown{hint}")
     if len(set(header)) < len(header):
         raise ValueError(f"a column is there twice in {','.join(header)}; leave one out")
     if missing := [name for name in NEEDED if name not in header]:

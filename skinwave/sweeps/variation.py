@@ -1,6 +1,5 @@
 """What a sweep varies: keys of a scene file, their values, and which of them meet."""
 
-import difflib
 import hashlib
 import itertools
 import json
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from simple_model.choices import choose
+from simple_model.choices import choose, meant
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import dumps, loads, read
 from skinwave.scene_keys import MATERIAL, SECTIONS
@@ -172,8 +171,8 @@ def _known(key: str) -> str:
     """
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     if key != BODY and ".".join(key.split(".")[:2]) not in known:
-        near = difflib.get_close_matches(key, known, 1, 0.0)
-        raise ValueError(f"'{key}' is no key of a scene; did you mean '{near[0]}'?")
+        hint = meant(key, known) or "; a key is of the form tacton.size_mm"
+        raise ValueError(f"'{key}' is no key of a scene{hint}")
     return key
 
 
