@@ -19,7 +19,6 @@ _HOMES = {
     "simulate": "simulation",
     "SkinwaveWarning": "effort",
     "Plan": "planning.plan",
-    "plan": "planning.plan",
     "Field": "fields",
     "field": "fields",
     "Agreement": "comparison",

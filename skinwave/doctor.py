@@ -8,10 +8,9 @@ from importlib.util import find_spec
 
 import fem
 from meshes import cache
-from skinwave.effort import versions
+from skinwave.effort import THREADS, versions
 from skinwave.pictures.renderer import renderer
 
-THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 DRAWING = ("matplotlib", "pyvista", "vtk", "pillow")
 # module, distribution, what is missing without it
 OPTIONAL = (

@@ -1,5 +1,6 @@
 """What an answer cost: seconds by phase, memory, versions."""
 
+import os
 import platform
 import sys
 import time
@@ -14,6 +15,7 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 T = TypeVar("T")
 SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 Progress = Callable[[str, float], None]  # phase and fraction of it done
 
 
@@ -63,6 +65,17 @@ def _versions() -> tuple[tuple[str, str], ...]:
         with suppress(PackageNotFoundError):
             found[name] = version(name)
     return (*found.items(), ("os", platform.platform()))
+
+
+def threads() -> dict[str, str]:
+    """How many threads linear algebra takes, by the environment variables that say so.
+
+    Sums in another order round otherwise, which a reduction of a body with little loss amplifies to
+    a part of its tolerance: 1e-5 of a sheet's motion. As many threads give the same digits again.
+    """
+    counted = getattr(os, "sched_getaffinity", None)
+    usable = os.environ.get(THREADS[0]) or str(len(counted(0)) if counted else os.cpu_count() or 1)
+    return {name: os.environ.get(name) or usable for name in THREADS}
 
 
 def silent(phase: str, fraction: float) -> None:

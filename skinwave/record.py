@@ -12,7 +12,7 @@ import numpy as np
 
 from meshes import cache
 from simple_model import Response
-from skinwave.effort import versions
+from skinwave.effort import threads, versions
 from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
@@ -64,6 +64,7 @@ def write(
         "model": {"asked": asked.get("model")},
         "solver": {"asked": asked.get("solver")},
         "versions": versions(),
+        "threads": threads(),
     }
     meshes = {}
     if response:

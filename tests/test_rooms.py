@@ -22,7 +22,7 @@ INNER = {
     "models": set(),
     "planning": {"models"},
     "patterns": set(),
-    "pictures": {"models"},
+    "pictures": {"models", "planning"},
     "verify": {"models", "planning", "pictures"},
     "studies": {"models", "planning", "pictures"},
     "reports": {"models", "planning", "pictures", "studies", "verify"},

@@ -1,7 +1,10 @@
 """A result folder once more, from its record.json."""
 
 import argparse
+import os
 import shlex
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -21,8 +24,11 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave import record
+    from skinwave.effort import threads
 
     kept = record.read(options.folder)
+    if kept["threads"] != threads():  # which are set when a process begins
+        return _with_threads(options, kept["threads"])
     folder = options.folder.resolve()
     out = options.out or folder.with_name(f"{folder.name}-rerun")
     with tempfile.TemporaryDirectory() as place:
@@ -32,6 +38,12 @@ def run(options: argparse.Namespace) -> int:
         if kept["command"]["name"] in ("compute", "waves"):
             return _model_again(options, kept, scene, out)
         return _command_again(options, kept, scene, out)
+
+
+def _with_threads(options: argparse.Namespace, threads: dict[str, str]) -> int:
+    """The same command in a process with as many threads as the record has."""
+    words = [sys.executable, "-m", "skinwave", *options.typed]
+    return subprocess.run(words, env=os.environ | threads, check=False).returncode
 
 
 def _command_again(
