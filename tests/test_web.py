@@ -575,6 +575,19 @@ def test_the_moving_body_is_what_its_probe_sees(scene):
     assert np.corrcoef(frames[:, middle], upwards)[0, 1] > 0.999
 
 
+@pytest.mark.parametrize("whole", [0.05, 3.0])
+def test_frames_resolve_the_fastest_motion_however_long_the_pattern(monkeypatch, whole):
+    monkeypatch.setattr(moving, "shown_period", lambda pressure: whole)
+    monkeypatch.setattr(moving, "period", lambda pressure: whole)
+    shape = moving.Shape(points=np.zeros((1, 3)), triangles=np.zeros((0, 3), int))
+    lines, pressure = np.array([20.0, 400.0]), scenes.scene_of(STARTS).pressure
+    seen = moving.moving_of(shape, pressure, lines, np.ones((2, 1), complex))
+    assert len(seen.frames) <= moving.MOST
+    assert len(seen.frames) / seen.period >= moving.EACH * 400
+    assert seen.repeats == (whole < 1)
+    assert (seen.period == whole) == (whole < 1)
+
+
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
     told = Queue()
     asked = Worker(lambda *content: told.put(content))

@@ -1,4 +1,4 @@
-"""A body in three dimensions, moving through one period of the steady state about its mean."""
+"""A body in three dimensions, moving through the period of the whole pattern about its mean."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -13,7 +13,7 @@ from simple_model.steady import played
 from skinwave.models.speeds import period, shown_period
 from skinwave.scene import Body
 
-FEWEST, MOST = 32, 128  # frames of a period
+FEWEST, MOST = 32, 400  # frames of a period: of a palm 4 MB
 EACH = 8  # frames of the fastest vibration that is seen
 SEEN = 0.02  # of the largest line: weaker ones need no frames of their own
 DRAWN = 0.06  # of the width: how far the largest motion is drawn
@@ -32,7 +32,8 @@ class Shape:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moving:
-    """A shape and its motion `frames` (t, n) in metre upwards, equally spaced through `period` s.
+    """A shape and its motion `frames` (t, n) in metre upwards, equally spaced through `period` s:
+    of the whole pattern, or of as much of it as `MOST` frames resolve.
 
     `repeats` says whether the load is the same again after it.
     """
@@ -85,11 +86,13 @@ def moving_of(
     span = shown_period(pressure)
     strength = np.abs(upwards).max(axis=1, initial=0.0)
     seen = frequencies[strength > SEEN * strength.max(initial=0.0)]
-    count = int(np.clip(ceil(EACH * span * seen.max(initial=0.0)), FEWEST, MOST))
+    fastest = float(seen.max(initial=0.0))
+    whole = (needed := ceil(EACH * span * fastest)) <= MOST
+    span, count = (span, max(needed, FEWEST)) if whole else (MOST / EACH / fastest, MOST)
     t = np.arange(count) * span / count
     return Moving(
         shape=shape, frames=played(frequencies, upwards, t), period=span,
-        repeats=period(pressure) is not None,
+        repeats=whole and period(pressure) is not None,
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 // The body in three dimensions: its surface as drawing.py sends it, moved through one period.
 (() => {
-  const LASTS = 4000; // ms that a period lasts on the screen
+  const LASTS = 4000; // ms that a period lasts on the screen at least
+  const SLOWED = 250; // times that a long one is slowed down
   const VERTEX = `#version 300 es
     in vec3 place; in float before; in float after;
     uniform mat3 turn; uniform vec3 middle; uniform vec2 size; uniform float part, drawn;
@@ -208,7 +209,8 @@
         return;
       }
       if (view.playing && !document.hidden) {
-        view.at = (view.at + (view.last === null ? 0 : now - view.last) / LASTS) % 1;
+        const lasts = Math.max(LASTS, SLOWED * (at.motion?.period ?? 0));
+        view.at = (view.at + (view.last === null ? 0 : now - view.last) / lasts) % 1;
         draw(at);
       }
       view.last = now;
