@@ -679,6 +679,21 @@ def test_the_process_tells_the_step_it_is_at(monkeypatch):
     assert {(what, number, content.of) for what, number, content in sent} == {("progress", 7, 5)}
 
 
+@pytest.mark.parametrize(("load", "threads"), [(0.4, 4), (2.9, 2), (9.0, 1)])
+def test_the_process_computes_on_the_cores_that_are_idle(monkeypatch, load, threads):
+    for name in worker.THREADS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("MKL_NUM_THREADS", "3")
+    monkeypatch.setattr(worker.os, "cpu_count", lambda: 4)
+    monkeypatch.setattr(worker.os, "getloadavg", lambda: (load, 0.0, 0.0))
+    seen, context = [], Mock(Pipe=lambda: (Mock(recv=Mock(side_effect=EOFError)), Mock()))
+    context.Process().start = lambda: seen.extend(worker.os.environ.get(n) for n in worker.THREADS)
+    monkeypatch.setattr(worker.multiprocessing, "get_context", lambda _: context)
+    Worker(print)._start()
+    assert seen == [str(threads), str(threads), "3"], "what the user said stays"
+    assert "OMP_NUM_THREADS" not in worker.os.environ
+
+
 @pytest.mark.parametrize("waits", [False, True])
 def test_a_process_that_dies_fails_the_question_that_is_awaited(waits):
     told = []
