@@ -611,6 +611,19 @@ def test_the_moving_body_is_what_its_probe_sees(scene):
     assert np.corrcoef(frames[:, middle], upwards)[0, 1] > 0.999
 
 
+@pytest.mark.parametrize("whole", [0.05, 3.0])
+def test_frames_resolve_the_fastest_motion_however_long_the_pattern(monkeypatch, whole):
+    monkeypatch.setattr(moving, "shown_period", lambda pressure: whole)
+    monkeypatch.setattr(moving, "period", lambda pressure: whole)
+    shape = moving.Shape(points=np.zeros((1, 3)), triangles=np.zeros((0, 3), int))
+    lines, pressure = np.array([20.0, 400.0]), scenes.scene_of(STARTS).pressure
+    seen = moving.moving_of(shape, pressure, lines, np.ones((2, 1), complex))
+    assert len(seen.frames) <= moving.MOST
+    assert len(seen.frames) / seen.period >= moving.EACH * 400
+    assert seen.repeats == (whole < 1)
+    assert (seen.period == whole) == (whole < 1)
+
+
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
     told = Queue()
     asked = Worker(lambda *content: told.put(content))
@@ -700,6 +713,21 @@ def test_the_process_tells_the_step_it_is_at(monkeypatch):
         tell(phase, 0.0)
     assert [content.number for _, _, content in sent] == [1, 2, 3, 4, 5]
     assert {(what, number, content.of) for what, number, content in sent} == {("progress", 7, 5)}
+
+
+@pytest.mark.parametrize(("load", "threads"), [(0.4, 4), (2.9, 2), (9.0, 1)])
+def test_the_process_computes_on_the_cores_that_are_idle(monkeypatch, load, threads):
+    for name in worker.THREADS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("MKL_NUM_THREADS", "3")
+    monkeypatch.setattr(worker.os, "cpu_count", lambda: 4)
+    monkeypatch.setattr(worker.os, "getloadavg", lambda: (load, 0.0, 0.0))
+    seen, context = [], Mock(Pipe=lambda: (Mock(recv=Mock(side_effect=EOFError)), Mock()))
+    context.Process().start = lambda: seen.extend(worker.os.environ.get(n) for n in worker.THREADS)
+    monkeypatch.setattr(worker.multiprocessing, "get_context", lambda _: context)
+    Worker(print)._start()
+    assert seen == [str(threads), str(threads), "3"], "what the user said stays"
+    assert "OMP_NUM_THREADS" not in worker.os.environ
 
 
 @pytest.mark.parametrize("waits", [False, True])

@@ -1,4 +1,4 @@
-"""A body in three dimensions, moving through one period of the steady state about its mean."""
+"""A body in three dimensions, moving through the period of the whole pattern about its mean."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +30,8 @@ class Shape:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moving:
-    """A shape and its motion `frames` (t, n) in metre upwards, equally spaced through `period` s.
+    """A shape and its motion `frames` (t, n) in metre upwards, equally spaced through `period` s:
+    of the whole pattern, or of as much of it as `MOST` frames resolve.
 
     `repeats` says whether the load is the same again after it.
     """

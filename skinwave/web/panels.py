@@ -134,8 +134,8 @@ def body() -> None:
             html.Span(id="body-now")
         html.Div(
             "motion drawn {{ body_motion.times }} times, about its mean; "
-            "{{ body_motion.repeats ? 'one period' : 'a part of the pattern, "
-            "after which it jumps a little' }}",
+            "{{ body_motion.repeats ? 'the period of the whole pattern' : 'a part of the pattern, "
+            "which may jump where it begins again' }}",
             v_if="body_motion.times", classes="sw-caption",
         )  # fmt: skip
         colour_bar("body_motion.ends || []", drawings.SIGNED)

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
 
@@ -47,15 +46,14 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
 
 def _on_one_thread() -> None:
     """Have numpy compute on one thread here: what a move takes is too small to share out, and
-    threads that wait for each other delay it. The process that answers with a body has all.
+    threads that wait for each other delay it. The process that answers with a body has more.
     """
-    limits = [name for name in THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(limits, "1"))
-    import numpy as np
+    from skinwave.web.worker import limited
 
-    np.ones((2, 2)) @ np.ones((2, 2))
-    for name in limits:
-        del os.environ[name]
+    with limited(1):
+        import numpy as np
+
+        np.ones((2, 2)) @ np.ones((2, 2))
 
 
 def main() -> None:

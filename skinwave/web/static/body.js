@@ -1,6 +1,7 @@
 // The body in three dimensions: its surface as drawing.py sends it, moved through one period.
 (() => {
-  const LASTS = 4000, EACH = 40; // ms that a period lasts on the screen, and a frame at least
+  const LASTS = 4000; // ms that a period lasts on the screen at least
+  const SLOWED = 250; // times that a long one is slowed down
   const VERTEX = `#version 300 es
     in vec3 place; in float before; in float after;
     uniform mat3 turn; uniform vec3 middle; uniform vec2 size; uniform float part, drawn;
@@ -208,7 +209,7 @@
         return;
       }
       if (view.playing && !document.hidden) {
-        const lasts = Math.max(LASTS, EACH * (at.motion?.count ?? 0));
+        const lasts = Math.max(LASTS, SLOWED * (at.motion?.period ?? 0));
         view.at = (view.at + (view.last === null ? 0 : now - view.last) / lasts) % 1;
         draw(at);
       }
