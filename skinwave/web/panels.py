@@ -31,10 +31,10 @@ LEFT_OUT = (
     "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. What "
     "drive and profile change is the one against the other; what propagation changes is the waves "
     "against the kernel under the same load.",
-    "<b>Skin slab</b>: exact waves of an endless flat layer of soft tissue of 15 mm on bone; no "
-    "sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
+    "<b>Skin slab</b>: wavenumber integral of an infinite flat layer of soft tissue of 15 mm on "
+    "bone; no sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
-    "the body anew, which takes some seconds; other controls do not.",
+    "the body anew, which takes up to half a minute; other controls do not.",
     "<b>3-D</b>: the steady state about its mean, exaggerated as is said below it. A slab is shown "
     "as far as the area goes; its sides are drawn straight down to the bone.",
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
