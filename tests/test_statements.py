@@ -13,7 +13,7 @@ from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import modelled, untold
-from skinwave.studies.study import caption, write_single
+from skinwave.studies.study_page import caption, write_single
 from skinwave.sweeps.measures import measured
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)

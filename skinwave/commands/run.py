@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
     from skinwave.simulation import follow
-    from skinwave.studies.study import write_single
+    from skinwave.studies.study_page import write_single
 
     scene = read(options.scene)
     known = (label for label, body in BODIES.items() if body == scene.body)

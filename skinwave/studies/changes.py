@@ -1,13 +1,13 @@
 """What propagation changes of every Tacton of a study, with maps of the one that is shown first."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from meshes import cache
 from simple_model.response import SETTLE
-from skinwave.effort import Progress, versions
+from skinwave.effort import versions
 from skinwave.propagation import Propagation, propagation, share_outside
 from skinwave.run import Run
 from skinwave.scene import Scene
@@ -56,8 +56,7 @@ def changes(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagat
 
 def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
     """The Tacton of the first screen; None where no body was answered beside both kernels."""
-    name = next((n for n in (*FIRST, *groups) if n in groups), "")
-    group = groups.get(name, [])
+    group = groups.get(first_of(groups), [])
     kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
     published = next((r for r in group if r.model == "point-kernel-published"), None)
     if kernel is None or published is None or not bodies:
@@ -95,21 +94,24 @@ def quick_maps(run: Run) -> Drawn:
     return body_map(run.scene, x, y), kernel_map(run.scene.pressure, x, y)
 
 
-def all_maps(run: Run, progress: Progress, solver: str) -> Drawn:
-    """A body's map, cached where elements answer, and the kernel's."""
-    if quick := quick_maps(run):
-        return quick
-    x, y = grid(run.scene)
-    below = kernel_map(run.scene.pressure, x, y)
-    physics = run.scene.body, run.scene.pressure
+def first_of(names: Iterable[str]) -> str:
+    """The Tacton of the first screen, of some by name."""
+    names = list(names)
+    return next((name for name in (*FIRST, *names) if name in names), "")
+
+
+def element_maps(scene: Scene, solver: str) -> Drawn:
+    """A body's map by elements, cached, and the kernel's."""
+    x, y = grid(scene)
+    below = kernel_map(scene.pressure, x, y)
+    physics = scene.body, scene.pressure
     name, names = (
         cache.key("surface", *physics, x, y, solver, versions()),
         ("x", "y", "rms", "level"),
     )
     if (entry := cache.load(name)) is not None:
         return SurfaceMap(**{n: entry[n] for n in names}, unit="m", h=entry["meta"]["h"]), below
-    progress(f"map of {run.column}", 0.0)
-    surface = body_map(run.scene, x, y, progress, solver=solver)
+    surface = body_map(scene, x, y, solver=solver)
     cache.store(name, {"h": surface.h}, **{n: getattr(surface, n) for n in names})
     return surface, below
 

@@ -1,19 +1,19 @@
 """Many runs at once, by Dask: in threads, in processes, or on the workers of a scheduler.
 
-Nothing but Dask is imported here: a worker process sets its threads before numpy is loaded.
+Nothing that loads numpy is imported here: a worker process sets its threads before that.
 """
 
 import os
-import signal
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from functools import partial
 from importlib.util import find_spec
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import active_children, get_context
 from typing import Any
+
+from skinwave.effort import as_worker
 
 LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker
@@ -126,7 +126,7 @@ def _run_here(
     if scheduler == "threads":
         pool = ThreadPoolExecutor(count)
     else:
-        pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_as_worker)
+        pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=as_worker)
     try:
         with Callback(posttask=finished):
             get(graph, list(graph), pool=pool, num_workers=count, chunksize=1)
@@ -136,21 +136,6 @@ def _run_here(
         for child in set(active_children()) - others:
             child.terminate()
         raise
-
-
-def _as_worker() -> None:
-    """Interrupts are the parent's; one thread each; none outlives a parent that is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-
-    def watch() -> None:
-        parent = parent_process()
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _run_on_cluster(

@@ -1,0 +1,190 @@
+"""The page of a comparison, and that of a single run."""
+
+from collections.abc import Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from functools import partial
+from html import escape
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from simple_model import Effort
+from skinwave import document
+from skinwave.effort import Progress
+from skinwave.files import fill
+from skinwave.models.prepared import Prepared
+from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
+from skinwave.run import Run
+from skinwave.scene_file import dumps
+from skinwave.studies import summary, tables
+from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
+from skinwave.studies.claims import Verdict
+from skinwave.studies.description import levels_of, modelled, path_of, tones_of, untold
+
+EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What a comparison left: its verdicts and warnings, what it cost, how much of it was done."""
+
+    verdicts: list[Verdict]
+    warnings: list[str]
+    runs: int
+    planned: int
+    seconds: float
+    peak_memory: int
+
+
+def write_single(folder: Path, run: Run) -> None:
+    """The folder of one run, with its page."""
+    fill(folder, run)
+    figure = tacton_figure(run.tacton, [run])
+    group = beside_kernels(run) if run.response.unit == "m" else []
+    first = shown({run.tacton: group}, quick_maps)
+    parts = [
+        *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),
+        document.warnings_banner([("", run.response.effort)]),
+        document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
+        *map(document.paragraph, untold([run])),
+        document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
+        document.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
+    ]
+    title = f"{run.tacton} on {run.body}: {run.model}"
+    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
+
+
+def page_parts(
+    folder: Path,
+    groups: Mapping[str, list[Run]],
+    first: Shown | None,
+    outcome: Outcome,
+    progress: Progress,
+    figures: Mapping[str, Future[bytes]],
+) -> list[str]:
+    """Parts of index.html, and a PNG of each figure in it."""
+    runs = [run for group in groups.values() for run in group]
+    (folder / "figures").mkdir()
+    few = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
+    overview = overview_figure(few, min(2, len(runs[0].scene.probes) - 1))
+    drawn = partial(_picture, folder, "propagation")
+    parts = [
+        *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
+        document.warnings_banner(efforts(runs)),
+        *_introduction(outcome, groups),
+        *map(document.paragraph, untold(runs)),
+        _picture(folder, "overview", overview, OVERVIEW_CAPTION),
+        document.section("What propagation changes", summary.per_tacton(changes(groups))),
+        document.section(
+            "Which of the paper's claims hold where",
+            tables.claims_table(outcome.verdicts),
+            *map(document.paragraph, _disagreements(outcome.verdicts)),
+        ),
+        document.section("What was modelled, and what was left out",
+                         *map(document.paragraph, modelled(runs))),
+        document.section("How far the models agree", tables.agreement_table(groups)),
+    ]  # fmt: skip
+    pictures = []
+    for k, (name, group) in enumerate(groups.items()):
+        progress("draw", k / len(groups))
+        image = figures[name].result() if name in figures else tacton_png(name, group)
+        pictures.append(_kept(folder, name, image, caption(name, group)))
+    return [*parts, document.section("Every Tacton", *pictures)]
+
+
+def tacton_png(name: str, group: list[Run]) -> bytes:
+    """A Tacton's figure as a PNG file."""
+    return png(tacton_figure(name, group))
+
+
+def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
+    """Efforts by what a run is called."""
+    return [(f"{run.tacton} on {run.body}", run.response.effort) for run in runs]
+
+
+def effort_section(
+    groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: Outcome
+) -> str:
+    """What each body and the whole cost."""
+    runs = [run for group in groups.values() for run in group]
+    efforts = {
+        body: replace(
+            p.effort,
+            **{
+                name: max(getattr(r.response.effort, name) for r in runs if r.body == body)
+                for name in ("energy_imbalance", "radiated")
+            },
+        )
+        for body, p in prepared.items()
+    }
+    return document.section("Effort", tables.effort_table(efforts, len(groups), outcome.seconds))
+
+
+def again(command: str) -> str:
+    """How the same is had once more."""
+    return document.section("Do it again", document.paragraph(
+        f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."
+    ))  # fmt: skip
+
+
+def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
+    """A figure drawn once: as a file, and inside the page."""
+    return _kept(folder, name, png(figure), caption)
+
+
+def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:
+    (folder / "figures" / f"{name}.png").write_bytes(image)
+    return document.picture(image, caption, name)
+
+
+def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str]:
+    if outcome.runs == outcome.planned:
+        state = f"{len(groups)} Tacton{'s' * (len(groups) != 1)}, {outcome.runs} runs."
+    else:
+        state = f"Interrupted: {outcome.runs} of {outcome.planned} runs are finished and shown."
+    return [
+        document.paragraph(
+            f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
+            "doi 10.1145/3613905.3650981), as published and under the load that the bodies "
+            "receive, beside finite elements of these bodies. Amplitudes of every line are in "
+            "lines.csv, waveforms in responses.npz; each run's folder has its scene."
+        )
+    ]
+
+
+def _disagreements(verdicts: list[Verdict]) -> list[str]:
+    """Where a body contradicts what was measured on paper, and whether propagation is the cause."""
+    of_kernel = {v.claim: v.holds for v in verdicts if v.model == "point-kernel"}
+    texts = []
+    for verdict in verdicts:
+        if verdict.body != "none" and verdict.claim.startswith("M") and not verdict.holds:
+            alone = of_kernel.get(verdict.claim, False)
+            texts.append(
+                f"The {label(verdict.body)} contradicts {verdict.claim}, which was measured on "
+                f"paper: {verdict.sentence}. "
+                + (
+                    "The point kernel under the same load does not, so that propagation is the "
+                    "cause."
+                    if alone
+                    else "So does the point kernel under the same load: propagation is not the "
+                    "cause."
+                )
+            )
+    return texts
+
+
+OVERVIEW_CAPTION = (
+    "Top: motion about its mean at one probe, relative to each model's largest motion at any "
+    "probe. Middle: its spectrum; markers are the Tacton's own lines, unmarked peaks are pairs "
+    "with 2 f_AM and the free vibration that the start of the Tacton leaves in a body. "
+    "Bottom: how far the motion spreads."
+)
+
+
+def caption(name: str, group: list[Run]) -> str:
+    """What a Tacton's figure shows."""
+    tacton = group[0].scene.tacton
+    moved = [] if tacton.trajectory.is_static else [path_of(tacton)]
+    parts = [*tones_of(tacton), *moved, *levels_of(tacton)]
+    return f"{name}: {', '.join(parts) or 'constant pressure'}. Rows are probes."
