@@ -31,6 +31,7 @@ from skinwave.studies.study_page import (
     again,
     effort_section,
     efforts,
+    overview_png,
     page_parts,
     tacton_png,
 )
@@ -78,6 +79,7 @@ def run_study(
     with helper() as aside:
         maps = _begun_maps(scenes, aside, progress, solver)
         groups, prepared, figures = _answered(scenes, folder, aside, progress, h, solver)
+        figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
         outcome = Outcome(
             verdicts=evaluate(runs),

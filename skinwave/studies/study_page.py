@@ -66,15 +66,13 @@ def page_parts(
     """Parts of index.html, and a PNG of each figure in it."""
     runs = [run for group in groups.values() for run in group]
     (folder / "figures").mkdir()
-    few = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
-    overview = overview_figure(few, min(2, len(runs[0].scene.probes) - 1))
     drawn = partial(_picture, folder, "propagation")
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
         *_introduction(outcome, groups),
         *map(document.paragraph, untold(runs)),
-        _picture(folder, "overview", overview, OVERVIEW_CAPTION),
+        _kept(folder, "overview", figures["overview"].result(), OVERVIEW_CAPTION),
         document.section("What propagation changes", summary.per_tacton(changes(groups))),
         document.section(
             "Which of the paper's claims hold where",
@@ -96,6 +94,13 @@ def page_parts(
 def tacton_png(name: str, group: list[Run]) -> bytes:
     """A Tacton's figure as a PNG file."""
     return png(tacton_figure(name, group))
+
+
+def overview_png(groups: Mapping[str, list[Run]]) -> bytes:
+    """A few Tactons side by side as a PNG file."""
+    few = {n: groups[n] for n in EXAMPLES if n in groups} or dict(list(groups.items())[:3])
+    probes = next(iter(few.values()))[0].scene.probes
+    return png(overview_figure(few, min(2, len(probes) - 1)))
 
 
 def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
