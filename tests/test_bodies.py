@@ -395,7 +395,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
 def meshed_anew(scene, h, monkeypatch):
     """The mesher differs from run to run: what it made before is not taken."""
     monkeypatch.setenv("SKINWAVE_CACHE", "")
-    return simulate(scene, "fem", h=h)
+    return compute(scene, "fem", h=h)
 
 
 @pytest.mark.slow
@@ -411,7 +411,7 @@ def test_a_palm_answers_alike_however_it_is_meshed(monkeypatch):
     assert required.h > default_size(scene.body)  # and not what a palm gets without a plan
     (row,) = (row for row in required.rows if row.what == "element size")
     assert "refined until less than 5 % is left" in row.reason
-    planned = simulate(scene, "fem", h=required.h)
+    planned = compute(scene, "fem", h=required.h)
     assert compare(fine, planned).relative_l2.max() < 0.05
 
 

@@ -91,7 +91,7 @@ def other_loss(
     worst = np.argmax(np.where(beyond, abs(np.log(ratio)), 0))
     low, high = LOSS_BAND
     return (
-        f"at {frequencies[worst]:.3g} Hz the loss factor is {ratio[worst]:.2g} times the one asked "
+        f"at {frequencies[worst]:.0f} Hz the loss factor is {ratio[worst]:.2g} times the one asked "
         f"for, which is fitted over {low:g} to {high:g} Hz: a resonance there is "
         f"{1 / ratio[worst]:.2g} times as high as it should be in elements",
     )
