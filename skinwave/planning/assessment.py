@@ -60,11 +60,7 @@ def told(
     (f, p) of a body that is not held.
     """
     body, size = scene.body, h or default_size(scene.body)
-    if compared is None:
-        other = compared_with(body, size) if h else _coarser(body, size)
-        precision = reduction_tolerance(tolerance)
-        compared = other, _prepared(body, scene.probes, other, solver, precision)
-    other, coarse = compared
+    other, coarse = compared or coarser_body(scene, h, tolerance, solver)
     if coarse.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
         error = np.nan if body.kind == "mesh" else 1.0
     else:
@@ -73,6 +69,18 @@ def told(
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)
+
+
+def coarser_body(
+    scene: Scene,
+    h: float | None = None,
+    tolerance: float = 0.05,
+    solver: str = "auto",
+) -> Coarser:
+    """The element size in metre that `assessed` compares with, and the body reduced with it."""
+    body = scene.body
+    other = compared_with(body, h) if h else _coarser(body, default_size(body))
+    return other, _prepared(body, scene.probes, other, solver, reduction_tolerance(tolerance))
 
 
 def sentences(

@@ -3,16 +3,17 @@
 import time
 from collections.abc import Mapping
 from concurrent.futures import Executor, Future
-from contextlib import suppress
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 
+from meshes import cache
 from skinwave import document
-from skinwave.effort import Progress, helper, peak_memory
+from skinwave.effort import Progress, helper, one_thread, peak_memory
 from skinwave.files import write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
-from skinwave.planning.assessment import assessed
+from skinwave.planning.assessment import assessed, coarser_body
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.simulation import check_knobs, compute
@@ -76,9 +77,11 @@ def run_study(
                 solid, h or default_size(solid)
             )  # refuses what cannot be meshed before any run
     started = time.perf_counter()
-    with helper() as aside:
+    with helper() as aside, ExitStack() as threads:
+        coarser = _begun_coarser(scenes, aside, h, solver)
         maps = _begun_maps(scenes, aside, progress, solver)
-        groups, prepared, figures = _answered(scenes, folder, aside, progress, h, solver)
+        groups, prepared, figures = _answered(scenes, folder, aside, coarser, progress, h, solver)
+        threads.enter_context(one_thread())
         figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
         outcome = Outcome(
@@ -104,6 +107,24 @@ def run_study(
     return spent
 
 
+def _begun_coarser(
+    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, h: float | None, solver: str
+) -> dict[Body, Future[None]]:
+    """The coarser meshes that answers are assessed by, begun aside and left in the cache."""
+    if cache.folder() is None:
+        return {}
+    solids = {s.body: s for group in scenes.values() for s in group.values()}
+    return {
+        body: aside.submit(_cache_coarser, scene, h, solver)
+        for body, scene in solids.items()
+        if body.kind != "none"
+    }
+
+
+def _cache_coarser(scene: Scene, h: float | None, solver: str) -> None:
+    coarser_body(scene, h, solver=solver)
+
+
 def _begun_maps(
     scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, solver: str
 ) -> Maps:
@@ -127,6 +148,7 @@ def _answered(
     scenes: Mapping[str, Mapping[str, Scene]],
     folder: Path,
     aside: Executor,
+    coarser: Mapping[Body, Future[None]],
     progress: Progress,
     h: float | None,
     solver: str,
@@ -142,8 +164,10 @@ def _answered(
         for k, (name, column, scene) in enumerate(
             sorted(every, key=lambda each: each[2].body.kind != "none")
         ):
-            run = _answer(name, column, scene, prepared, progress, h, solver)
-            write_run(folder / name / column, run)
+            new = scene.body.kind != "none" and column not in prepared
+            with nullcontext() if new else one_thread():
+                run = _answer(name, column, scene, prepared, coarser, progress, h, solver)
+                write_run(folder / name / column, run)
             groups.setdefault(name, []).append(run)
             if len(groups[name]) == len(scenes[name]):
                 figures[name] = aside.submit(tacton_png, name, groups[name])
@@ -158,6 +182,7 @@ def _answer(
     body: str,
     scene: Scene,
     prepared: dict[str, Prepared],
+    coarser: Mapping[Body, Future[None]],
     progress: Progress,
     h: float | None,
     solver: str,
@@ -171,5 +196,7 @@ def _answer(
             progress(f"{body}: {phase}", fraction)
 
         prepared[body] = prepare(scene.body, scene.probe_points, named, h=h, solver=solver)
+    if scene.body in coarser:
+        coarser[scene.body].result()
     response = assessed(scene, answer(prepared[body], scene), prepared[body], h, solver=solver)
     return Run(tacton=name, body=body, scene=scene, response=response)

@@ -67,12 +67,14 @@ def page_parts(
     runs = [run for group in groups.values() for run in group]
     (folder / "figures").mkdir()
     drawn = partial(_picture, folder, "propagation")
+    begun = not figures["overview"].cancel()
+    overview = figures["overview"].result() if begun else overview_png(groups)
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
         *_introduction(outcome, groups),
         *map(document.paragraph, untold(runs)),
-        _kept(folder, "overview", figures["overview"].result(), OVERVIEW_CAPTION),
+        _kept(folder, "overview", overview, OVERVIEW_CAPTION),
         document.section("What propagation changes", summary.per_tacton(changes(groups))),
         document.section(
             "Which of the paper's claims hold where",
@@ -83,11 +85,8 @@ def page_parts(
                          *map(document.paragraph, modelled(runs))),
         document.section("How far the models agree", tables.agreement_table(groups)),
     ]  # fmt: skip
-    pictures = []
-    for k, (name, group) in enumerate(groups.items()):
-        progress("draw", k / len(groups))
-        image = figures[name].result() if name in figures else tacton_png(name, group)
-        pictures.append(_kept(folder, name, image, caption(name, group)))
+    images = _images(groups, figures, progress)
+    pictures = [_kept(folder, n, images[n], caption(n, group)) for n, group in groups.items()]
     return [*parts, document.section("Every Tacton", *pictures)]
 
 
@@ -131,6 +130,18 @@ def again(command: str) -> str:
     return document.section("Do it again", document.paragraph(
         f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."
     ))  # fmt: skip
+
+
+def _images(
+    groups: Mapping[str, list[Run]], figures: Mapping[str, Future[bytes]], progress: Progress
+) -> dict[str, bytes]:
+    """Each Tacton's figure; what is not begun yet aside is drawn here, from the last on."""
+    here: dict[str, bytes] = {}
+    for name in reversed(list(groups)):
+        if name not in figures or figures[name].cancel():
+            progress("draw", len(here) / len(groups))
+            here[name] = tacton_png(name, groups[name])
+    return {name: here[name] if name in here else figures[name].result() for name in groups}
 
 
 def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
