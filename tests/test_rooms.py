@@ -27,7 +27,7 @@ INNER = {
     "studies": {"models", "planning", "pictures"},
     "reports": {"models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"models", "planning", "pictures"},
-    "web": {"models", "pictures", "reports", "studies"},
+    "web": {"models", "planning", "pictures", "reports", "studies"},
 }
 
 

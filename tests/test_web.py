@@ -28,6 +28,7 @@ from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import lobe_width, spot_width
 from skinwave.cli import main
 from skinwave.models.bodies import compliance
+from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
@@ -843,6 +844,16 @@ def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
     with session.state:
         session.state.am = 150
     assert session.state.warnings == [], "they are of another answer"
+
+
+def test_answers_carry_the_warnings_of_the_command_line(scene):
+    """Sides that reflect are left out by the wavenumber integral, and that is said."""
+    assert waves.Waves()(scene, nothing).response.effort.warnings == ()
+    small = replace(scene.body, width=0.04, height=0.04, sides="clamped")
+    reflecting = replace(scene, body=small)
+    said = waves.Waves()(reflecting, nothing).response.effort.warnings
+    assert said == plan(reflecting, model="flat-body").warnings
+    assert "which lets no wave return from the sides" in said[0]
 
 
 def test_a_held_frequency_and_a_preset(session):

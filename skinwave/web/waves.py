@@ -31,9 +31,17 @@ from simple_model.steady import (
     path_knots,
 )
 from skinwave.effort import Progress
-from skinwave.models.bodies import air, build, has_exact_waves, operators, surface_load
+from skinwave.models.bodies import (
+    air,
+    build,
+    default_size,
+    has_exact_waves,
+    operators,
+    surface_load,
+)
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import reduced_lines, sample_times
+from skinwave.planning.assessment import sentences
 from skinwave.run import is_skin
 from skinwave.scene import Body, Scene
 from skinwave.web.model import (
@@ -103,12 +111,12 @@ class Waves:
             height = scene.pressure.height
             known = self._keep("known", scene.body, lambda: wavenumbers(scene.body, progress))
             table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
-            return flat_answer(table, scene, moving)
+            return warned_of(scene, flat_answer(table, scene, moving))
         tacton = scene.tacton
         places_only = at_any_speed(tacton.trajectory), tacton.n_paths
         key = (scene.body, places_only, scene.pressure.height, scene.pressure.focus)
         body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
-        return reduced_answer(body, scene, moving)
+        return warned_of(scene, reduced_answer(body, scene, moving))
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
         made, ops = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
@@ -121,6 +129,16 @@ class Waves:
         while len(kept) > KEPT:
             del kept[next(iter(kept))]
         return found
+
+
+def warned_of(scene: Scene, answer: Answer) -> Answer:
+    """The answer with the warnings of the command line, but for those that take a second mesh."""
+    response = answer.response
+    if has_exact_waves(scene.body) and scene.body.sides == "absorbing":
+        return answer  # an infinite slab, whose sides reflect nothing
+    said = sentences(scene, response, h=default_size(scene.body))
+    effort = replace(response.effort, warnings=said)
+    return replace(answer, response=replace(response, effort=effort))
 
 
 def gaussian_only(pressure: MovingPressure) -> None:
