@@ -219,7 +219,9 @@ def _waves(times: Floats, frequencies: Floats) -> NDArray[np.complex128]:
     row = int(np.ceil(np.sqrt(len(times))))
     within = np.exp(2j * np.pi * np.outer(times[:row] - times[0], frequencies))
     rows = np.exp(2j * np.pi * np.outer(times[::row], frequencies))
-    return np.asarray((rows[:, None] * within).reshape(-1, len(frequencies))[: len(times)])
+    return np.asarray(
+        (rows[:, None] * within).reshape(len(rows) * row, len(frequencies))[: len(times)]
+    )
 
 
 def _window(bins: float) -> tuple[str, float]:

@@ -25,7 +25,7 @@ LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
     "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
 )  # fmt: skip
-RESERVED = ("figures", "overview")  # what a study names itself
+RESERVED = ("figures", "overview", "propagation")  # what a study names itself
 
 
 @contextmanager

@@ -279,7 +279,8 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
         assert {"t", "probes", "as published", "endless"} <= set(kept.files)
     with open(tmp_path / "scene-relaxed/relax.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert {row["line"] for row in rows} >= {"f_AM", "2f_AM", "f_d"}
+    # In so short a Tacton 2 f_AM is not resolved from 3 f_d - 2 f_AM.
+    assert {row["line"] for row in rows} >= {"f_AM", "2f_d", "f_d"}
     page = (tmp_path / "scene-relaxed/index.html").read_text()
     assert "What each assumption changes" in page
 

@@ -49,7 +49,7 @@ def test_run_with_each_model(scene, model):
 def test_compare_a_scene_of_ones_own(scene, capsys):
     scene.write_text(SMALL.replace("duration_s = 0.05", "duration_s = 0.3"))  # to tell lines apart
     assert main(["compare", str(scene), "--h", "6", "--out", "both"]) == 0
-    assert "2 of 2 runs" in capsys.readouterr().out
+    assert "3 of 3 runs" in capsys.readouterr().out
     folder = scene.parent / "both"
     rows = table(folder / "lines.csv")
     assert ",".join(rows[0]) == (
@@ -57,7 +57,7 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
         "displacement_um,velocity_mm_s,pressure_pa"
     )
     assert {(row["body"], row["model"]) for row in rows} == {
-        ("none", "point-kernel"), ("slab", "fem"),
+        ("none", "point-kernel-published"), ("none", "point-kernel"), ("slab", "fem"),
     }  # fmt: skip
     row = next(r for r in rows if r["body"] == "slab" and r["line"] == "f_AM")
     velocity = 2 * np.pi * 200 * float(row["displacement_um"]) / 1e3
@@ -65,7 +65,7 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
     claims = table(folder / "claims.csv")
     assert list(claims[0]) == ["claim", "body", "model", "holds", "value", "bar", "sentence"]
     assert (folder / "short/slab/scene.toml").exists()
-    assert (folder / "short/none/responses.npz").exists()
+    assert (folder / "short/point-kernel/responses.npz").exists()
     assert (folder / "figures/short.png").stat().st_size > 10_000
 
 
@@ -184,8 +184,8 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
         process.stderr.read()
     assert process.returncode == 1
     page = (tmp_path / "cut/index.html").read_text()
-    assert "Interrupted: 15 of 45 runs" in page
-    assert len(list((tmp_path / "cut").glob("*/none/responses.npz"))) == 15
+    assert "Interrupted: 30 of 60 runs" in page
+    assert len(list((tmp_path / "cut").glob("*/point-kernel/responses.npz"))) == 15
     assert not os.path.exists(tmp_path / "cut.partial")
 
 

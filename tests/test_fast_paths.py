@@ -21,6 +21,7 @@ from simple_model.flat_body import steady_lines
 from simple_model.sampling import resolving_step
 from simple_model.steady import along_path, load_lines, path_knots, played
 from skinwave import Body, Scene, simulate
+from skinwave.simulation import compute
 
 PALM = slab(density=1000, shear_modulus=25e3, viscosity=5.0, poisson=0.4999, depth=0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
@@ -125,5 +126,5 @@ def test_time_steps_resolve_a_fast_focus_and_leave_others_alone():
     load = circling(0.005, 100.0)
     assert 1 / resolving_step(load, 5e-5) > 6 * load.tacton.drawing_frequency
     brief = replace(load, tacton=replace(load.tacton, duration=0.01))
-    found = simulate(Scene(pressure=brief, body=SKIN), "fem-transient", h=10e-3)
+    found = compute(Scene(pressure=brief, body=SKIN), "fem-transient", h=10e-3)
     assert found.effort.steps > 0.0099 * 6 * load.tacton.drawing_frequency

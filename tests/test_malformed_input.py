@@ -145,10 +145,10 @@ def test_a_scene_of_any_name_is_compared_within_its_folder(folder, name):
     before = contents(folder)
     assert main(["compare", "named.toml", "--h", "6", "--out", "out", "--quiet"]) == 0
     assert {p: c for p, c in contents(folder).items() if "out" not in p.parts} == before
-    assert len(list((folder / "out").glob("*/*/responses.npz"))) == 2
+    assert len(list((folder / "out").glob("*/*/responses.npz"))) == 3
     assert len(list((folder / "out/figures").glob("*.png"))) == 2
     command = ["run", "out", "--model", "point-kernel", "--out", "single", "--quiet"]
-    (command[1],) = map(str, (folder / "out").glob("*/none/scene.toml"))
+    (command[1],) = map(str, (folder / "out").glob("*/point-kernel/scene.toml"))
     assert main(command) == 0
 
 

@@ -14,6 +14,7 @@ from simple_model import (
     focal_spot,
     relative_intensity,
 )
+from skinwave.simulation import compute
 
 D_MM = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 25])
 
@@ -184,11 +185,11 @@ def test_models_of_lines_refuse_a_load_with_formulas_of_its_own(load, model):
 @pytest.mark.parametrize("model", ["point-kernel", "fem-transient"])
 def test_models_that_evaluate_the_load_honour_its_own_formulas(model):
     plain, louder = (
-        skinwave.simulate(skinwave.Scene(pressure=load(tacton=SHORT), body=SKIN), model, h=0.01)
+        compute(skinwave.Scene(pressure=load(tacton=SHORT), body=SKIN), model, h=0.01)
         for load in (MovingPressure, Louder)
     )
     np.testing.assert_allclose(louder.displacement, 2 * plain.displacement, rtol=1e-9, atol=1e-15)
-    foreign = skinwave.simulate(skinwave.Scene(pressure=Foreign(), body=SKIN), model, h=0.01)
+    foreign = compute(skinwave.Scene(pressure=Foreign(), body=SKIN), model, h=0.01)
     assert np.abs(foreign.displacement).max() > 0
 
 

@@ -441,7 +441,7 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
     text = (tmp_path / "flat/index.html").read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in text
-    assert text.count("data:image/") == 6
+    assert text.count("data:image/") == 7
     assert (tmp_path / "flat/pictures/rms.png").exists()
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 

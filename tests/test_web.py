@@ -27,6 +27,7 @@ from simple_model import (
 from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import lobe_width, spot_width
 from skinwave.cli import main
+from skinwave.models import speeds
 from skinwave.models.bodies import compliance
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body
@@ -205,6 +206,7 @@ def test_a_scene_goes_through_its_file_and_back_to_the_controls():
         scenes.scene_of(values | {"foci": 3})
 
 
+PUBLISHED = {"drive": "linear", "profile": "main_lobe"}
 OWN = {"foci": 3, "drawn": 90.0, "paths": "circle/20/-20/0, square/15/20/0.5, line/20/0/20"}
 
 
@@ -389,7 +391,7 @@ def test_nothing_is_felt_of_what_does_not_vibrate_nor_on_paper():
 
 def test_map_and_table_agree_under_a_rhythm():
     """The level of the strongest line where the borderline runs is 0 dB in the table."""
-    scene = scenes.scene_of(STARTS | {"shape": "point", "am": 150, "pulses": "50/50"})
+    scene = scenes.scene_of(STARTS | PUBLISHED | {"shape": "point", "am": 150, "pulses": "50/50"})
     outermost = max(model.kernel_map(scene.pressure).felt, key=lambda line: np.abs(line).max())
     response = point_kernel(scene.pressure, outermost[:1], np.arange(10_000) / 10_000)
     table = line_table(scene.pressure, response)
@@ -612,17 +614,16 @@ def test_the_moving_body_is_what_its_probe_sees(scene):
     assert np.corrcoef(frames[:, middle], upwards)[0, 1] > 0.999
 
 
-@pytest.mark.parametrize("whole", [0.05, 3.0])
-def test_frames_resolve_the_fastest_motion_however_long_the_pattern(monkeypatch, whole):
-    monkeypatch.setattr(moving, "shown_period", lambda pressure: whole)
-    monkeypatch.setattr(moving, "period", lambda pressure: whole)
+@pytest.mark.parametrize(("am", "envelope", "whole"), [(20.0, 0.0, 0.05), (141.0, 20.0, 1.0)])
+def test_frames_resolve_the_fastest_motion_however_long_the_pattern(am, envelope, whole):
     shape = moving.Shape(points=np.zeros((1, 3)), triangles=np.zeros((0, 3), int))
-    lines, pressure = np.array([20.0, 400.0]), scenes.scene_of(STARTS).pressure
+    values = STARTS | {"shape": "point", "am": am, "envelope": envelope, "duration": 1.0}
+    lines, pressure = np.array([20.0, 400.0]), scenes.scene_of(values).pressure
     seen = moving.moving_of(shape, pressure, lines, np.ones((2, 1), complex))
-    assert len(seen.frames) <= moving.MOST
-    assert len(seen.frames) / seen.period >= moving.EACH * 400
-    assert seen.repeats == (whole < 1)
-    assert (seen.period == whole) == (whole < 1)
+    assert len(seen.frames) <= speeds.MOST
+    assert len(seen.frames) / seen.period >= 0.99 * speeds.EACH * 400
+    assert seen.repeats == (whole < 0.1)
+    assert (seen.period == pytest.approx(whole)) == (whole < 0.1)
 
 
 def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):

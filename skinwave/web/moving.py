@@ -109,8 +109,9 @@ def sent_motion(moving: Moving, pressure: MovingPressure) -> dict[str, Any]:
     drawn = DRAWN * 1e3 * float(np.ptp(points[:, 0]))
     t = np.arange(len(moving.frames)) * moving.period / len(moving.frames)
     f_d = path.drawing_frequency
-    at = [path.at_phase((f_d * t + phase) % 1) for phase in pressure.tacton.foci]
     n = pressure.tacton.n_paths
+    within = np.mod(n * f_d * t, 1.0) / n  # each of several foci stays on its own path
+    at = [path.at_phase((within + phase) % 1) for phase in pressure.tacton.foci]
     # From one path's end to the next one's beginning there is no line.
     along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, DRAWN_POINTS)) / n
     line = path.at_phase(along) if f_d else np.zeros((n, 0, 2))
