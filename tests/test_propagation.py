@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import inf, pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from skinwave.comparison import compare
 from skinwave.propagation import OUTSIDE, propagation, share_outside
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
+from skinwave.scene_file import read
 from skinwave.simulation import compute, simulate
 from skinwave.studies.changes import beside_kernels, quick_maps, shown
 from skinwave.studies.claims import evaluate
+from skinwave.studies.paper15 import beside_kernels as beside_kernels_of
 from skinwave.studies.paper15 import tactons
 from skinwave.studies.study import own_scenes, paper_scenes
 from skinwave.studies.summary import sentences, small_table
@@ -92,6 +95,17 @@ def test_one_name_means_one_kernel_through_every_door():
     published = compute(scene, "point-kernel-published")
     assert published.model == "point-kernel-published"
     assert published.displacement.min() < 0 <= on_body.min()
+
+
+def test_the_same_load_has_the_drawing_frequency_that_the_published_one_lacks():
+    """At 10 mm, on the path: a_1 / a_0 of a Gaussian focus on a circle of 20 mm, over m."""
+    scene = read(Path(__file__).parents[1] / "examples/skin-slab.toml")
+    published, same = (
+        Run(tacton="one", body="none", scene=its, response=compute(its, model))
+        for model, its in beside_kernels_of(scene).items()
+    )
+    assert same.lines["f_d"][2] / same.lines["f_AM"][2] == pytest.approx(1.35, rel=0.05)
+    assert published.lines["f_d"][2] < 1e-6 * published.lines["f_AM"][2]
 
 
 def test_answers_to_different_loads_are_not_compared():
