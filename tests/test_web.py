@@ -30,6 +30,7 @@ from skinwave.cli import main
 from skinwave.models import speeds
 from skinwave.models.bodies import compliance
 from skinwave.planning.plan import plan
+from skinwave.propagation import share_outside
 from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
@@ -845,6 +846,22 @@ def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
     with session.state:
         session.state.am = 150
     assert session.state.warnings == [], "they are of another answer"
+
+
+def test_the_first_sentences_say_what_each_difference_changes(session):
+    answer = waves.Waves()(session.scene, nothing)
+    with session.state:
+        told(session, "answer", session.number, answer)
+    propagation, drive, felt = session.state.summary
+    share = float(re.search(r"carry (\d+) %", propagation)[1])
+    exact = share_outside(model.kernel_map(session.scene.pressure).rms, answer.map.rms)
+    assert share == round(100 * exact)
+    assert 5 < share < 60
+    assert "not propagation, adds f_" in drive
+    assert "dB re threshold" in felt
+    with session.state:
+        session.state.body = "none"
+    assert session.state.summary == [drive]
 
 
 def test_answers_carry_the_warnings_of_the_command_line(scene):

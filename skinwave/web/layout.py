@@ -60,6 +60,7 @@ def lay_out(session: Session) -> None:
         panels.about()
         with v3.VMain(), html.Div(classes="sw-page", id="ready"):
             with html.Div(classes="sw-above"):
+                panels.summary()
                 panels.warnings()
                 panels.differences()
             _maps(session)

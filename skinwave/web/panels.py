@@ -153,6 +153,13 @@ def differences() -> None:
     ])  # fmt: skip
 
 
+def summary() -> None:
+    """What propagation and the drive law do, in a sentence each."""
+    with html.Div(v_if="summary.length", classes="sw-summary", id="summary",
+                  raw_attrs=['aria-label="What propagation changes"']):  # fmt: skip
+        html.Span("{{ said }} ", v_for="said in summary", key="said")
+
+
 def warnings() -> None:
     """What is less than was asked for, and how wrong the answer may be: as text, for sentences may
     quote what came from a file.

@@ -5,12 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from simple_model import MovingPressure, named_lines, published
+from skinwave.propagation import share_outside
 from skinwave.scene import Body, Scene
 from skinwave.web import drawings, model, moving, plots
 from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.model import Answer
 from skinwave.web.plots import Curves
 
+NAMED = 3  # lines that a sentence names
+PRESENT = 1e-2  # of the strongest line of a load: one that is named
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
 
 
@@ -27,7 +31,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
-        "warnings": [], "expected": "", "published": False,
+        "summary": [], "warnings": [], "expected": "", "published": False,
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
@@ -51,6 +55,7 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         "untold": untold(len(model.untold_lines(scene, kernel.response)), tacton.duration),
     })  # fmt: skip
     told = [kernel] if waves is None or stale else [kernel, waves]
+    state.summary = summary(scene, told)
     state.update({"warnings": warnings(told), "expected": expected(told[-1])})
     seen = waves.moving if waves else None
     if seen is not None and not stale:
@@ -60,6 +65,38 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         })  # fmt: skip
     elif seen is None and state.body_motion:
         state.update({"body_shape": {}, "body_motion": {}})
+
+
+def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
+    """What propagation does, if a body's answer follows the kernel's, what the drive law does, and
+    what is strongest at the selected point.
+    """
+    new = added_names(scene.pressure)[:NAMED]
+    said = f"adds {', '.join(new)}, which the published load lacks" if new else "adds no component"
+    drive = f"The drive law ({scene.pressure.drive}), not propagation, {said}."
+    kernel, waves = answers[0], answers[-1]
+    if waves is kernel or not np.nansum(waves.map.rms):
+        return [drive]
+    share = 100 * share_outside(kernel.map.rms, waves.map.rms)
+    texts = [
+        f"Waves carry {share:.0f} % of the motion in this area to where the point kernel, under "
+        "the same load, predicts less than a tenth of its largest.",
+        drive,
+    ]
+    levels = {line: line.sensation for line in waves.lines if line.sensation is not None}
+    if levels:
+        line = max(levels, key=lambda each: levels[each])
+        texts.append(
+            f"Strongest at the selected point: {line.name}, {line.frequency:.0f} Hz, "
+            f"{levels[line]:+.0f} dB re threshold."
+        )
+    return texts
+
+
+def added_names(pressure: MovingPressure) -> list[str]:
+    """Lines of a load that it lacks as published: what drive law and focus add."""
+    before = named_lines(published(pressure))
+    return [name for name in named_lines(pressure, PRESENT) if name not in before]
 
 
 def warnings(answers: Sequence[Answer]) -> list[str]:
