@@ -157,7 +157,7 @@ def summary() -> None:
     """What propagation and the drive law do, in a sentence each."""
     with html.Div(v_if="summary.length", classes="sw-summary", id="summary",
                   raw_attrs=['aria-label="What propagation changes"']):  # fmt: skip
-        html.Span("{{ said }} ", v_for="said in summary", key="said")
+        html.Span("{{ said + ' ' }}", v_for="said in summary", key="said")
 
 
 def warnings() -> None:

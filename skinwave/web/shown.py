@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import MovingPressure, named_lines, published
+from simple_model.line_names import line_names
 from skinwave.propagation import share_outside
 from skinwave.scene import Body, Scene
 from skinwave.web import drawings, model, moving, plots
@@ -94,9 +95,12 @@ def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
 
 
 def added_names(pressure: MovingPressure) -> list[str]:
-    """Lines of a load that it lacks as published: what drive law and focus add."""
-    before = named_lines(published(pressure))
-    return [name for name in named_lines(pressure, PRESENT) if name not in before]
+    """Lines of a load that it lacks as published, the strongest first: what drive law and focus
+    add.
+    """
+    before, found = named_lines(published(pressure)), line_names(pressure, PRESENT)
+    names = [found.names[k] for k in np.argsort(-found.strengths, kind="stable")]
+    return [name for name in names if name not in before]
 
 
 def warnings(answers: Sequence[Answer]) -> list[str]:
