@@ -192,9 +192,8 @@ def _disagreements(verdicts: list[Verdict]) -> list[str]:
 
 OVERVIEW_CAPTION = (
     "Top: motion about its mean at one probe, relative to each model's largest motion at any "
-    "probe. Middle: its spectrum; markers are the Tacton's own lines, unmarked peaks are pairs "
-    "with 2 f_AM and the free vibration that the start of the Tacton leaves in a body. "
-    "Bottom: how far the motion spreads."
+    "probe. Middle: its spectrum; filled markers are lines of the load, open ones free vibrations "
+    "that the start of the Tacton leaves in a body. Bottom: how far the motion spreads."
 )
 
 
