@@ -30,6 +30,7 @@ iframe { border: 1px solid #ddd; width: 100%; height: 30em; } pre { white-space:
 @media print { body { margin: 0; padding: 0; max-width: none; font-size: 11px; }
   figure, tr, pre, .warning { break-inside: avoid; } h2, h3 { break-after: avoid; }
   .screen { display: none; }
+  details::details-content { content-visibility: visible; }
   .wide { overflow: visible; } table { font-size: 9px; width: 100%; } }
 </style></head><body>
 <h1>$title</h1>

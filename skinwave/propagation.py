@@ -52,7 +52,8 @@ class Propagation:
     Parameters
     ----------
     column : the body, as `Run.column`
-    strongest, kernel_strongest : the component above threshold by most, or the largest
+    strongest, kernel_strongest : the component of largest amplitude
+    felt_most : the component above threshold by most, None of what is not skin
     delay : float, s, of that component behind the kernel's at the probe next to the path where
         both move, or None
     share, spread, kernel_spread : of the maps, None where there is none
@@ -63,6 +64,7 @@ class Propagation:
     column: str
     strongest: Component | None
     kernel_strongest: Component | None
+    felt_most: Component | None
     delay: float | None
     share: float | None = None
     spread: Reach | None = None
@@ -97,6 +99,7 @@ def propagation(
         column=run.column,
         strongest=strongest,
         kernel_strongest=strongest_component(kernel),
+        felt_most=strongest_component(run, felt=True) if run.is_skin else None,
         delay=None if strongest is None else _delay(run, kernel, strongest.frequency),
     )
     if surface is None or kernel_surface is None or not surface.rms.any():
@@ -133,24 +136,26 @@ def distance_from_path(scene: Scene, surface: SurfaceMap) -> Floats:
     return np.asarray(cKDTree(path_points(scene, 1441)).query(surface.places)[0])
 
 
-def strongest_component(run: Run) -> Component | None:
-    """The line above threshold by most or, of what is not skin, the largest; None of none."""
+def strongest_component(run: Run, *, felt: bool = False) -> Component | None:
+    """The line of largest amplitude at any probe or, if `felt`, above threshold by most; None of
+    none.
+    """
     names = [name for name, f in run.frequencies.items() if f > 0]
     if not names:
         return None
     amplitudes = np.array([run.lines[name] for name in names])
     if not amplitudes.any():
         return None
-    skin = run.is_skin
     frequencies = np.array([run.frequencies[name] for name in names])
-    heard = sensation_level(amplitudes, frequencies[:, None]) if skin else amplitudes
+    levels = sensation_level(amplitudes, frequencies[:, None])
+    heard = levels if felt else amplitudes
     line, probe = np.unravel_index(int(np.argmax(heard)), heard.shape)
     return Component(
         name=names[line],
         frequency=float(frequencies[line]),
         amplitude=float(amplitudes[line, probe]),
         probe=int(probe),
-        level=float(heard[line, probe]) if skin else None,
+        level=float(levels[line, probe]) if run.is_skin else None,
     )
 
 

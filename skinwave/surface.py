@@ -41,7 +41,7 @@ class SurfaceMap:
     rms : (ny, nx) float, in `unit`, "m" or "Pa"; not a number off the body
     level : (ny, nx) float, dB, of the component that is above the threshold of detection by most,
         were the body skin; minus infinity of a pressure
-    h : float, metre, element size, 0 where there are no elements
+    note : str, how it was computed, if another way than the probes
     """
 
     x: Floats
@@ -49,7 +49,7 @@ class SurfaceMap:
     rms: Floats
     level: Floats
     unit: str
-    h: float = 0.0
+    note: str = ""
 
     @property
     def places(self) -> Floats:
@@ -91,13 +91,14 @@ def body_map(
     if not has_wavenumber_integral(scene):
         h = COARSER[scene.body.kind == "sheet"] * default_size(scene.body)
         moved = waves(scene, REDUCED, progress, h=h, solver=solver)
-        return replace(element_map(moved, x, y), h=h)
+        return replace(element_map(moved, x, y), note=f"elements of {1e3 * h:.2g} mm")
     compliance = exact_waves(scene.body, "flat-body-harmonic")
 
     def answer(places: Floats) -> Lines:
         return steady_lines(compliance, scene.pressure, places, threshold=FAINT)
 
-    return _mapped(scene.pressure, answer, x, y, "m")
+    found = _mapped(scene.pressure, answer, x, y, "m")
+    return replace(found, note="infinite layer")
 
 
 def has_wavenumber_integral(scene: Scene) -> bool:

@@ -206,7 +206,7 @@ def test_the_first_screen_says_what_each_difference_changes():
     assert "not propagation" in drive
     assert "Felt out to" in felt
     assert "half or twice the pressure" in felt
-    assert "over the presets of soft tissue the share is" in felt
+    assert "varied one by one, the share is" in felt
     rows = small_table(list(first.changes.values()), "one")
     assert f"{OUTSIDE:g} dB region" in rows
     assert rows.count("<tr>") == 6
@@ -222,6 +222,16 @@ def test_a_constant_pressure_at_rest_moves_nothing(drive):
     first = shown({"one": beside_kernels(run)}, quick_maps)
     assert sentences(first)[0].startswith("Nothing vibrates")
     assert small_table(list(first.changes.values()), "one")
+
+
+def test_the_strongest_component_is_one_of_amplitude_in_kernel_and_body():
+    """What is felt most follows from the threshold, which is not propagation's."""
+    scene = Scene(pressure=MovingPressure(tacton=circle(80, 0, 0)), body=Body())
+    _, kernel, run = beside_kernels(_run(scene, "flat-body-harmonic"))
+    found = propagation(run, kernel)
+    assert found.kernel_strongest.name == found.strongest.name == "f_AM"
+    assert found.felt_most.name == "2f_AM"
+    assert found.felt_most.amplitude < found.strongest.amplitude
 
 
 def test_paper_has_no_sensation_level():

@@ -42,8 +42,7 @@ def surfaces_figure(scene: Scene, surfaces: Mapping[str, SurfaceMap]) -> Figure:
             ax.plot(*path.T, color="white", ls="dotted", lw=1.3)
         else:
             ax.plot(*path.T, color="white", marker="+", ls="none")
-        of_elements = f" (elements of {1e3 * surface.h:.2g} mm)" * (surface.h > 0)
-        ax.set_title(label(column) + of_elements, fontsize=10)
+        ax.set_title(label(column) + f" ({surface.note})" * bool(surface.note), fontsize=10)
         ax.set_xlabel("x, mm")
         figure.colorbar(image, ax=ax, label=f"RMS about the mean, {unit}", shrink=0.85)
     axes[0].set_ylabel("y, mm")
@@ -61,5 +60,6 @@ def surfaces_figure(scene: Scene, surfaces: Mapping[str, SurfaceMap]) -> Figure:
 
 SURFACES = (
     "RMS of the steady vibration about its mean. Beyond the dashed line the point kernel predicts "
-    "less than a tenth of its largest; what the body moves there is what propagation adds."
+    "less than a tenth of its largest; what the body moves there is what propagation adds, "
+    "and what edges that reflect make of it."
 )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fem.materials import Material
 from meshes import cache
 from simple_model.response import SETTLE
 from skinwave.effort import versions
@@ -15,7 +16,8 @@ from skinwave.simulation import compute
 from skinwave.studies import paper15
 from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
 
-MATERIALS = ("forearm", "palm", "palm-stiff")  # presets of soft tissue, softest first
+# What is known of skin: its stiffness to a factor of 2, its loss to one of 5 between sources.
+STIFFER, LOSSIER = 2.0, 5**0.5
 Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's
 Maps = Callable[[Run], Drawn]
 FIRST = ("am140-stm20",)  # of the paper's Tactons, the one with both modulations in the middle
@@ -110,9 +112,11 @@ def element_maps(scene: Scene, solver: str) -> Drawn:
         ("x", "y", "rms", "level"),
     )
     if (entry := cache.load(name)) is not None:
-        return SurfaceMap(**{n: entry[n] for n in names}, unit="m", h=entry["meta"]["h"]), below
+        return SurfaceMap(
+            **{n: entry[n] for n in names}, unit="m", note=entry["meta"]["note"]
+        ), below
     surface = body_map(scene, x, y, solver=solver)
-    cache.store(name, {"h": surface.h}, **{n: getattr(surface, n) for n in names})
+    cache.store(name, {"note": surface.note}, **{n: getattr(surface, n) for n in names})
     return surface, below
 
 
@@ -136,13 +140,25 @@ def _error(run: Run) -> float:
 
 
 def _shares(scene: Scene) -> tuple[float, float] | None:
-    """Least and largest share outside the kernel's region over the presets of soft tissue."""
-    if scene.body.material not in MATERIALS or not has_wavenumber_integral(scene):
+    """Least and largest share outside the kernel's region where stiffness and loss, one at a time,
+    are as little and as much as is known of skin.
+    """
+    if not has_wavenumber_integral(scene):
         return None
+    solid = scene.body.solid
+    varied = [
+        solid,
+        *(_scaled(solid, k, ("shear_modulus", "viscosity", "relaxing_modulus"))
+          for k in (1 / STIFFER, STIFFER)),
+        *(_scaled(solid, k, ("viscosity", "loss_factor", "relaxing_modulus"))
+          for k in (1 / LOSSIER, LOSSIER)),
+    ]  # fmt: skip
     x, y = grid(scene)
     kernel = kernel_map(scene.pressure, x, y).rms
-    found = []
-    for material in MATERIALS:
-        softer = replace(scene, body=replace(scene.body, material=material))
-        found.append(share_outside(kernel, body_map(softer, x, y).rms))
+    bodies = [replace(scene, body=replace(scene.body, material=each)) for each in varied]
+    found = [share_outside(kernel, body_map(each, x, y).rms) for each in bodies]
     return min(found), max(found)
+
+
+def _scaled(solid: Material, factor: float, names: Sequence[str]) -> Material:
+    return replace(solid, **{name: factor * getattr(solid, name) for name in names})

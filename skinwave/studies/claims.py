@@ -87,7 +87,7 @@ def _single_line(runs: list[Run]) -> Judgement:
         worst < ABSENT,
         worst,
         ABSENT,
-        f"the strongest line beside f_AM is at {decibel(worst)} dB",
+        f"the strongest line beside f_AM is at {decibel(worst)} dB re f_AM",
     )
 
 

@@ -14,6 +14,7 @@ from skinwave import document
 from skinwave.effort import Progress
 from skinwave.files import fill
 from skinwave.models.prepared import Prepared
+from skinwave.numbers import decibel
 from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
 from skinwave.run import Run
 from skinwave.scene_file import dumps
@@ -78,6 +79,7 @@ def page_parts(
         document.section("What propagation changes", summary.per_tacton(changes(groups))),
         document.section(
             "Which of the paper's claims hold where",
+            document.paragraph(LEVELS),
             tables.claims_table(outcome.verdicts),
             *map(document.paragraph, _disagreements(outcome.verdicts)),
         ),
@@ -171,25 +173,31 @@ def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str
 
 def _disagreements(verdicts: list[Verdict]) -> list[str]:
     """Where a body contradicts what was measured on paper, and whether propagation is the cause."""
-    of_kernel = {v.claim: v.holds for v in verdicts if v.model == "point-kernel"}
+    of_kernel = {v.claim: v for v in verdicts if v.model == "point-kernel"}
     texts = []
     for verdict in verdicts:
-        if verdict.body != "none" and verdict.claim.startswith("M") and not verdict.holds:
-            alone = of_kernel.get(verdict.claim, False)
-            texts.append(
-                f"The {label(verdict.body)} contradicts {verdict.claim}, which was measured on "
-                f"paper: {verdict.sentence}. "
-                + (
-                    "The point kernel under the same load does not, so that propagation is the "
-                    "cause."
-                    if alone
-                    else "So does the point kernel under the same load: propagation is not the "
-                    "cause."
-                )
+        kernel = of_kernel.get(verdict.claim)
+        if verdict.body == "none" or not verdict.claim.startswith("M") or verdict.holds:
+            continue
+        text = (
+            f"The {label(verdict.body)} contradicts {verdict.claim}, which was measured on paper: "
+            f"{verdict.sentence}."
+        )
+        if kernel is not None and verdict.claim != "M2":  # which is about places, in Hz
+            same = "holds" if kernel.holds else "fails, too"
+            text += (
+                f" In the point kernel under the same load it {same}: what decides is "
+                f"{decibel(kernel.value)} dB there and {decibel(verdict.value)} dB here, and that "
+                "difference is propagation's."
             )
+        texts.append(text)
     return texts
 
 
+LEVELS = (
+    "Levels are relative to f_AM at the same probe, and those of the probe where that is largest, "
+    "which may be one where f_AM is weak."
+)
 OVERVIEW_CAPTION = (
     "Top: motion about its mean at one probe, relative to each model's largest motion at any "
     "probe. Middle: its spectrum; filled markers are lines of the load, open ones free vibrations "

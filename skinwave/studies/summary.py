@@ -15,6 +15,12 @@ from skinwave.scene import Body
 from skinwave.studies.changes import Shown
 
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
+ABOUT_MAPS = (
+    "Share of squared displacement and spread are of maps of 44 mm either way. A slab's is that of "
+    "an infinite layer; where only elements answer, the first Tacton alone has a map. Strongest is "
+    "the largest amplitude at any probe; a phase delay is known but for whole periods and includes "
+    "the phase of a body that is driven off resonance."
+)
 NAMED = 3  # lines that a sentence names
 
 
@@ -62,7 +68,7 @@ def small_table(columns: Sequence[Propagation], name: str) -> str:
         + ["0", *("-" if c.delay is None else significant(1e3 * c.delay, 2) for c in columns)],
         ["strongest component"]
         + [_component(first.kernel_strongest, "Pa"), *(_component(c.strongest) for c in columns)],
-        ["its sensation level, dB SL"] + ["-", *(_sensation(c.strongest) for c in columns)],
+        ["component felt most"] + ["-", *(_felt_most(c.felt_most) for c in columns)],
     ]
     return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
 
@@ -127,17 +133,17 @@ def _driven(kernel: Run, published: Run) -> str:
         )
     said = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
     return (
-        f"The drive law ({drive}), not propagation, adds the component{'s' * (len(names) > 1)} "
-        f"{said}: the kernel has {'them' if len(names) > 1 else 'it'} under the same load, and not "
-        "as published."
+        f"Drive law and focus ({drive}, {kernel.scene.pressure.focus}), not propagation, add the "
+        f"component{'s' * (len(names) > 1)} {said}: the kernel has "
+        f"{'them' if len(names) > 1 else 'it'} under the same load, and not as published."
     )
 
 
 def _felt(found: Propagation) -> str:
-    peak = found.strongest
-    if peak is None:
+    if found.strongest is None:
         return ""
-    if peak.level is None:
+    if (peak := found.felt_most) is None or peak.level is None:
+        peak = found.strongest
         return (
             f"The strongest component is {peak.name} at {peak.frequency:.0f} Hz; detection "
             "thresholds are of skin and say nothing of paper."
@@ -171,7 +177,7 @@ def _material(body: Body, shares: tuple[float, float] | None) -> str:
     if shares is None:
         return text
     least, most = (significant(100 * share, 2) for share in shares)
-    return f"{text}: over the presets of soft tissue the share is {least} to {most} %"
+    return f"{text}: with these, varied one by one, the share is {least} to {most} %"
 
 
 def _component(found: Component | None, unit: str = "m") -> str:
@@ -182,8 +188,10 @@ def _component(found: Component | None, unit: str = "m") -> str:
     return f"{found.name}, {found.frequency:.0f} Hz, {said}"
 
 
-def _sensation(found: Component | None) -> str:
-    return "-" if found is None or found.level is None else f"{found.level:+.0f}"
+def _felt_most(found: Component | None) -> str:
+    if found is None or found.level is None:
+        return "-"
+    return f"{found.name}, {found.frequency:.0f} Hz, {found.level:+.0f} dB SL"
 
 
 def _percent(share: float | None) -> str:
@@ -201,10 +209,11 @@ def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> str:
     rows = [
         [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
          "-" if c.delay is None else significant(1e3 * c.delay, 2),
-         _component(c.kernel_strongest, "Pa"), _component(c.strongest), _sensation(c.strongest)]
+         _component(c.kernel_strongest, "Pa"), _component(c.strongest), _felt_most(c.felt_most)]
         for name, columns in found.items()
         for c in columns.values()
     ]  # fmt: skip
     header = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
-    header += ["phase delay, ms", "strongest in kernel", "in body", "dB SL"]
-    return table(header, rows)
+    header += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
+    header += ["felt most"]
+    return paragraph(ABOUT_MAPS) + table(header, rows)

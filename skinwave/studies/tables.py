@@ -7,13 +7,16 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Effort
-from skinwave.comparison import compare
+from skinwave.comparison import compare, moving_rms
 from skinwave.document import paragraph, table
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label
 from skinwave.propagation import strongest_component
 from skinwave.run import Run
 from skinwave.studies.claims import TEXTS, Verdict
+
+SILENT = 0.01  # of the strongest probe: where the reference moves less, no misfit is given
+ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
 
 
 def claims_table(verdicts: list[Verdict]) -> str:
@@ -58,10 +61,12 @@ def _agreement(a: Run, b: Run) -> list[str]:
     strongest = strongest_component(b)
     found = compare(a.response, b.response, (strongest.frequency,) if strongest else ())
     delays = found.phase_delay[0] if strongest else np.array([np.nan])
+    level = moving_rms(a.response)
+    heard = level > SILENT * level.max()  # a misfit relative to nothing is none
     return [
-        _between(found.relative_l2),
-        _between(found.shape_misfit),
-        _between(1e3 * found.delay),
+        _between(found.relative_l2[heard]),
+        _between(found.shape_misfit[heard]),
+        _between(1e3 * found.delay[heard]),
         _between(1e3 * delays[np.isfinite(delays)]),
         f"{_spread(found.spread_reference)} to {_spread(found.spread_candidate)}",
     ]
@@ -71,6 +76,7 @@ def _between(values: Floats) -> str:
     """The least and the largest."""
     if not len(values):
         return "-"
+    values = np.where(np.abs(values) < ROUND_OFF, 0.0, values)
     low, high = (significant(float(v) + 0.0, 2) for v in (values.min(), values.max()))
     return low if low == high else f"{low} to {high}"
 
