@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import lstsq
 from scipy.signal import get_window
 
 from simple_model.trajectory import Floats
@@ -203,25 +202,15 @@ def fit_lines(
     t, x = response.times[:, None], response.displacement
     span = float(np.ptp(t[kept]))
     distinct, which = _distinct(frequencies, 1 / span)
-    waves = _waves(response.times, distinct[1:])
-    basis = np.hstack([np.ones_like(t), waves.real, waves.imag])
+    angle = 2 * np.pi * t * distinct[1:]
+    basis = np.hstack([np.ones_like(t), np.cos(angle), np.sin(angle)])
     window = _window(float(np.diff(distinct).min(initial=np.inf) * span))
     weighted = (basis[kept] * get_window(window, int(kept.sum()), fftbins=False)[:, None]).T
     normal = weighted @ basis[kept], weighted @ x[kept]
-    fitted = lstsq(*normal, cond=1e-13, lapack_driver="gelsy", check_finite=False)[0]
+    fitted = np.linalg.lstsq(*normal, rcond=1e-13)[0]
     cosine, sine = np.split(fitted[1:], 2)
     amplitudes = np.vstack([fitted[:1], cosine - 1j * sine])[which]
     return amplitudes, x - basis @ fitted
-
-
-def _waves(times: Floats, frequencies: Floats) -> NDArray[np.complex128]:
-    """exp(2 pi i f t) (t, f) at equally spaced times: rows of them, by the times within a row."""
-    row = int(np.ceil(np.sqrt(len(times))))
-    within = np.exp(2j * np.pi * np.outer(times[:row] - times[0], frequencies))
-    rows = np.exp(2j * np.pi * np.outer(times[::row], frequencies))
-    return np.asarray(
-        (rows[:, None] * within).reshape(len(rows) * row, len(frequencies))[: len(times)]
-    )
 
 
 def _window(bins: float) -> tuple[str, float]:

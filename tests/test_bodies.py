@@ -444,7 +444,7 @@ def test_tactons_are_compared_on_the_body_of_a_file(slab_file, tmp_path, monkeyp
     (tmp_path / "scene.toml").write_text(dumps(scene))
     arguments = ["compare", "scene.toml", "--body", "slab.vtu", "--unit", "m", "--out", "both"]
     assert main(arguments) == 0
-    assert "2 of 2 runs" in capsys.readouterr().out
+    assert "3 of 3 runs" in capsys.readouterr().out
     assert "mesh" in (tmp_path / "both/lines.csv").read_text()
     assert main(["compare", "scene.toml", "--body", "slap.vtu"]) == 2
     assert "is no file and none of" in capsys.readouterr().err

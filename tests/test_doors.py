@@ -141,7 +141,7 @@ def test_a_report_says_the_same(tmp_path, monkeypatch, capsys):
     said = answered(loads(SLAB), "fem", h=0.008).effort.warnings
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SLAB)
-    monkeypatch.setattr("skinwave.reports.album.shown_scenes", lambda scene: {"slab": scene})
+    monkeypatch.setattr("skinwave.reports.album.shown_scenes", lambda scene, _: {"slab": scene})
     assert main(["report", "scene.toml", "--h", "8", "--quiet"]) == 0
     shown = on_the_page(tmp_path / "scene-report/index.html")
     assert [x.split(" (slab")[0] for x in shown] == list(said)

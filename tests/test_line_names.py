@@ -29,7 +29,7 @@ from simple_model.response import SETTLE, fit_lines
 from skinwave.files import line_rows
 from skinwave.run import JUDGED, Run
 from skinwave.scene import BODIES, Body, Scene
-from skinwave.simulation import simulate
+from skinwave.simulation import compute
 
 TIMES = np.arange(6000) / 6000
 PLACES = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.002]]
@@ -314,7 +314,7 @@ def test_steady_lines_of_a_linear_body_are_those_of_its_load(seed):
         pressure=MovingPressure(tacton=tacton, drive=drive), body=Body(kind="slab"),
         probes=((0.0, 0.0), (0.01, 0.0), (0.02, 0.0)),
     )  # fmt: skip
-    response = simulate(scene, "flat-body-harmonic")
+    response = compute(scene, "flat-body-harmonic")
     table = line_table(scene.pressure, response)
     assert table.unresolved == {}
     assert table.unnamed == ()

@@ -280,7 +280,8 @@ def test_a_field_is_the_transients_everywhere():
     body = skinwave.Body(width=0.05, height=0.05, depth=0.01)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path))
     scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0),))
-    found = field(scene, np.arange(6) * 4e-3, tolerance=5e-3, h=0.005)
+    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 5 mm"):
+        found = field(scene, np.arange(6) * 4e-3, tolerance=5e-3, h=0.005)
     build = build_body(body, 0.005)
     ops = operators(build)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
