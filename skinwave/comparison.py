@@ -69,7 +69,7 @@ def compare(
     scale = 1.0 if fits else float((x * y).sum() / max((y * y).sum(), np.finfo(float).tiny))
     norm = np.linalg.norm(x, axis=0)
     delay, shape_misfit = _aligned(reference, candidate)
-    a, b = (_lines(response, frequencies) for response in (reference, candidate))
+    a, b = (heard_phasors(response, frequencies) for response in (reference, candidate))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = abs(scale) * np.abs(b) / np.abs(a)
     return Agreement(
@@ -104,7 +104,7 @@ def phase_delays(
     return found
 
 
-def _lines(response: Response, frequencies: tuple[float, ...]) -> np.ndarray:
+def heard_phasors(response: Response, frequencies: tuple[float, ...]) -> np.ndarray:
     """Complex amplitudes (f, p) of lines, 0 of what is round-off in the response."""
     if not frequencies:
         return np.zeros((0, len(response.probes)), np.complex128)

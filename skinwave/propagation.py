@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from meshes.tetmesh import Floats
 from simple_model import sensation_level
-from skinwave.comparison import compare
+from skinwave.comparison import heard_phasors, phase_delays
 from skinwave.pictures.views import path_points
 from skinwave.run import Run, is_skin
 from skinwave.scene import Scene
@@ -54,8 +54,8 @@ class Propagation:
     column : the body, as `Run.column`
     strongest, kernel_strongest : the component of largest amplitude
     felt_most : the component above threshold by most, None of what is not skin
-    delay : float, s, of that component behind the kernel's at the probe next to the path where
-        both move, or None
+    delay : float, s, of the strongest component behind the kernel's at the probe next to the path
+        where both move, or None
     share, spread, kernel_spread : of the maps, None where there is none
     felt : reach of what is above threshold with half the pressure, as it is, and with twice;
         None each where nothing is, and no tuple for what is not skin or has no map
@@ -177,7 +177,8 @@ def _levels(run: Run) -> dict[str, float]:
 
 def _delay(run: Run, kernel: Run, frequency: float) -> float | None:
     probes = run.response.probes[:, :2]
-    delays = compare(kernel.response, run.response, (frequency,)).phase_delay[0]
+    a, b = (heard_phasors(each.response, (frequency,)) for each in (kernel, run))
+    delays = phase_delays(a, b, np.array([frequency]), probes)[0]
     away = cKDTree(path_points(run.scene)).query(probes)[0]
     away[np.isnan(delays)] = np.inf
     nearest = int(np.argmin(away))
