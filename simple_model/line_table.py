@@ -9,7 +9,17 @@ from scipy.signal import get_window
 
 from simple_model.line_names import MOST, WEAKEST, LineNames, line_names
 from simple_model.pressure import MovingPressure
-from simple_model.response import SETTLE, Response, fit_lines, resolution, step, told_apart
+from simple_model.response import (
+    ALIKE,
+    SETTLE,
+    Response,
+    fit_lines,
+    hidden,
+    resolution,
+    step,
+    told_apart,
+    unmixed,
+)
 from simple_model.trajectory import Floats
 
 Mask = NDArray[np.bool_]
@@ -132,14 +142,16 @@ class _Fit:
 def _fit(found: LineNames, response: Response, settle: float) -> _Fit:
     f, least = found.frequencies, resolution(response, settle=settle)
     strengths = _floored(found)
-    resolved = told_apart(response, f, settle=settle, strengths=strengths)
     fitted = np.zeros(len(f), bool)
     for k in np.argsort(-strengths, kind="stable"):
         fitted[k] = f[k] >= least and not _near(f[k : k + 1], f[fitted], least)[0]
     amplitudes = np.zeros((len(f), response.displacement.shape[1]))
     complex_amplitudes, rest = fit_lines(response, f[fitted], settle=settle)
     amplitudes[fitted] = np.abs(complex_amplitudes)
-    return _Fit(resolved=resolved & fitted, fitted=fitted, amplitudes=amplitudes, rest=rest)
+    resolved = fitted & unmixed(f, strengths, least)
+    left = np.where(_near(f, f[fitted], ALIKE * least), 0.0, strengths)
+    resolved &= ~hidden(response, f, strengths, left, fitted, settle=settle)
+    return _Fit(resolved=resolved, fitted=fitted, amplitudes=amplitudes, rest=rest)
 
 
 def _peaks(response: Response, fit: _Fit, highest: float, settle: float) -> list[Unnamed]:

@@ -178,14 +178,50 @@ def told_apart(
 
     Frequencies that are the same, or as good as, are one line and need not be told apart; nor does
     a line from others that have, by their `strengths` (f,) if given, at most 5 % of it together.
+    Nor may those that are not told apart, and so not fitted, show as more than 5 % of it.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)
-    least = resolution(response, settle=settle)
+    told = unmixed(frequencies, strengths, resolution(response, settle=settle))
+    while True:
+        rest = np.where(told, 0.0, strengths)
+        clear = told & ~hidden(response, frequencies, strengths, rest, told, settle=settle)
+        if (clear == told).all():
+            return told
+        told = clear
+
+
+def unmixed(frequencies: Floats, strengths: Floats, least: float) -> NDArray[np.bool_]:
+    """Whether no other line within so many Hz as `least`, nor rest, has 5 % of each line (f,)."""
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
     mixed = (near & ~alike) @ strengths > MINOR * (alike @ strengths)
     return ~mixed & ((frequencies < 1e-9) | (frequencies >= least))
+
+
+def hidden(
+    response: Response,
+    frequencies: Floats,
+    strengths: Floats,
+    rest: Floats,
+    fitted: NDArray[np.bool_],
+    *,
+    settle: float = SETTLE,
+) -> NDArray[np.bool_]:
+    """Whether more than 5 % of each line (f,) may be side lobes of those that are not fitted, of
+    which there is so much (f,) as `rest`.
+    """
+    least = resolution(response, settle=settle)
+    distinct, _ = _distinct(frequencies[fitted], least)
+    x = np.pi * (frequencies[:, None] - frequencies[rest > 0]) / least
+    _, beta = _window(_closest(distinct, 1 / least))
+    return _kaiser_transform(x, beta) @ rest[rest > 0] > MINOR * strengths
+
+
+def _kaiser_transform(x: Floats, beta: float) -> Floats:
+    """|W(x)| / W(0) of a Kaiser window, x pi times bins (Kaiser & Schafer 1980, eq. 2)."""
+    root = np.sqrt(beta**2 - x**2 + 0j) + 1e-9
+    return np.abs(np.sinh(root) / root) * (beta / np.sinh(beta) if beta else 1.0)
 
 
 def fit_lines(
@@ -204,13 +240,18 @@ def fit_lines(
     distinct, which = _distinct(frequencies, 1 / span)
     angle = 2 * np.pi * t * distinct[1:]
     basis = np.hstack([np.ones_like(t), np.cos(angle), np.sin(angle)])
-    window = _window(float(np.diff(distinct).min(initial=np.inf) * span))
+    window = _window(_closest(distinct, span))
     weighted = (basis[kept] * get_window(window, int(kept.sum()), fftbins=False)[:, None]).T
     normal = weighted @ basis[kept], weighted @ x[kept]
     fitted = np.linalg.lstsq(*normal, rcond=1e-13)[0]
     cosine, sine = np.split(fitted[1:], 2)
     amplitudes = np.vstack([fitted[:1], cosine - 1j * sine])[which]
     return amplitudes, x - basis @ fitted
+
+
+def _closest(frequencies: Floats, span: float) -> float:
+    """How many bins of a fitted time in s the closest of ascending frequencies are apart."""
+    return float(np.diff(frequencies).min(initial=np.inf) * span)
 
 
 def _window(bins: float) -> tuple[str, float]:

@@ -84,10 +84,10 @@ def prepare(
     name = _entry_name(body, build, probes, solver, tolerance)
     with clock("read from cache"):
         entry = cache.load(name)
-    found = _from_cache(entry, probes, clock) if entry else None
-    if found:
-        return found
     size, report = h or default_size(body), progress or silent
+    found = _from_cache(entry, probes, clock) if entry else None
+    if found:  # other sizes may make the same mesh
+        return replace(found, effort=replace(found.effort, h=size))
     return _prepared_anew(body, build, size, probes, clock, report, solver, tolerance, name)
 
 
