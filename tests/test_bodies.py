@@ -18,7 +18,7 @@ from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare
 from skinwave.cli import main
-from skinwave.models.bodies import build, default_size, has_layer, operators, surface_load
+from skinwave.models.bodies import build, has_layer, operators, surface_load
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Layer, Placement, Relief
 from skinwave.scene_file import dumps, loads
