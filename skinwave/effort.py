@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import active_children, get_context, parent_process
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -71,15 +71,10 @@ def helper() -> Iterator[Executor]:
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Linear algebra on one thread: in small products several wait for each other."""
-    with _pools().limit(limits=1, user_api="blas"):
-        yield
-
-
-@lru_cache(maxsize=1)
-def _pools() -> Any:
     from threadpoolctl import ThreadpoolController
 
-    return ThreadpoolController()
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        yield
 
 
 def as_worker() -> None:
@@ -114,8 +109,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 def threads() -> dict[str, str]:
     """How many threads linear algebra takes, by the environment variables that say so.
 
-    Sums in another order round otherwise, which a reduction of a body with little loss amplifies to
-    a part of its tolerance: 1e-5 of a sheet's motion. As many threads give the same digits again.
+    Sums in another order round otherwise; as many threads give the same digits again.
     """
     counted = getattr(os, "sched_getaffinity", None)
     usable = os.environ.get(THREADS[0]) or str(len(counted(0)) if counted else os.cpu_count() or 1)

@@ -12,7 +12,7 @@ from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
 from simple_model.sampling import shown
 from simple_model.steady import along_path, load_lines, path_knots, path_weights
-from skinwave.effort import Clock, Progress, peak_memory, silent, versions
+from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.models.bodies import Build, air, default_size, surface_load, surface_motion
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.scene import Body, Scene
@@ -88,7 +88,8 @@ def prepare(
     found = _from_cache(entry, probes, clock) if entry else None
     if found:  # other sizes may make the same mesh
         return replace(found, effort=replace(found.effort, h=size))
-    return _prepared_anew(body, build, size, probes, clock, report, solver, tolerance, name)
+    with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
+        return _prepared_anew(body, build, size, probes, clock, report, solver, tolerance, name)
 
 
 def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance: float) -> str:

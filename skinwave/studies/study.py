@@ -1,19 +1,19 @@
 """The main job: Tactons on several bodies, compared, in one folder."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from contextlib import ExitStack, nullcontext, suppress
+from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
-from meshes import cache
 from skinwave import document
 from skinwave.effort import Progress, helper, one_thread, peak_memory
 from skinwave.files import write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
-from skinwave.planning.assessment import assessed, coarser_body
+from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.simulation import check_knobs, compute
@@ -77,11 +77,10 @@ def run_study(
                 solid, h or default_size(solid)
             )  # refuses what cannot be meshed before any run
     started = time.perf_counter()
-    with helper() as aside, ExitStack() as threads:
-        coarser = _begun_coarser(scenes, aside, h, solver)
+    with helper() as aside, one_thread():
+        bodies = _begun_bodies(scenes, aside, progress, h, solver)
         maps = _begun_maps(scenes, aside, progress, solver)
-        groups, prepared, figures = _answered(scenes, folder, aside, coarser, progress, h, solver)
-        threads.enter_context(one_thread())
+        groups, prepared, figures = _answered(scenes, folder, aside, bodies, progress, h, solver)
         figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
         outcome = Outcome(
@@ -107,22 +106,49 @@ def run_study(
     return spent
 
 
-def _begun_coarser(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, h: float | None, solver: str
-) -> dict[Body, Future[None]]:
-    """The coarser meshes that answers are assessed by, begun aside and left in the cache."""
-    if cache.folder() is None:
-        return {}
-    solids = {s.body: s for group in scenes.values() for s in group.values()}
-    return {
-        body: aside.submit(_cache_coarser, scene, h, solver)
-        for body, scene in solids.items()
-        if body.kind != "none"
+Bodies = Callable[[Scene], tuple[Prepared, Coarser]]  # reduced, and the coarser one beside it
+
+
+def _begun_bodies(
+    scenes: Mapping[str, Mapping[str, Scene]],
+    aside: Executor,
+    progress: Progress,
+    h: float | None,
+    solver: str,
+) -> Bodies:
+    """The reduced bodies: the last is prepared here when it is first asked for, and what is aside
+    meanwhile are the others and the coarser ones that answers are assessed by.
+    """
+    every = [each for group in scenes.values() for each in group.items()]
+    solids = {s.body: (column, s) for column, s in every if s.body.kind != "none"}
+    *others, last = solids
+    begun = {body: aside.submit(_prepared, solids[body][1], h, solver) for body in others}
+    coarse = {
+        body: aside.submit(coarser_body, scene, h, solver=solver)
+        for body, (_, scene) in solids.items()
     }
 
+    @lru_cache
+    def here() -> Prepared:
+        column, scene = solids[last]
 
-def _cache_coarser(scene: Scene, h: float | None, solver: str) -> None:
-    coarser_body(scene, h, solver=solver)
+        def named(phase: str, fraction: float) -> None:
+            progress(f"{column}: {phase}", fraction)
+
+        return _prepared(scene, h, solver, named)
+
+    def bodies(scene: Scene) -> tuple[Prepared, Coarser]:
+        mine = here()  # before anything is waited for
+        found = begun[scene.body].result() if scene.body in begun else mine
+        return found, coarse[scene.body].result()
+
+    return bodies
+
+
+def _prepared(
+    scene: Scene, h: float | None, solver: str, progress: Progress | None = None
+) -> Prepared:
+    return prepare(scene.body, scene.probe_points, progress, h=h, solver=solver)
 
 
 def _begun_maps(
@@ -148,7 +174,7 @@ def _answered(
     scenes: Mapping[str, Mapping[str, Scene]],
     folder: Path,
     aside: Executor,
-    coarser: Mapping[Body, Future[None]],
+    bodies: Bodies,
     progress: Progress,
     h: float | None,
     solver: str,
@@ -164,10 +190,17 @@ def _answered(
         for k, (name, column, scene) in enumerate(
             sorted(every, key=lambda each: each[2].body.kind != "none")
         ):
-            new = scene.body.kind != "none" and column not in prepared
-            with nullcontext() if new else one_thread():
-                run = _answer(name, column, scene, prepared, coarser, progress, h, solver)
-                write_run(folder / name / column, run)
+            if scene.body.kind == "none":
+                response = compute(scene, column)
+            else:
+                prepared[column], coarser = bodies(scene)
+                found = answer(prepared[column], scene)
+                response = assessed(
+                    scene, found, prepared[column], h, solver=solver, compared=coarser
+                )
+            body = "none" if scene.body.kind == "none" else column
+            run = Run(tacton=name, body=body, scene=scene, response=response)
+            write_run(folder / name / column, run)
             groups.setdefault(name, []).append(run)
             if len(groups[name]) == len(scenes[name]):
                 figures[name] = aside.submit(tacton_png, name, groups[name])
@@ -175,28 +208,3 @@ def _answered(
     if not groups:
         raise KeyboardInterrupt
     return groups, prepared, figures
-
-
-def _answer(
-    name: str,
-    body: str,
-    scene: Scene,
-    prepared: dict[str, Prepared],
-    coarser: Mapping[Body, Future[None]],
-    progress: Progress,
-    h: float | None,
-    solver: str,
-) -> Run:
-    """One run; a body is prepared when it is first met."""
-    if scene.body.kind == "none":
-        return Run(tacton=name, body="none", scene=scene, response=compute(scene, body))
-    if body not in prepared:
-
-        def named(phase: str, fraction: float) -> None:
-            progress(f"{body}: {phase}", fraction)
-
-        prepared[body] = prepare(scene.body, scene.probe_points, named, h=h, solver=solver)
-    if scene.body in coarser:
-        coarser[scene.body].result()
-    response = assessed(scene, answer(prepared[body], scene), prepared[body], h, solver=solver)
-    return Run(tacton=name, body=body, scene=scene, response=response)
