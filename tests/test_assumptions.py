@@ -257,7 +257,9 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
         lambda scene: tuple(n for n in ladder(scene) if n not in ("flat", "one material")),
     )
     (tmp_path / "scene.toml").write_text(dumps(scene))
-    assert main(["relax", "scene.toml", "--h", "8", "--quiet"]) == 0
+    assert main(["relax", "scene.toml", "--h", "9", "--quiet"]) == 0
+    coarse = "elements of 9 mm are wider than twice the standard deviation of the focus"
+    assert coarse in capsys.readouterr().err
     record = json.loads((tmp_path / "scene-relaxed/relax.json").read_text())
     effects = {effect["name"]: effect for effect in record["effects"]}
     assert [e["waveform"] for e in record["effects"]] == sorted(
@@ -283,6 +285,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     assert {row["line"] for row in rows} >= {"f_AM", "2f_d", "f_d"}
     page = (tmp_path / "scene-relaxed/index.html").read_text()
     assert "What each assumption changes" in page
+    assert coarse in page
 
 
 def test_little_loss_is_that_of_layers_too():

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, metre, progress_of, summarise
+from skinwave.commands.common import add_output, metre, progress_of, summarise, warn
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -27,12 +27,13 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
+    from skinwave import document
     from skinwave.files import output_folder
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
     from skinwave.studies.assumptions import DEVICE_RATES, check_rate
     from skinwave.studies.relax import climb
-    from skinwave.studies.relax_page import sentence, write
+    from skinwave.studies.relax_page import efforts, sentence, write
 
     h = metre(options.h)
     check_knobs("auto", h=h)
@@ -51,9 +52,11 @@ def run(options: argparse.Namespace) -> int:
         with progress_of(options) as progress:
             found = climb(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
+    warnings = document.worst_warnings(efforts(found))
+    warn(warnings)
     sentences = [sentence(effect) for effect in found.effects()]
     failed = [f"'{rung.name}' failed: {rung.error}" for rung in found.rungs if rung.error]
-    summary = {"out": str(out), "sentences": sentences, "failed": failed}
+    summary = {"out": str(out), "sentences": sentences, "failed": failed, "warnings": warnings}
     summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
     return 0
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from simple_model import Effort
 from skinwave import document
 from skinwave.comparison import compare
 from skinwave.numbers import decibel, significant
@@ -48,6 +49,7 @@ def write(folder: Path, found: Ladder) -> None:
     drawn = png(figure(effects), dpi=130)
     (folder / "relax.png").write_bytes(drawn)
     parts = [
+        document.warnings_banner(efforts(found)),
         document.paragraph(
             "From the published model to the richest one that this scene has, one assumption after "
             "another. Waveforms are compared after the factor that fits best where one is a "
@@ -62,6 +64,11 @@ def write(folder: Path, found: Ladder) -> None:
     ]
     title = f"{found.scene.name}: assumptions, one by one"
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
+
+
+def efforts(found: Ladder) -> list[tuple[str, Effort]]:
+    """What each answer took, by the name of its rung."""
+    return [(rung.name, rung.response.effort) for rung in found.every if rung.response]
 
 
 def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]:
