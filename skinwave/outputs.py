@@ -126,6 +126,8 @@ def beside(out: Path, make: Callable[[Path], object], begin: str, end: str) -> P
     """A new path in the folder of `out`, with the permissions that new files have; `make` makes it
     and fails if it exists, be it a link.
     """
+    with contextlib.suppress(FileNotFoundError):
+        out.lstat()  # a name that is too long is refused now, not when all is written
     for _ in range(ATTEMPTS):
         path = out.with_name(f"{begin}{secrets.token_hex(4)}{end}")
         with contextlib.suppress(FileExistsError):
@@ -175,8 +177,13 @@ def _refuse_unwritable(out: Path, aside: Path | None, error: OSError, cure: str)
     other = error.filename is not None and not str(error.filename).startswith(ours)
     if not error.strerror or isinstance(error, ELSEWHERE) or (other and aside):
         return
+    raise unwritable(out, error, cure) from error
+
+
+def unwritable(out: Path, error: OSError, cure: str) -> ValueError:
+    """The sentence that a folder or file cannot be written."""
     room = "make room there or " * (error.errno in FULL)
-    raise ValueError(f"{out} cannot be written ({error.strerror}); {room}{cure}") from error
+    return ValueError(f"{out} cannot be written ({error.strerror}); {room}{cure}")
 
 
 def _kept(aside: Path, report: Sequence[str]) -> str:

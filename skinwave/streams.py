@@ -53,7 +53,7 @@ def explained(error: OSError) -> str:
     """What, why and cure of an error of the system, which says it without a place or a cure."""
     if not error.strerror:
         return str(error)
-    place = error.filename if error.filename is not None else "a file or standard output"
+    place = error.filename if error.filename is not None else "standard output or a file"
     cure = CURES.get(error.errno or 0, "check its name and place")
     return f"{place} cannot be read or written ({error.strerror}); {cure}"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from skinwave import marks, record
-from skinwave.outputs import output_file
+from skinwave.outputs import output_file, unwritable
 
 ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
 OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
@@ -30,17 +30,14 @@ def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
     ValueError
         If it is something else, holds files of others among its rows, or cannot be made.
     """
-    new = not out.exists() or (out.is_dir() and not any(out.iterdir()))
-    if not new:
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
         _refuse_foreign(out)
     try:
         (out / ROWS).mkdir(parents=True, exist_ok=True)
-        if new:
+        if not _is_recorded(out):
             record.write(out, command or {"typed": "", "name": "sweep", "options": {}})
     except OSError as error:
-        raise ValueError(
-            f"{out} cannot be written ({error.strerror}); choose another --out"
-        ) from None
+        raise unwritable(out, error, "choose another --out") from None
     return out
 
 
