@@ -119,6 +119,7 @@ def test_overwriting_replaces_only_when_all_is_written(scene, capsys):
     arguments = ["run", scene, "--out", "kept", "--overwrite"]
     known = ["--model", "point-kernel", "--quiet"]
     assert main([*map(str, arguments), *known]) == 0
+    capsys.readouterr()
     before = (scene.parent / "kept/record.json").stat()
     assert "solver 'nonsense' is unknown" in refused(capsys, *arguments, "--solver", "nonsense")
     assert (scene.parent / "kept/record.json").stat() == before
