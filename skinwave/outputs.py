@@ -209,10 +209,11 @@ def _make_parents(folder: Path, made: list[Path]) -> None:
 
 def _put_in_place(aside: Path, out: Path, there: tuple[int, int] | None) -> None:
     """Give what is written its name, unless the name has come to mean another folder."""
-    if _identity(out) != there or (there and marks.foreign(out)):
+    now = _identity(out)
+    if now is not None and (now != there or marks.foreign(out)):
         raise _Taken
     try:
-        if there is None:
+        if now is None:
             aside.rename(out)
         else:
             _exchange(aside, out)
