@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import skinwave
 from skinwave.commands import COMMANDS
+from skinwave.streams import CLOSED, explained, flushed, reader_gone
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
@@ -23,6 +24,7 @@ UNCACHED = (
 )  # which compute nothing, or always anew
 
 
+@flushed
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
@@ -34,13 +36,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with _cache_as_asked(options):
             return int(options.command(options))
-    except KeyboardInterrupt:
-        print("skinwave: interrupted; nothing was finished", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        kept = str(interrupt) or "nothing was finished"
+        print(f"skinwave: interrupted; {kept}", file=sys.stderr)
         return 1
     except (ValueError, ArithmeticError, MemoryError, OSError) as error:
+        if reader_gone(error):
+            return CLOSED
         if options.debug:
             raise
-        said = " ".join(str(error).split()) or "not enough memory; take larger elements"
+        text = explained(error) if isinstance(error, OSError) else str(error)
+        said = " ".join(text.split()) or "not enough memory; take larger elements"
         print(f"skinwave: {said}", file=sys.stderr)
         return 2
 

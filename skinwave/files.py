@@ -1,22 +1,19 @@
-"""What a run leaves in its folder, written aside and then renamed."""
+"""What a run leaves in its folder."""
 
-import contextlib
 import csv
 import json
 import os
 import re
 import shutil
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, astuple, fields
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 from simple_model import Effort
-from skinwave import record
+from skinwave import outputs, record
 from skinwave.run import Run
 from skinwave.scene_file import dumps
 from skinwave.studies.claims import Verdict
@@ -26,130 +23,57 @@ LINE_COLUMNS = (
     "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
 )  # fmt: skip
 RESERVED = ("figures", "overview", "propagation")  # what a study names itself
-
-
-@contextmanager
-def output_folder(out: Path, *, overwrite: bool = False) -> Iterator[Path]:
-    """A folder to write in, which becomes `out` when all is written.
-
-    Until then it is `<out>.partial`. An error removes it, with the folders above that were made
-    for it, and leaves what was there before untouched; only an interrupt or a killed process
-    leaves it behind, and the next one begins anew.
-
-    Raises
-    ------
-    ValueError
-        If `out` exists and may not be overwritten, or cannot be written.
-    """
-    out = Path(os.path.realpath(out))  # a link stays one, and points to what is written
-    _refuse_existing(out, overwrite)
-    aside = out.with_name(out.name + ".partial")
-    above = [folder for folder in aside.parents if not os.path.exists(folder)]
-    try:
-        if aside.exists():
-            shutil.rmtree(aside)
-        aside.mkdir(parents=True)
-        yield aside
-        _put_in_place(aside, out)
-    except Exception as error:
-        _remove(aside, above)
-        if isinstance(error, OSError) and error.strerror:
-            raise ValueError(
-                f"{out} cannot be written ({error.strerror}); make room there or choose --out"
-            ) from error
-        raise
-    except KeyboardInterrupt:
-        if not any(aside.iterdir()):
-            _remove(aside, above)
-        raise
-
-
-@contextmanager
-def output_file(out: Path, *, overwrite: bool = False) -> Iterator[IO[bytes]]:
-    """A file to write to, which becomes `out` when all is written; an error leaves no trace.
-
-    Raises
-    ------
-    ValueError
-        If `out` exists and may not be overwritten, or cannot be written.
-    """
-    out = Path(os.path.realpath(out))
-    if os.path.lexists(out) and (out.is_dir() or not overwrite):
-        cure = (
-            "is a folder; name a file" if out.is_dir() else "exists and is kept; pass --overwrite"
-        )
-        raise ValueError(f"{out} {cure} or choose another")
-    aside = out.with_name(out.name + ".partial")
-    try:
-        with open(aside, "wb") as file:
-            yield file
-        os.replace(aside, out)
-    except BaseException as error:
-        with contextlib.suppress(OSError):
-            aside.unlink()
-        if isinstance(error, OSError) and error.strerror:
-            raise ValueError(
-                f"{out} cannot be written ({error.strerror}); make room there or choose another"
-            ) from error
-        raise
-
-
-def _refuse_existing(out: Path, overwrite: bool) -> None:
-    if Path.cwd().is_relative_to(out):
-        raise ValueError(f"{out} holds the current folder; choose another --out")
-    if os.path.lexists(out) and not overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
-    if os.path.lexists(out) and not out.is_dir():
-        raise ValueError(f"{out} is a file; choose a folder with --out")
-
-
-def _put_in_place(aside: Path, out: Path) -> None:
-    """Rename what is written; what it replaces is put back if that fails."""
-    if not out.exists():
-        aside.rename(out)
-        return
-    kept = Path(tempfile.mkdtemp(prefix=f"{out.name}.replaced-", dir=out.parent), out.name)
-    try:
-        out.rename(kept)
-        aside.rename(out)
-    except OSError:
-        if kept.exists():
-            kept.rename(out)
-        kept.parent.rmdir()
-        raise
-    shutil.rmtree(kept.parent, ignore_errors=True)
-
-
-def _remove(aside: Path, above: Iterable[Path]) -> None:
-    """A folder, and those above it that are empty then."""
-    shutil.rmtree(aside, ignore_errors=True)
-    with contextlib.suppress(OSError):
-        for folder in above:
-            folder.rmdir()
+DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # of Windows
+LONGEST, MOST_BYTES = 80, 200  # of a name, which gets an ending and is limited to 255 bytes
 
 
 def folder_name(name: str) -> str:
-    """A scene's name as that of a folder: within the one above it, and none that a study has."""
-    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:80]
-    return plain if plain not in ("", *RESERVED) else f"scene_{plain}"
+    """A scene's name as that of a folder or file on any system: within the folder above it, no
+    device of Windows, without dots, and none that a study has, in capitals or not.
+    """
+    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:LONGEST]
+    plain = plain.encode()[:MOST_BYTES].decode(errors="ignore").strip()
+    taken = plain.casefold() in ("", *RESERVED) or DEVICES.fullmatch(plain)
+    return f"scene_{plain}" if taken else plain
 
 
-def write_run(folder: Path, run: Run) -> None:
-    """The folder of one run; all or nothing."""
-    aside = folder.with_name(folder.name + ".part")
-    aside.mkdir(parents=True)
-    fill(aside, run)
-    os.replace(aside, folder)
+def distinct_names(names: Iterable[str]) -> list[str]:
+    """The `folder_name` of each, no two alike on a system for which capitals are small letters."""
+    found: dict[str, str] = {}
+    for name in map(folder_name, names):
+        other, k = name, 1
+        while other.casefold() in found:
+            k += 1
+            other = f"{name}_{k}"
+        found[other.casefold()] = other
+    return [*found.values()]
+
+
+def write_run(
+    folder: Path, run: Run, *, by: str = "compute", also: Callable[[Path], object] | None = None
+) -> None:
+    """The folder of one run, all or nothing; `also` writes more into it."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    aside = outputs.beside(folder, Path.mkdir, f"{folder.name}.partial-", "")
+    try:
+        fill(aside, run, by=by)
+        if also:
+            also(aside)
+        os.replace(aside, folder)
+    except BaseException:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise
 
 
 def fill(folder: Path, run: Run, *, by: str = "compute") -> None:
     """scene.toml, responses.npz, lines.csv, effort.json and record.json of one run, into an empty
     folder; `by` is how its model was computed, as in `record.of_model`.
     """
-    (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
     write_responses(folder / record.RESPONSES[0], {"displacement": run, run.model: run})
     write_lines(folder / "lines.csv", [run])
     write_effort(folder / "effort.json", run.response.effort)
+    # Only then is it a result for whoever looks for scenes in a folder that was left half-written.
+    (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
     command = record.of_model(run, by)
     record.write(folder, command, scene=run.scene, response=run.response)
 

@@ -116,13 +116,15 @@ def test_what_exists_is_kept(scene, capsys):
 
 
 def test_overwriting_replaces_only_when_all_is_written(scene, capsys):
-    (scene.parent / "kept").mkdir()
-    (scene.parent / "kept/note.txt").write_text("mine")
     arguments = ["run", scene, "--out", "kept", "--overwrite"]
+    known = ["--model", "point-kernel", "--quiet"]
+    assert main([*map(str, arguments), *known]) == 0
+    capsys.readouterr()
+    before = (scene.parent / "kept/record.json").stat()
     assert "solver 'nonsense' is unknown" in refused(capsys, *arguments, "--solver", "nonsense")
-    assert (scene.parent / "kept/note.txt").read_text() == "mine"
-    assert main([*map(str, arguments), "--model", "point-kernel", "--quiet"]) == 0
-    assert not (scene.parent / "kept/note.txt").exists()
+    assert (scene.parent / "kept/record.json").stat() == before
+    assert main([*map(str, arguments), *known]) == 0
+    assert (scene.parent / "kept/record.json").stat().st_ino != before.st_ino
     assert (scene.parent / "kept/index.html").exists()
     assert sorted(p.name for p in scene.parent.iterdir()) == ["kept", "short.toml"]
 

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from meshes import cache
-from skinwave import read
+from skinwave import read, record
 from skinwave.cli import main
+from skinwave.outputs import output_folder
 from skinwave.planning.plan import Plan
 from skinwave.scene import BODIES
 
@@ -66,7 +67,7 @@ def opens(folder):
 
 def finished(partial):
     """Folders of the runs that were finished before a kill."""
-    return [p for p in partial.glob("*/*") if p.is_dir() and p.suffix != ".part"]
+    return [p for p in partial.glob("*/*") if p.is_dir() and ".partial-" not in p.name]
 
 
 def started(**where):
@@ -97,23 +98,26 @@ def test_a_killed_comparison_leaves_whole_parts_and_runs_again(folder, monkeypat
             (kept,) = folder.glob("out.replaced-*/out")
             assert opens(kept)
             kept.rename(folder / "out")
-        for part in finished(folder / "out.partial"):
-            assert opens(part)
+        for left in folder.glob("out.partial-*"):
+            assert all(map(opens, finished(left)))
+            shutil.rmtree(left)
         if k % 4 == 3:
             with started() as again:
                 assert again.wait() == 0
             assert opens(folder / "out")
-            assert not (folder / "out.partial").exists()
+            assert not [*folder.glob("out.partial-*")]
 
 
 def test_a_killed_run_leaves_nothing_that_stops_the_next(folder, capsys):
     arguments = ["run", "good.toml", "--model", "point-kernel", "--tolerance", "0.9", "--quiet"]
-    for left in ("out.partial", "out.partial.part", "out.partial/small"):
+    for left in ("out.partial", "out.partial-01234567", "out.partial/small"):
         (folder / left).mkdir(parents=True)
         (folder / left / "responses.npz").write_bytes(b"half")
+    before = contents(folder)
     assert main([*arguments, "--out", "out"]) == 0
     assert opens(folder / "out")
-    assert not (folder / "out.partial").exists()
+    shutil.rmtree(folder / "out")
+    assert contents(folder) == before  # also that of another run, or of the user's
 
 
 def test_what_a_killed_process_leaves_in_the_cache_is_rebuilt(tmp_path, monkeypatch):
@@ -141,6 +145,13 @@ def refused(capsys, folder, arguments):
     return said[0]
 
 
+def marked(out):
+    """A folder that this program may replace, with a page of an earlier result."""
+    with output_folder(out) as folder:
+        (folder / "index.html").write_text("earlier")
+        record.write(folder, {"typed": "", "name": "run", "options": {}})
+
+
 FAILING = ["numpy.savez", "pathlib.Path.write_text", "pathlib.Path.write_bytes", "os.replace",
            "pathlib.Path.rename", "csv.writer", "pathlib.Path.mkdir"]  # fmt: skip
 
@@ -152,8 +163,7 @@ def test_a_full_or_read_only_disk_is_said_and_nothing_is_left(
     folder, capsys, monkeypatch, existing, what, code
 ):
     if existing:
-        (folder / "above/out").mkdir(parents=True)
-        (folder / "above/out/note").write_text("mine")
+        marked(folder / "above/out")
 
     def fails(*arguments, **options):
         raise OSError(code, os.strerror(code))
@@ -199,8 +209,7 @@ def disk(folder):
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
     if sys.platform != "linux" or subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("no disk can be mounted here")
-    (place / "out").mkdir()
-    (place / "out/note").write_text("mine")
+    marked(place / "out")
     yield place
     subprocess.run(["umount", str(place)], check=True)
 

@@ -25,7 +25,9 @@ TOLERANCE = "relative error of waveforms"
 def add_output(parser: argparse.ArgumentParser) -> None:
     """Where and how results are written."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing folder")
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace a folder that skinwave wrote"
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     add_reporting(parser)
 

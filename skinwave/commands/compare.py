@@ -32,7 +32,8 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave import record
-    from skinwave.files import folder_name, output_folder
+    from skinwave.files import folder_name
+    from skinwave.outputs import output_folder
     from skinwave.pictures.figures import label
     from skinwave.scene import with_body
     from skinwave.scene_file import read
@@ -51,8 +52,11 @@ def run(options: argparse.Namespace) -> int:
         scenes = own_scenes(scene, folder_name(scene.name))
     against = " and ".join(label(body) for body in bodies or paper15.MEASURED_ON)
     out = options.out or Path("paper-15" if paper else f"{Path(options.scene).stem}-compared")
+    inputs = [] if paper else [options.scene]
+    inputs += [body.file for body in (bodies or {}).values()]
+    inputs += [scene.body.file] if scene else []
     with (
-        output_folder(out, overwrite=options.overwrite) as folder,
+        output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder,
         progress_of(options) as progress,
     ):
         outcome = run_study(

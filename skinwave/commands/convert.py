@@ -23,7 +23,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave.files import output_file
+    from skinwave.outputs import output_file
     from skinwave.patterns import Options, convert
     from skinwave.scene_file import read
 
@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
         scale=options.scale,
     )
     base = read(options.scene) if options.scene else None
-    with output_file(options.target, overwrite=options.overwrite) as file:
+    inputs = [options.source, *([options.scene] if options.scene else [])]
+    with output_file(options.target, overwrite=options.overwrite, inputs=inputs) as file:
         content, notes = convert(options.source, options.target, asked, base)
         file.write(content)
     summary = {"out": str(options.target), "bytes": len(content), "notes": notes}

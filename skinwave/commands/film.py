@@ -43,6 +43,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
+    from skinwave.outputs import output_path
     from skinwave.pictures.films import check_format, film, seam
     from skinwave.pictures.renderer import renderer
     from skinwave.pictures.styles import style
@@ -50,20 +51,16 @@ def run(options: argparse.Namespace) -> int:
     source = options.source
     out = options.out or Path(f"{source.resolve().stem}.gif")
     check_format(out)
-    if out.exists() and not options.overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
     if options.frames is not None and not 2 <= options.frames <= 1000:
         raise ValueError(f"frames = {options.frames} is outside 2..1000; a film needs a few")
     if not renderer().found:
         raise ValueError(f"there is nothing to draw a film with: {renderer().said}")
-    with progress_of(options) as progress:
+    with (
+        output_path(out, overwrite=options.overwrite, inputs=[source]) as aside,
+        progress_of(options) as progress,
+    ):
         views = _views(options, progress)
-        aside = out.with_name(f"{out.stem}.partial{out.suffix}")
-        try:
-            film(aside, views, style(options.style), progress, camera=options.camera)
-            aside.replace(out)
-        finally:
-            aside.unlink(missing_ok=True)
+        film(aside, views, style(options.style), progress, camera=options.camera)
     summary = {"out": str(out), "frames": len(views[0].times), "period_ms": 1e3 * views[0].period}
     summarise(options, summary, f"{len(views[0].times)} frames of {seam(views[0])}; wrote {out}")
     return 0

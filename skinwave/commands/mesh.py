@@ -30,16 +30,18 @@ def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from meshes import body_from_file, dihedral_angles, write
     from meshes.files import WRITTEN
+    from skinwave.outputs import output_path
 
     out = options.out or Path(f"{options.file.stem}-mesh.vtu")
     if out.suffix.lower() not in WRITTEN:
         raise ValueError(f"{out} cannot be written; name a file that ends in .vtu or .msh")
-    if out.is_dir() or (out.exists() and not options.overwrite):
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
     if not out.parent.is_dir():
         raise ValueError(f"{out.parent} is no folder; make it or choose another --out")
     said: list[str] = []
-    with progress_of(options) as progress:
+    with (
+        output_path(out, overwrite=options.overwrite, inputs=[options.file]) as aside,
+        progress_of(options) as progress,
+    ):
         mesh = body_from_file(
             options.file, options.h / 1e3,
             unit=options.unit, up=options.up, timeout=options.timeout, say=said.append,
@@ -47,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
             clip=None if options.clip is None else [side / 1e3 for side in options.clip],
         )  # fmt: skip
         progress("writing", 0.9)
-        write(out, mesh)
+        write(aside, mesh)
     summary = {
         "out": str(out),
         "tetrahedra": len(mesh.tets),

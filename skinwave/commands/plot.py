@@ -23,6 +23,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=FORMATS, default="png")
     parser.add_argument("--style", default="report", help="report, talk or print")
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: DIR/figures")
+    parser.add_argument("--overwrite", action="store_true", help="replace figures in that folder")
     parser.add_argument("--quiet", action="store_true", help="no summary")
     add_reporting(parser)
 
@@ -32,7 +33,8 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.sweeps import dataset, engine
 
     engine.check("threads")
-    from skinwave.files import folder_name, output_file
+    from skinwave.files import distinct_names
+    from skinwave.outputs import output_file
     from skinwave.pictures.figures import drawn
     from skinwave.pictures.styles import style
     from skinwave.sweeps.sweep_figures import (
@@ -55,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     if options.preset == "speed":
         figures["speed"] = speed_figure(rows, by, chosen)
     for column in options.column or ([] if figures else ["peak_um"]):
-        name = folder_name(f"{column} over {x}" + (f" and {by}" if by else ""))
+        name = f"{column} over {x}" + (f" and {by}" if by else "")
         if not options.heat:
             figures[name] = line_figure(rows, column, x, by, chosen)
         elif by:
@@ -63,10 +65,13 @@ def run(options: argparse.Namespace) -> int:
         else:
             raise ValueError("a map needs two varied keys; leave out --heat or give --by")
     out = options.out or options.folder / "figures"
+    # The figures inside a sweep's folder are this command's own, and drawn anew.
+    anew = options.overwrite or options.out is None
     out.mkdir(parents=True, exist_ok=True)
-    paths = [out / f"{name.replace(' ', '-')}.{options.format}" for name in figures]
+    names = distinct_names(name.replace(" ", "-") for name in figures)
+    paths = [out / f"{name}.{options.format}" for name in names]
     for path, figure in zip(paths, figures.values(), strict=True):
-        with output_file(path, overwrite=True) as file:
+        with output_file(path, overwrite=anew) as file:
             file.write(drawn(figure, options.format, chosen.dpi))
     said = "\n".join(f"wrote {path}" for path in paths)
     summarise(options, {"figures": [str(path) for path in paths], "runs": len(rows)}, said)

@@ -27,8 +27,8 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave import document
-    from skinwave.files import output_folder
+    from skinwave import document, record
+    from skinwave.outputs import output_folder
     from skinwave.scene_file import read
     from skinwave.simulation import check_knobs
     from skinwave.studies.assumptions import DEVICE_RATES, check_rate
@@ -48,10 +48,12 @@ def run(options: argparse.Namespace) -> int:
         return _mechanisms(options, h)
     scene = read(options.scene)
     out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
-    with output_folder(out, overwrite=options.overwrite) as folder:
+    inputs = [options.scene, scene.body.file]
+    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
             found = climb(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
+        record.write(folder, record.of_command(options), scene=scene)
     warnings = document.worst_warnings(efforts(found))
     warn(warnings)
     sentences = [sentence(effect) for effect in found.effects()]
@@ -62,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _mechanisms(options: argparse.Namespace, h: float | None) -> int:
-    from skinwave.files import output_folder
+    from skinwave import record
+    from skinwave.outputs import output_folder
     from skinwave.studies.mechanisms import paper_vs_skin, sentences, write
 
     out = options.out or Path("paper-vs-skin")
@@ -70,6 +73,7 @@ def _mechanisms(options: argparse.Namespace, h: float | None) -> int:
         with progress_of(options) as progress:
             found = paper_vs_skin(progress, h=h)
         write(folder, found)
+        record.write(folder, record.of_command(options))
     said = [*sentences(found), *found.failed]
     summary = {"out": str(out), "sentences": said, "failed": list(found.failed)}
     summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))

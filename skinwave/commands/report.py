@@ -31,7 +31,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave import record
-    from skinwave.files import output_folder
+    from skinwave.outputs import output_folder
     from skinwave.pictures.styles import style
     from skinwave.reports.scene_report import write_report
     from skinwave.scene_file import read
@@ -39,10 +39,11 @@ def run(options: argparse.Namespace) -> int:
     source, made = options.source, options.source.is_dir()
     scene = None if made else read(source)
     out = options.out or (source / "report" if made else Path(f"{source.stem}-report"))
+    inputs = [source, scene.body.file if scene else ""]
     # The report inside a result folder is this command's own, and made anew.
     anew = options.overwrite or (made and options.out is None)
     with (
-        output_folder(out, overwrite=anew) as folder,
+        output_folder(out, overwrite=anew, inputs=inputs, report=_drawn(options)) as folder,
         progress_of(options) as progress,
     ):
         if scene is not None:
@@ -62,6 +63,12 @@ def run(options: argparse.Namespace) -> int:
     summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
     summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")
     return 0
+
+
+def _drawn(options: argparse.Namespace) -> list[str]:
+    """The options by which it is drawn, where they are not the defaults."""
+    words = [] if options.style == "report" else ["--style", options.style]
+    return words + [word for kind in options.format if kind != "png" for word in ("--format", kind)]
 
 
 def _again(options: argparse.Namespace) -> str:

@@ -25,11 +25,14 @@ def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave import record
     from skinwave.effort import threads
+    from skinwave.marks import within
 
     kept = record.read(options.folder)
     if kept["threads"] != threads():  # which are set when a process begins
         return _with_threads(options, kept["threads"])
     folder = options.folder.resolve()
+    if options.out and within(folder, options.out):
+        raise ValueError(f"{options.out} holds the result that is repeated; choose another --out")
     out = options.out or folder.with_name(f"{folder.name}-rerun")
     with tempfile.TemporaryDirectory() as place:
         scene = Path(place) / "scene.toml"
@@ -56,7 +59,7 @@ def _command_again(
     place = "source" if "source" in asked else "scene"
     given = str(scene) if kept["scene"] is not None else asked.get(place)
     try:
-        again = parser().parse_args([name, str(given)])
+        again = parser().parse_args([name] if given is None else [name, str(given)])
     except SystemExit:
         raise ValueError(f"the record's command '{name}' is none that can be repeated") from None
     vars(again).update({key: value for key, value in asked.items() if key != place})
@@ -71,7 +74,8 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     from dataclasses import replace
     from math import nan
 
-    from skinwave.files import fill, output_folder
+    from skinwave.files import fill
+    from skinwave.outputs import output_folder
     from skinwave.pictures.motion import probe_response, waves
     from skinwave.run import Run
     from skinwave.scene_file import read
@@ -80,7 +84,9 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     asked, by = kept["command"]["options"], kept["command"]["name"]
     its, h, solver = read(scene), asked["h"], asked["solver"]
     with (
-        output_folder(out, overwrite=options.overwrite) as folder,
+        output_folder(
+            out, overwrite=options.overwrite, inputs=[options.folder, its.body.file]
+        ) as folder,
         progress_of(options) as progress,
     ):
         if by == "waves":

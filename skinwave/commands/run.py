@@ -33,7 +33,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
     from skinwave import record
-    from skinwave.files import output_folder
+    from skinwave.outputs import output_folder
     from skinwave.run import Run
     from skinwave.scene import BODIES
     from skinwave.scene_file import read
@@ -43,7 +43,9 @@ def run(options: argparse.Namespace) -> int:
     scene = read(options.scene)
     known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
-    with output_folder(out, overwrite=options.overwrite) as folder:
+    with output_folder(
+        out, overwrite=options.overwrite, inputs=[options.scene, scene.body.file]
+    ) as folder:
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
             required = required_plan(options, scene, progress)
             response = follow(

@@ -52,6 +52,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
+    from skinwave import record
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
@@ -69,8 +70,9 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{options.scene.stem}-sweep")
     with _progress(options, len(wanted)) as progress:
         found = sweep(
-            wanted, out, knobs, progress, scheduler=options.scheduler, workers=options.workers
-        )
+            wanted, out, knobs, progress, scheduler=options.scheduler, workers=options.workers,
+            command=record.of_command(options),
+        )  # fmt: skip
     if options.csv and found.planned > found.missing:
         dataset.write_csv(out, dataset.read(out))
     summary = {

@@ -14,16 +14,19 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave.files import output_folder
+    from skinwave import record
+    from skinwave.outputs import output_folder
     from skinwave.scene_file import read
     from skinwave.studies.tradeoff import sentences, study, write
 
     scene = read(options.scene)
     out = options.out or Path(f"{options.scene.stem}-tradeoff")
-    with output_folder(out, overwrite=options.overwrite) as folder:
+    inputs = [options.scene, scene.body.file]
+    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
             found = study(scene, progress)
         write(folder, scene, found)
+        record.write(folder, record.of_command(options), scene=scene)
     summary = {"out": str(out), "accepted": found.accepted, "sentences": sentences(found)}
     summarise(options, summary, "\n".join([*sentences(found), f"open {out}/index.html"]))
     return 0

@@ -14,7 +14,8 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it; the exit code."""
-    from skinwave.files import output_folder
+    from skinwave import record
+    from skinwave.outputs import output_folder
     from skinwave.verify.page import summary_table
     from skinwave.verify.suite import run_suite, suite
 
@@ -27,6 +28,7 @@ def run(options: argparse.Namespace) -> int:
         results = run_suite(
             entries, folder, progress, left_out=len(suite()) - len(entries), debug=options.debug
         )
+        record.write(folder, record.of_command(options))
     failed = [result.entry.name for result in results if not result.case.passed]
     summary = {
         "out": str(out),

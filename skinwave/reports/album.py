@@ -7,6 +7,7 @@ COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.fields import assessed_probes
-from skinwave.files import fill, write_lines
+from skinwave.files import write_lines, write_run
 from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.pictures.motion import Waves, waves
@@ -116,14 +117,16 @@ def make(
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs = []
     for view, run in answers(scene, shown, progress, h=h, solver=solver, frames=frames):
-        (folder / run.column).mkdir()
-        fill(folder / run.column, run, by="waves")
-        if view is not None:
-            save(folder / run.column / "view.npz", view)
+        also = None if view is None else partial(_keep_view, view)
+        write_run(folder / run.column, run, by="waves", also=also)
         runs.append(run)
     write_lines(folder / "lines.csv", runs)
     _plan(folder, scene, runs, progress, solver, command)
     return worst_warnings((run.body, run.response.effort) for run in runs)
+
+
+def _keep_view(view: View, folder: Path) -> None:
+    save(folder / "view.npz", view)
 
 
 def answers(

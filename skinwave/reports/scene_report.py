@@ -10,6 +10,7 @@ import numpy as np
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
+from skinwave.files import distinct_names
 from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
@@ -121,9 +122,11 @@ def _maps(album: Album, run: Run) -> Drawn:
 def _write_data(folder: Path, album: Album) -> None:
     """Probes, their sound and, of every view, a few frames of its field."""
     folder.mkdir()
-    for name, runs in tactons(album).items():
+    groups = tactons(album)
+    names = distinct_names(groups) if len(groups) > 1 else [""]
+    for name, runs in zip(names, groups.values(), strict=True):
         for k, run in enumerate(runs):
-            stem = run.column if len(tactons(album)) == 1 else f"{name}-{run.column}"
+            stem = f"{name}-{run.column}" if name else run.column
             write_probes(folder / f"{stem}_probes", run.response)
             if k == len(runs) - 1:
                 write_sound(folder, run.response, strongest_probe([run]))

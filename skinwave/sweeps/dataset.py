@@ -1,40 +1,93 @@
 """Rows of a sweep on disk: small Parquet files in one folder, read as one table.
 
-Each file is written aside and renamed, so that what is there is whole; nothing is ever rewritten.
+Each file is written aside and renamed, so that what is there is whole; none is ever rewritten, and
+two sweeps into one folder only add to it. A folder with other files among the rows is refused.
 """
 
 import csv
 import io
 import os
+import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from skinwave.files import output_file
+from skinwave import marks, record
+from skinwave.outputs import output_file, unwritable
 
-ROWS = "rows"  # the folder of the files within that of a sweep
-KEY, INDEX = "key", "index"  # the columns that name a row and that order rows
+ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
+OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
+KEY, INDEX, STATUS = "key", "index", "status"  # columns: a row's name, its place, how it ended
 
 Row = Mapping[str, Any]
 
 
-def open_folder(out: Path) -> Path:
-    """The folder of a sweep, made if it is new.
+def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
+    """The folder of a sweep, made if it is new, with a record of the `command`.
 
     Raises
     ------
     ValueError
-        If it is something else, or cannot be made.
+        If it is something else, holds files of others among its rows, or cannot be made.
     """
-    if out.exists() and not (out / ROWS).is_dir() and (not out.is_dir() or any(out.iterdir())):
-        raise ValueError(f"{out} exists and holds no sweep; choose another --out")
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        _refuse_foreign(out)
     try:
         (out / ROWS).mkdir(parents=True, exist_ok=True)
+        if not _is_recorded(out):
+            record.write(out, command or {"typed": "", "name": "sweep", "options": {}})
     except OSError as error:
-        raise ValueError(
-            f"{out} cannot be written ({error.strerror}); choose another --out"
-        ) from None
+        raise unwritable(out, error, "choose another --out") from None
     return out
+
+
+def _refuse_foreign(out: Path) -> None:
+    """Refuse a folder that is not that of a sweep, or whose rows are not all of sweeps."""
+    if not (out / ROWS).is_dir() or not (_is_recorded(out) or _visible(out) <= {*OWN}):
+        raise ValueError(f"{out} exists and holds no sweep; choose another --out")
+    files = [out / ROWS / name for name in sorted(_visible(out / ROWS))]
+    wrong = [p for p in files if not (p.match("part-*.parquet") and {KEY, STATUS} <= _columns(p))]
+    if os.path.lexists(out / CSV) and KEY not in _header(out / CSV):
+        wrong.append(out / CSV)
+    if wrong:
+        raise ValueError(
+            f"{wrong[0]} holds no rows of a sweep; move it elsewhere or choose another --out"
+        )
+
+
+def _is_recorded(out: Path) -> bool:
+    try:
+        return bool(record.read(out)["command"]["name"] == "sweep")
+    except (ValueError, KeyError):
+        return False
+
+
+def _visible(folder: Path) -> set[str]:
+    """Names in a folder, but for what systems and killed processes leave."""
+    hidden = marks.OF_SYSTEM
+    return {p.name for p in folder.iterdir() if p.name[0] != "." and p.name not in hidden}
+
+
+def _header(path: Path) -> list[str]:
+    """Names of the columns of a table in CSV; none of what is no regular file."""
+    if not path.is_file():
+        return []
+    with open(path, encoding="utf-8", errors="replace") as file:
+        return file.readline(10_000).strip().split(",")
+
+
+def _columns(path: Path) -> set[str]:
+    """Names of a Parquet file's columns; none of what is no such file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        return set()
+    try:
+        with open(path, "rb") as file:
+            return set(pq.read_schema(file).names)
+    except (OSError, pa.ArrowException):
+        return set()
 
 
 def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
@@ -54,10 +107,11 @@ def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
     }
     schema = pa.schema([(name, types[kind]) for name, kind in columns.items()])
     table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema)
-    place = out / ROWS / f"part-{rows[0][KEY]}.parquet"
-    aside = place.with_name(f".{place.name}.partial")  # readers of folders pass over dots
-    pq.write_table(table, aside)
-    os.replace(aside, place)
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink)
+    # Another sweep into the same folder may hold other rows after the same first one.
+    with output_file(out / ROWS / f"part-{rows[0][KEY]}-{secrets.token_hex(4)}.parquet") as file:
+        file.write(sink.getvalue())
 
 
 def read(out: Path) -> list[dict[str, Any]]:
@@ -104,7 +158,7 @@ def write_csv(out: Path, rows: Iterable[Row]) -> None:
     lines = csv.DictWriter(text, columns)
     lines.writeheader()
     lines.writerows(flat)
-    with output_file(out / "rows.csv", overwrite=True) as file:
+    with output_file(out / CSV, overwrite=True) as file:
         file.write(text.getvalue().encode())
 
 

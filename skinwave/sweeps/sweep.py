@@ -1,7 +1,7 @@
 """Many scenes in one table: which runs, each body prepared once, each run once."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
@@ -73,6 +73,7 @@ def sweep(
     *,
     scheduler: str = "processes",
     workers: int | None = None,
+    command: Mapping[str, Any] | None = None,
 ) -> Outcome:
     """Answer every case that the folder has no row of, and append a row for each.
 
@@ -82,6 +83,7 @@ def sweep(
     folder : a new one, or that of a sweep, which is gone on with
     scheduler : "processes", "threads", or the address of a Dask scheduler
     workers : how many runs go on at a time on this machine; all cores if not given
+    command : what a new folder's record.json says of how it was made, as `record.of_command`
 
     An interrupt ends it early; the rows that are written stay. An error of a run is its row.
 
@@ -96,7 +98,7 @@ def sweep(
     _check(knobs)
     engine.check(scheduler)
     count = engine.workers(scheduler, workers)
-    there = dataset.names(dataset.open_folder(folder))
+    there = dataset.names(dataset.open_folder(folder, command))
     release = version("skinwave")
     named = {case.name(release, knobs): case for case in wanted}
     left = {name: case for name, case in named.items() if name not in there}
