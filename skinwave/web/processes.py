@@ -1,0 +1,94 @@
+"""Processes of pages: started, told what to show, and ended with all that they have left."""
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import sys
+import tempfile
+from dataclasses import dataclass
+from typing import Any
+
+PATIENCE = 60.0  # s that a session may take to start
+# For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
+# limit to what was freed once, and a process that answers for hours fills with gaps.
+RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
+# -P: no module of the folder that the program was started in.
+COMMAND = (sys.executable, "-P", "-m", "skinwave.web.serve")
+FAILURES = (OSError, TimeoutError, ValueError)  # of a process that does not start
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PageProcess:
+    """A process, the port that it serves its page at, the page's password for it, and the folder
+    of its temporary files.
+    """
+
+    process: Any
+    port: int
+    password: str
+    folder: str
+
+
+async def started(folder: str) -> PageProcess:
+    """A process that waits for a page, its temporary files in a new folder within `folder`.
+
+    Raises
+    ------
+    OSError, TimeoutError, ValueError
+        If it does not start, or says something else than its port and password.
+    """
+    own = tempfile.mkdtemp(dir=folder)
+    process = None
+    try:
+        # In a session of its own: Ctrl-C in a terminal is for the server alone, which ends it.
+        process = await asyncio.create_subprocess_exec(
+            *COMMAND, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+            start_new_session=True,
+            env={**RETURNED, **os.environ, "WSLINK_READY_MSG": "",
+                 **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), own)},
+        )  # fmt: skip
+        assert process.stdout is not None
+        line = await asyncio.wait_for(process.stdout.readline(), PATIENCE)
+        port, password = line.decode().split()
+        return PageProcess(process=process, port=int(port), password=password, folder=own)
+    except BaseException:
+        if process is not None:
+            kill(process)
+            await process.wait()
+        shutil.rmtree(own, ignore_errors=True)
+        raise
+
+
+async def begun(page: PageProcess, asked: dict[str, Any]) -> PageProcess:
+    """The process once it shows what is asked: the text of a "scene", the "query" of an address.
+
+    Raises
+    ------
+    OSError, TimeoutError
+        If it does not; it has ended then.
+    """
+    try:
+        page.process.stdin.write((json.dumps(asked) + "\n").encode())
+        await page.process.stdin.drain()
+        if await asyncio.wait_for(page.process.stdout.readline(), PATIENCE) != b"ready\n":
+            raise OSError("the process of a page has ended")
+    except BaseException:
+        kill(page.process)
+        await gone(page)
+        raise
+    return page
+
+
+def kill(process: Any) -> None:
+    """End a process at once; what it has started ends as soon as it does."""
+    with contextlib.suppress(ProcessLookupError, RuntimeError, OSError):
+        process.stdin.close()
+        process.kill()
+
+
+async def gone(page: PageProcess) -> None:
+    """Wait for the end of a process, and remove its temporary files."""
+    await page.process.wait()
+    shutil.rmtree(page.folder, ignore_errors=True)
