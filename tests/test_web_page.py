@@ -744,13 +744,17 @@ def test_two_pages_do_not_disturb_each_other_and_ask_nothing_of_the_network(
 
 def test_a_lost_connection_is_said_and_comes_back(browser):
     process, address = served("--port", "0")
-    page, _ = opened(browser, address, "?am=71")
+    context = browser.new_context()
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(address + "&am=71")
+    page.wait_for_function(READY)
     ended(process)
     page.wait_for_selector("#sw-lost")
     again, new = served("--port", re.search(r":(\d+)/", address)[1])
     page.get_by_text("open the address that `skinwave web` has printed").wait_for()
-    page.context.new_page().goto(new)  # as --open does: it brings the new token
+    context.new_page().goto(new)  # as --open does: it brings the new token
     page.wait_for_function(READY)
     assert state(page, "am") == 71
-    page.close()
+    context.close()
     ended(again)

@@ -76,8 +76,7 @@ def policy(host: str) -> str:
 
 def printable(said: Any) -> str:
     """What someone else said as one line of a terminal."""
-    text = "".join(c if c.isprintable() else " " for c in str(said)[:LONGEST_LINE])
-    return " ".join(text.split())
+    return "".join(c if c.isprintable() else " " for c in str(said)[:LONGEST_LINE]).rstrip()
 
 
 def _cookie(request: web.Request) -> str:

@@ -45,7 +45,7 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
             return await elsewhere(figure_of, session.scene, there(), kind)
 
     return {
-        "scene_toml": lambda: dumps(there() and session.scene).encode(),
+        "scene_toml": lambda: dumps(session.scene).encode(),
         "waveform_csv": lambda: csv_of(there()),
         "waveform_wav": lambda: wav_of(there()[-1]),
         "figure": figure,

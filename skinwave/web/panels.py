@@ -189,7 +189,8 @@ def line_table() -> None:
         )
         html.Tr(
             "<td><template v-for='(part, k) in row.name.split(/<.?sub>/)' :key='k'>"
-            "<sub v-if='k % 2'>{{ part }}</sub><template v-else>{{ part }}</template></template></td>"
+            "<sub v-if='k % 2'>{{ part }}</sub><template v-else>{{ part }}</template>"
+            "</template></td>"
             "<td>{{ row.frequency }}</td><td>{{ row.pressure }}</td>"
             "<td>{{ row.displacement }}</td><td>{{ row.level }}</td>",
             v_for="row in rows", key="row.name",

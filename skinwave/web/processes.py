@@ -5,10 +5,13 @@ import contextlib
 import json
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from dataclasses import dataclass
 from typing import Any
+
+from skinwave.web.access import printable
 
 PATIENCE = 60.0  # s that a session may take to start
 # For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
@@ -29,6 +32,7 @@ class PageProcess:
     port: int
     password: str
     folder: str
+    relay: asyncio.Task[None] | None = None
 
 
 async def started(folder: str) -> PageProcess:
@@ -40,23 +44,28 @@ async def started(folder: str) -> PageProcess:
         If it does not start, or says something else than its port and password.
     """
     own = tempfile.mkdtemp(dir=folder)
-    process = None
+    process = relay = None
     try:
         # In a session of its own: Ctrl-C in a terminal is for the server alone, which ends it.
         process = await asyncio.create_subprocess_exec(
             *COMMAND, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-            start_new_session=True,
+            stderr=asyncio.subprocess.PIPE, start_new_session=True,
             env={**RETURNED, **os.environ, "WSLINK_READY_MSG": "",
                  **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), own)},
         )  # fmt: skip
         assert process.stdout is not None
+        relay = asyncio.create_task(_relayed(process))
         line = await asyncio.wait_for(process.stdout.readline(), PATIENCE)
         port, password = line.decode().split()
-        return PageProcess(process=process, port=int(port), password=password, folder=own)
+        return PageProcess(
+            process=process, port=int(port), password=password, folder=own, relay=relay
+        )
     except BaseException:
         if process is not None:
             kill(process)
             await process.wait()
+        if relay is not None:
+            relay.cancel()
         shutil.rmtree(own, ignore_errors=True)
         raise
 
@@ -82,13 +91,37 @@ async def begun(page: PageProcess, asked: dict[str, Any]) -> PageProcess:
 
 
 def kill(process: Any) -> None:
-    """End a process at once; what it has started ends as soon as it does."""
+    """End a process at once, with what it is about to start; what it has started ends as soon as
+    it does.
+    """
     with contextlib.suppress(ProcessLookupError, RuntimeError, OSError):
         process.stdin.close()
-        process.kill()
+        if process.returncode is not None:
+            return
+        if hasattr(os, "killpg"):  # not `process.kill`, which takes the exit code from asyncio
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
 
 
 async def gone(page: PageProcess) -> None:
     """Wait for the end of a process, and remove its temporary files."""
     await page.process.wait()
+    if page.relay is not None:
+        page.relay.cancel()
     shutil.rmtree(page.folder, ignore_errors=True)
+
+
+async def _relayed(process: Any) -> None:
+    """Say what a process says of errors, as long as it is there: what it has started may say that
+    it was ended in the middle.
+    """
+    while True:
+        try:
+            line = await process.stderr.readline()
+        except ValueError:  # longer than any of ours
+            continue
+        if not line:
+            return
+        if process.returncode is None:
+            print(printable(line.decode("utf-8", "replace")), file=sys.stderr, flush=True)

@@ -10,7 +10,7 @@ import time
 # with waves), measured as what they do not share; bodies of finite elements take more.
 MOST = 12
 AT_ONCE = 2  # pages that are opened at a time: more of them wait for each other's imports
-FORGOTTEN = 10.0  # s after which a page that does not ask any more has left the line
+FORGOTTEN = 5.0  # s after which a page that does not ask any more has left the line
 LONGEST_LINE = 1000
 FULL = (
     f"{MOST} pages are open, as many as skinwave keeps at a time; this one opens as soon as "
@@ -41,9 +41,9 @@ class Turns:
         if page in self._line or len(self._line) < LONGEST_LINE:
             self._line[page] = now
         before = list(self._line).index(page) if page in self._line else LONGEST_LINE
-        if before >= MOST - self.there:
-            return f"{FULL}{_said(before)}."
-        return f"{BUSY}{_said(before)}." if before >= AT_ONCE - self.opening else ""
+        if before < min(MOST - self.there, AT_ONCE - self.opening):
+            return ""
+        return f"{FULL if self.there >= MOST else BUSY}{_said(before)}."
 
     def begin(self, page: str) -> None:
         """A page that has its turn is being opened from now on."""
