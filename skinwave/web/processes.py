@@ -17,8 +17,9 @@ PATIENCE = 60.0  # s that a session may take to start
 # For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
 # limit to what was freed once, and a process that answers for hours fills with gaps.
 RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
-# -P: no module of the folder that the program was started in.
-COMMAND = (sys.executable, "-P", "-m", "skinwave.web.serve")
+# No module of the folder that the program was started in, neither here nor in what a page starts.
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}
+COMMAND = (sys.executable, "-m", "skinwave.web.serve")
 FAILURES = (OSError, TimeoutError, ValueError)  # of a process that does not start
 
 
@@ -50,7 +51,7 @@ async def started(folder: str) -> PageProcess:
         process = await asyncio.create_subprocess_exec(
             *COMMAND, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
-            env={**RETURNED, **os.environ, "WSLINK_READY_MSG": "",
+            env={**RETURNED, **os.environ, **SAFE_PATH, "WSLINK_READY_MSG": "",
                  **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), own)},
         )  # fmt: skip
         assert process.stdout is not None
