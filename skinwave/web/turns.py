@@ -1,4 +1,4 @@
-"""Whose turn it is to open: as many pages as there is memory for, a few of them at a time.
+"""Whose turn it is to open: a limited number of pages at a time, a few of them opened at once.
 
 A page asks again every second until it is its turn. One that does not ask any more has been closed,
 and leaves the line.
