@@ -30,7 +30,7 @@ from skinwave.web.turns import MOST, Turns
 LATER = 5.0  # s after which the next process is made ready: the page that opens comes first
 LARGEST = 2**26  # bytes of a message
 LARGEST_REQUEST = 2**16  # bytes of what a page asks for as it opens
-LAST = 1.0  # s that requests have when the server ends
+LAST = 0.3  # s that requests and pages have when the server ends
 UNREAD = (
     "What the page asks for cannot be read: it must be a JSON object of at most "
     f"{LARGEST_REQUEST} bytes that gives numbers or texts; reload the page without its ?..."
