@@ -24,6 +24,7 @@ from page_client import Refused, browser, opened
 from skinwave.web import asked, controls, downloads, front, moves, processes, turns
 from skinwave.web.access import is_local, policy
 from skinwave.web.controls import STARTS
+from skinwave.web.page import page_text
 
 HOSTILE = ("fem", "meshes", "simple_model", "skinwave", "json", "random", "numpy", "trame",
            "multiprocessing", "socket", "matplotlib", "aiohttp")  # fmt: skip
@@ -231,6 +232,13 @@ def test_every_answer_has_a_policy(monkeypatch):
     assert re.findall(r"<script[^>]*>\s*[^<\s]", page) == [], "no script in the text of the page"
     assert "unsafe-inline" not in re.search("script-src[^;]*", policy("localhost:1"))[0]
     assert "elsewhere" not in policy("elsewhere.example")
+
+
+@pytest.mark.parametrize("scripts", ["", 2 * '<script type="module" src="a.js"></script>'])
+def test_a_page_of_trame_that_begins_otherwise_is_refused(tmp_path, scripts):
+    (tmp_path / "index.html").write_text(f"<html><head>{scripts}</head></html>")
+    with pytest.raises(ValueError, match="install another version"):
+        page_text(str(tmp_path))
 
 
 # --- what a page sends -------------------------------------------------------------------------

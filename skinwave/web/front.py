@@ -8,7 +8,6 @@ through here.
 import asyncio
 import contextlib
 import json
-import re
 import secrets
 import shutil
 import signal
@@ -16,7 +15,6 @@ import tempfile
 import uuid
 from collections.abc import Callable
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import aiohttp
@@ -24,6 +22,7 @@ from aiohttp import web
 
 from skinwave.web.access import TOKEN, local_only, secured, with_token
 from skinwave.web.controls import KEYS
+from skinwave.web.page import page_text
 from skinwave.web.processes import FAILURES, PATIENCE, PageProcess, begun, gone, kill, started
 from skinwave.web.turns import MOST, Turns
 
@@ -36,13 +35,6 @@ UNREAD = (
     f"{LARGEST_REQUEST} bytes that gives numbers or texts; reload the page without its ?..."
 )
 UNSTARTED = "The process of this page did not start; reload the page."
-WAITING = (
-    "position: absolute; z-index: 1001; left: 10%; right: 10%; top: 12%; text-align: center; "
-    "font: 1.1rem sans-serif"
-)
-VIEWPORT = re.compile(r'width=device-width,[^"]*')  # with what keeps a reader from zooming in
-SCRIPT = re.compile(r"<script(?P<said>[^>]*)>(?P<inside>.*?)</script>\s*", re.DOTALL)
-SOURCE = re.compile(r'src="([^"]*)"')
 
 
 class Front:
@@ -221,28 +213,6 @@ async def _carry(source: Any, sink: Any) -> None:
 
 async def _alive(_: web.Request) -> web.Response:
     return web.Response(text="yes")
-
-
-def page_text(folder: str) -> str:
-    """The page: trame's own, without a script in its text, begun by `static/opening.js`."""
-    text = Path(folder, "index.html").read_text(encoding="utf-8")
-    text = text.replace("<title>trame is built by Kitware</title>", "<title>skinwave</title>")
-    text = VIEWPORT.sub("width=device-width, initial-scale=1", text)
-    scripts = [(found["said"], SOURCE.search(found["said"])) for found in SCRIPT.finditer(text)]
-    (main,) = [source[1] for said, source in scripts if source and 'type="module"' in said]
-    first = "".join(
-        f'<script src="{source[1]}"></script>'
-        for said, source in scripts
-        if source and 'type="module"' not in said
-    )
-    begun = (
-        f'<script src="__skinwave/opening.js" data-main="{main}" data-keys="{" ".join(KEYS)}">'
-        "</script>"
-    )
-    text = SCRIPT.sub("", text).replace("</head>", f"{first}</head>", 1)
-    loading = Path(folder, "loading.tpl").read_text(encoding="utf-8")
-    shown = f'<div id="app"><p id="sw-waiting" role="status" style="{WAITING}"></p>{loading}</div>'
-    return text.replace('<div id="app"></div>', shown, 1).replace("</body>", f"{begun}</body>", 1)
 
 
 def _page(folder: str) -> Any:
