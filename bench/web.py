@@ -85,7 +85,7 @@ def in_a_browser(moves: int) -> None:
     command = [sys.executable, "-m", "skinwave", "web", "--port", "0"]
     server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     assert server.stderr is not None
-    address = re.search(r"http://\S+/", server.stderr.readline()).group()  # type: ignore[union-attr]
+    address = re.search(r"http://\S+", server.stderr.readline()).group()  # type: ignore[union-attr]
     try:
         with sync_playwright() as p:
             browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
@@ -99,12 +99,12 @@ def in_a_browser(moves: int) -> None:
                 page.wait_for_function(DRAWN)
                 ready.append(time.perf_counter() - before)
             row("page ready", ready)
-            page.goto(address + "?body=none")
+            page.goto(address + "&body=none")
             page.wait_for_function(DRAWN)
             said = "kernel, same load, Pa"
             times = page.evaluate(PRESSED, ["am", moves, said])
             row("slider to plots, kernel alone", [t / 1e3 for t in times])
-            page.goto(address + "?body=skin-slab")
+            page.goto(address + "&body=skin-slab")
             page.wait_for_function(
                 "() => window.trame?.state?.get('wave_map')?.picture"
                 " && window.trame.utils.plots.shown.spectrum_plot.figure"

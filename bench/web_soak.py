@@ -160,7 +160,7 @@ def _moved(page: Page, rng: random.Random, errors: list[str], bodies: Sequence[s
 
 def _address(log: Path) -> str:
     for _ in range(300):
-        if found := re.search(r"http://\S+/", log.read_text()):
+        if found := re.search(r"http://\S+", log.read_text()):
             return str(found[0])
         time.sleep(0.1)
     raise SystemExit("the server does not start")

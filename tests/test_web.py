@@ -1116,45 +1116,54 @@ def test_what_of_a_scene_is_beyond_its_control_is_left_out_and_said(request):
 
 
 @pytest.mark.parametrize("says", [b"ready\n", b"", None])
-def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypatch, says):
+def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypatch, tmp_path, says):
     web = pytest.importorskip("aiohttp.web")
-    from skinwave.web import front
+    from skinwave.web import front, processes
+    from skinwave.web.processes import PageProcess
 
     ends = []
 
     async def line():
         return says if says is not None else await asyncio.sleep(60)
 
-    process, asked = Mock(), Mock()
-    process.stdin.drain = AsyncMock()
-    process.stdout.readline = line
-    process.terminate = lambda: ends.append(True)
-    asked.json = AsyncMock(return_value={"am": "77"})
+    def made():
+        process, over = Mock(), asyncio.Event()
+        process.stdin.drain = AsyncMock()
+        process.stdout.readline, process.wait = line, over.wait
+        process.stdin.close = lambda: (ends.append(True), over.set())
+        return PageProcess(process=process, port=1, password="secret", folder=str(tmp_path / "x"))
 
-    async def started():
-        return process, 1, "secret"
+    async def started(_):
+        return made()
 
     async def opened():
-        one = front.Front()
-        one._spare = asyncio.create_task(started())
+        one, asked = front.Front(), Mock(query={})
+        asked.text = AsyncMock(return_value='{"am": "77"}')
+        one._spare = asyncio.create_task(started(""))
         answer = await one.open(asked)
         assert isinstance(answer, web.Response)
-        assert answer.status == (200 if says else 500)
-        assert (len(one._sessions), len(ends)) == ((1, 0) if says else (0, 1))
-        await asyncio.sleep(0.2)
-        assert (len(one._sessions), len(ends)) == (0, 1)
+        assert answer.status == (200 if says else 503)
+        # The one that was prepared, and the one that is started instead of it.
+        assert (len(one._unclaimed), len(ends)) == ((1, 0) if says else (0, 2))
+        assert (one.turns.opening, one.turns.there) == (0, 1 if says else 0)
+        await asyncio.sleep(0.3)
+        assert (len(one._unclaimed), len(ends)) == (0, 1 if says else 2)
+        assert one.turns.there == 0, "its place is free"
 
+    monkeypatch.setattr(front, "started", started)
     monkeypatch.setattr(front, "PATIENCE", 0.1)
+    monkeypatch.setattr(processes, "PATIENCE", 0.1)
+    monkeypatch.setattr(processes.os, "killpg", Mock())
     asyncio.run(opened())
 
 
-def test_a_session_takes_only_its_own_password():
+def test_a_session_takes_only_its_own_password(tmp_path):
     pytest.importorskip("trame")
     import aiohttp
     import msgpack
     from wslink.chunking import UnChunker, generate_chunks
 
-    from skinwave.web import front
+    from skinwave.web import processes
 
     async def greeted(port, password):
         hello = {"wslink": "1.0", "id": "system:c0:0", "method": "wslink.hello",
@@ -1168,12 +1177,15 @@ def test_a_session_takes_only_its_own_password():
             return UnChunker().process_chunk((await page.receive(timeout=20)).data)
 
     async def both():
-        process, port, password = await front._started()
+        page = await processes.started(str(tmp_path))
         try:
-            return await greeted(port, "wslink-secret"), await greeted(port, password)
+            return (
+                await greeted(page.port, "wslink-secret"),
+                await greeted(page.port, page.password),
+            )
         finally:
-            front._kill(process)
-            await process.wait()
+            processes.kill(page.process)
+            await processes.gone(page)
 
     refused, taken = asyncio.run(both())
     assert "error" in refused

@@ -38,7 +38,7 @@ def served(*arguments):
     """A server in a process of its own, and its address."""
     command = [sys.executable, "-m", "skinwave", "web", *arguments]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
-    return process, re.search(r"http://\S+/", process.stderr.readline()).group()
+    return process, re.search(r"http://\S+", process.stderr.readline()).group()
 
 
 def ended(process):
@@ -76,7 +76,7 @@ def opened(browser, address, query="", **viewport):
     page.on("request", lambda request: logs.asked.append(request.url))
     page.on("pageerror", lambda error: logs.errors.append(str(error)))
     page.on("console", lambda m: logs.errors.append(m.text) if m.type == "error" else None)
-    page.goto(address + query)
+    page.goto(address + query.replace("?", "&"))
     page.wait_for_function(READY)
     return page, logs
 
@@ -735,19 +735,26 @@ def test_two_pages_do_not_disturb_each_other_and_ask_nothing_of_the_network(
     query_has(page, "am=222")
     assert state(other, "am") == 60
     other.close()
+    own = address.partition("?")[0]
     for log in (visit[1], logs):
         assert log.errors == []
-        elsewhere = [url for url in log.asked if not url.startswith((address, "data:", "blob:"))]
+        elsewhere = [url for url in log.asked if not url.startswith((own, "data:", "blob:"))]
         assert elsewhere == []
 
 
 def test_a_lost_connection_is_said_and_comes_back(browser):
     process, address = served("--port", "0")
-    page, _ = opened(browser, address, "?am=71")
+    context = browser.new_context()
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(address + "&am=71")
+    page.wait_for_function(READY)
     ended(process)
     page.wait_for_selector("#sw-lost")
-    again, _ = served("--port", address.rstrip("/").rpartition(":")[2])
+    again, new = served("--port", re.search(r":(\d+)/", address)[1])
+    page.get_by_text("open the address that `skinwave web` has printed").wait_for()
+    context.new_page().goto(new)  # as --open does: it brings the new token
     page.wait_for_function(READY)
     assert state(page, "am") == 71
-    page.close()
+    context.close()
     ended(again)

@@ -3,7 +3,8 @@
 `controls` are what can be turned, `scenes` makes a scene of them, `model` arrays, `plots`,
 `drawings` and `moving` what a page draws, all without a browser. `waves` and `worker` answer with a
 body, in a process of its own; `session`, `shown` and `layout` are the page, with curves and body
-drawn in `static`; `front` gives each page a process of its own.
+drawn in `static`; `front` gives each page a process of its own (`processes`), when it is its turn
+(`turns`); `page` is its text, `access` says who may open one, and `asked` what it may send.
 """
 
 EXTRA = ("trame", "trame_vuetify")

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from simple_model.choices import choose
 from simple_model.response import step
 from skinwave.exports import sampled, write_table
 from skinwave.pictures.figures import colour, drawn, label
@@ -18,6 +19,8 @@ from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
 from skinwave.web.worker import end_with_parent
 
+FORMATS = ("svg", "png", "pdf")  # matplotlib knows others, some of which start a program
+
 
 def offered(session: Any) -> dict[str, Callable[..., Any]]:
     """What makes each file of what a session shows, by its name as a trigger of the page.
@@ -25,16 +28,26 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
     Waves are those of a body if it has answered; a file of several answers has the kernel's, too.
     """
 
+    one_at_a_time = asyncio.Lock()
+
+    def there() -> tuple[Answer, ...]:
+        if not session.answers:
+            raise ValueError("there is no answer that could be saved; correct the controls first")
+        return tuple(session.answers)
+
     async def report() -> bytes:
-        return await elsewhere(report_of, session.scene, session.answers)
+        async with one_at_a_time:
+            return await elsewhere(report_of, session.scene, there())
 
     async def figure(kind: str) -> bytes:
-        return await elsewhere(figure_of, session.scene, session.answers, kind)
+        choose("format of a figure", str(kind), FORMATS)
+        async with one_at_a_time:
+            return await elsewhere(figure_of, session.scene, there(), kind)
 
     return {
         "scene_toml": lambda: dumps(session.scene).encode(),
-        "waveform_csv": lambda: csv_of(session.answers),
-        "waveform_wav": lambda: wav_of(session.answers[-1]),
+        "waveform_csv": lambda: csv_of(there()),
+        "waveform_wav": lambda: wav_of(there()[-1]),
         "figure": figure,
         "report": report,
     }
@@ -132,7 +145,7 @@ def _column(scene: Scene, answer: Answer) -> str:
 
 
 def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
-    """Maps, waveform and spectrum; `kind` is "svg" or "png"."""
+    """Maps, waveform and spectrum; `kind` is one of `FORMATS`."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")

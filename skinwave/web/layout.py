@@ -22,7 +22,7 @@ MODULE = {
 LOST = """
 <div id="sw-lost" role="alert" style="font: 1rem sans-serif; padding: 3rem; text-align: center">
   <p>The connection to skinwave is lost. This page comes back by itself, with what its address says,
-  as soon as the program answers.</p><p><a href="">Try now</a></p>
+  as soon as the program answers.</p><p id="sw-lost-why"></p><p><a href="">Try now</a></p>
 </div>
 """
 PLOTS = {

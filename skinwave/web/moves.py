@@ -8,8 +8,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from simple_model.choices import choose
 from skinwave.scene_file import loads
 from skinwave.web import controls, model, scenes, shown
+from skinwave.web.asked import numbers
 from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, Values
 from skinwave.web.downloads import offered
 from skinwave.web.history import History
@@ -105,8 +107,9 @@ def own_path(session: Session, which: int, part: int, given: str) -> None:
     """Set the shape, size, x or y (`part` 0 to 3) of one of the paths."""
     text = session.state.typed.get("paths", session.good["paths"])
     parts = [path.strip().split("/") for path in text.split(",") if path.strip()]
-    if which >= len(parts):  # left out while the change was on its way
-        return
+    which, part = map(int, numbers(which, part))
+    if not (0 <= which < len(parts) and 0 <= part < len(parts[which])):
+        return  # left out while the change was on its way
     parts[which][part] = str(given).strip().replace(",", ".").replace("/", "")
     turn(session, {"paths": ", ".join("/".join(path) for path in parts)})
 
@@ -114,18 +117,20 @@ def own_path(session: Session, which: int, part: int, given: str) -> None:
 def select(session: Session, x: float, y: float) -> None:
     """Select the point of the area at x and y in mm."""
     limit = NUMBERS["x"].high
-    at = {"x": round(float(x), 2), "y": round(float(y), 2)}
+    x, y = numbers(x, y)
+    at = {"x": round(x, 2), "y": round(y, 2)}
     turn(session, {key: min(max(value, -limit), limit) for key, value in at.items()})
 
 
 def preset(session: Session, name: str) -> None:
     """Take one of the paper's Tactons."""
-    turn(session, controls.presets()[name], whole=True)
+    known = controls.presets()
+    turn(session, known[choose("preset", str(name), tuple(known))], whole=True)
 
 
 def restart(session: Session, query: str = "") -> None:
     """Begin anew with what an address says."""
-    values, refused = controls.from_query(query, session.own is not None)
+    values, refused = controls.from_query(str(query), session.own is not None)
     session.pinned, session.history = (), History(values)
     session.state.update({"hold": False, "pinned": False, "problem": ""})
     take(session, values)
@@ -173,6 +178,7 @@ def zoom(session: Session, start: float | None = None, end: float | None = None)
     if start is None or end is None:
         session.zoomed = None
     else:
+        start, end = numbers(start, end)
         last = session.scene.tacton.duration
         start = min(max(0.0, start / 1e3), last - SHORTEST)
         session.zoomed = (start, min(max(end / 1e3, start + SHORTEST), last))

@@ -188,7 +188,10 @@ def line_table() -> None:
             "<th scope='col' title='above the threshold of detection'>felt, dB</th>"
         )
         html.Tr(
-            '<td v-html="row.name"></td><td>{{ row.frequency }}</td><td>{{ row.pressure }}</td>'
+            "<td><template v-for='(part, k) in row.name.split(/<.?sub>/)' :key='k'>"
+            "<sub v-if='k % 2'>{{ part }}</sub><template v-else>{{ part }}</template>"
+            "</template></td>"
+            "<td>{{ row.frequency }}</td><td>{{ row.pressure }}</td>"
             "<td>{{ row.displacement }}</td><td>{{ row.level }}</td>",
             v_for="row in rows", key="row.name",
         )  # fmt: skip

@@ -5,6 +5,7 @@ python -m skinwave.web.serve      # started by `front`, not by hand
 
 import asyncio
 import json
+import logging
 import os
 import secrets
 import sys
@@ -13,6 +14,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
+
+from skinwave.web.access import local_only, printable
 
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
@@ -56,16 +59,38 @@ def _on_one_thread() -> None:
         np.ones((2, 2)) @ np.ones((2, 2))
 
 
+def _quiet() -> None:
+    """What other libraries log of messages that cannot be read: one line of each."""
+    logging.getLogger("wslink").setLevel(logging.CRITICAL + 1)  # `guard` says what is a fault here
+
+    def in_a_line(record: logging.LogRecord) -> bool:
+        error = record.exc_info[1] if record.exc_info else None
+        record.msg = "skinwave: a message to the process of a page is left out: %s"
+        record.args = (printable(error or record.getMessage()),)
+        record.exc_info = None
+        return True
+
+    logging.getLogger("aiohttp.server").addFilter(in_a_line)
+
+
 def main() -> None:
     """Serve one page until it is closed."""
     password = secrets.token_hex(32)  # so that nobody but the page talks to this port
     sys.argv = [sys.argv[0], "--authKey", password]  # trame reads it
     _on_one_thread()
     from trame.app import get_server
+    from trame_server.protocol import CoreServer
 
     import skinwave.web.layout  # noqa: F401, what takes its time, before a page asks
+    from skinwave.web.asked import guard
 
+    guard(CoreServer)
+    _quiet()
     server = get_server("page", client_type="vue3")
+    server.controller.on_error = lambda said: print(
+        f"skinwave: a script of the page has failed: {printable(said)}", file=sys.stderr
+    )
+    server.controller.on_server_bind.add(lambda bound: bound.app.middlewares.append(local_only))
     loop = asyncio.new_event_loop()
     asyncio.set_event_loop(loop)
 

@@ -43,6 +43,8 @@ document.addEventListener("keydown", (event) => {
 setInterval(async () => {
   if (!document.getElementById("sw-lost")) return;
   try {
-    if ((await fetch("alive", { cache: "no-store" })).ok) window.location.reload();
+    const answer = await fetch("alive", { cache: "no-store" });
+    if (answer.ok) window.location.reload();
+    else document.getElementById("sw-lost-why").textContent = await answer.text();
   } catch {}
 }, 1500);

@@ -1,0 +1,128 @@
+"""Processes of pages: started, told what to show, and ended with all that they have left."""
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import signal
+import sys
+import tempfile
+from dataclasses import dataclass
+from typing import Any
+
+from skinwave.web.access import printable
+
+PATIENCE = 60.0  # s that a session may take to start
+# For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
+# limit to what was freed once, and a process that answers for hours fills with gaps.
+RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
+# No module of the folder that the program was started in, neither here nor in what a page starts.
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}
+COMMAND = (sys.executable, "-m", "skinwave.web.serve")
+FAILURES = (OSError, TimeoutError, ValueError)  # of a process that does not start
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PageProcess:
+    """A process, the port that it serves its page at, the page's password for it, and the folder
+    of its temporary files.
+    """
+
+    process: Any
+    port: int
+    password: str
+    folder: str
+    relay: asyncio.Task[None] | None = None
+
+
+async def started(folder: str) -> PageProcess:
+    """A process that waits for a page, its temporary files in a new folder within `folder`.
+
+    Raises
+    ------
+    OSError, TimeoutError, ValueError
+        If it does not start, or says something else than its port and password.
+    """
+    own = tempfile.mkdtemp(dir=folder)
+    process = relay = None
+    try:
+        # In a session of its own: Ctrl-C in a terminal is for the server alone, which ends it.
+        process = await asyncio.create_subprocess_exec(
+            *COMMAND, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE, start_new_session=True,
+            env={**RETURNED, **os.environ, **SAFE_PATH, "WSLINK_READY_MSG": "",
+                 **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), own)},
+        )  # fmt: skip
+        assert process.stdout is not None
+        relay = asyncio.create_task(_relayed(process))
+        line = await asyncio.wait_for(process.stdout.readline(), PATIENCE)
+        port, password = line.decode().split()
+        return PageProcess(
+            process=process, port=int(port), password=password, folder=own, relay=relay
+        )
+    except BaseException:
+        if process is not None:
+            kill(process)
+            await process.wait()
+        if relay is not None:
+            relay.cancel()
+        shutil.rmtree(own, ignore_errors=True)
+        raise
+
+
+async def begun(page: PageProcess, asked: dict[str, Any]) -> PageProcess:
+    """The process once it shows what is asked: the text of a "scene", the "query" of an address.
+
+    Raises
+    ------
+    OSError, TimeoutError
+        If it does not; it has ended then.
+    """
+    try:
+        page.process.stdin.write((json.dumps(asked) + "\n").encode())
+        await page.process.stdin.drain()
+        if await asyncio.wait_for(page.process.stdout.readline(), PATIENCE) != b"ready\n":
+            raise OSError("the process of a page has ended")
+    except BaseException:
+        kill(page.process)
+        await gone(page)
+        raise
+    return page
+
+
+def kill(process: Any) -> None:
+    """End a process at once, with what it is about to start; what it has started ends as soon as
+    it does.
+    """
+    with contextlib.suppress(ProcessLookupError, RuntimeError, OSError):
+        process.stdin.close()
+        if process.returncode is not None:
+            return
+        if hasattr(os, "killpg"):  # not `process.kill`, which takes the exit code from asyncio
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+
+
+async def gone(page: PageProcess) -> None:
+    """Wait for the end of a process, and remove its temporary files."""
+    await page.process.wait()
+    if page.relay is not None:
+        page.relay.cancel()
+    shutil.rmtree(page.folder, ignore_errors=True)
+
+
+async def _relayed(process: Any) -> None:
+    """Say what a process says of errors, as long as it is there: what it has started may say that
+    it was ended in the middle.
+    """
+    while True:
+        try:
+            line = await process.stderr.readline()
+        except ValueError:  # longer than any of ours
+            continue
+        if not line:
+            return
+        if process.returncode is None:
+            print(printable(line.decode("utf-8", "replace")), file=sys.stderr, flush=True)
