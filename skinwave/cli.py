@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import skinwave
 from skinwave.commands import COMMANDS
+from skinwave.processes import ended_by_signals, safe_path
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
@@ -24,7 +25,13 @@ UNCACHED = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
+    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong.
+
+    Raises
+    ------
+    SystemExit
+        With 128 and the signal's number, if SIGTERM or SIGHUP ends it.
+    """
     typed = list(sys.argv[1:] if arguments is None else arguments)
     if typed[:1] == ["--version"]:  # looked up here, because help need not wait for it
         print(f"skinwave {skinwave.__version__}")
@@ -32,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(_joined(typed))
     options.typed = typed
     try:
-        with _cache_as_asked(options):
+        with safe_path(), ended_by_signals(), _cache_as_asked(options):
             return int(options.command(options))
     except KeyboardInterrupt:
         print("skinwave: interrupted; nothing was finished", file=sys.stderr)

@@ -7,17 +7,20 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import parent_process
 from typing import Any, ParamSpec, TypeVar
+
+from skinwave.processes import PATIENCE, end, guarded, pool
 
 P = ParamSpec("P")
 T = TypeVar("T")
 SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+Aside = Callable[..., Future[Any]]  # begin a function with these arguments elsewhere
 Progress = Callable[[str, float], None]  # phase and fraction of it done
 
 
@@ -51,21 +54,15 @@ def peak_memory() -> int:
 
 def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """What a function returns in a new process: its memory and its caches begin empty."""
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(function, *args, **kwargs).result()
+    with pool(1, as_part) as other:
+        return other.submit(partial(guarded, function, *args, **kwargs)).result()
 
 
 @contextmanager
-def helper() -> Iterator[Executor]:
+def helper() -> Iterator[Aside]:
     """A process beside this one, on one thread; what it has not done when this ends is given up."""
-    others = set(active_children())
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=as_worker)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in set(active_children()) - others:
-            child.terminate()
+    with pool(1, as_worker) as other:
+        yield lambda work, *args: other.submit(partial(guarded, work, *args))
 
 
 @contextmanager
@@ -83,15 +80,25 @@ def _pools() -> Any:
 
 
 def as_worker() -> None:
-    """Begin a process: interrupts are the parent's, a thread each, none outlives its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Begin a process as a part of its parent, on one thread."""
     for name in THREADS:
         os.environ.setdefault(name, "1")
+    as_part()
+
+
+def as_part() -> None:
+    """Begin a process: interrupts are the parent's, it does not outlive that, and removes what it
+    made aside when it is ended.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, end)
 
     def watch() -> None:
         parent = parent_process()
         if parent is not None:
             parent.join()
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(PATIENCE)
             os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -62,6 +62,9 @@ def output_folder(out: Path, *, overwrite: bool = False) -> Iterator[Path]:
         if not any(aside.iterdir()):
             _remove(aside, above)
         raise
+    except BaseException:  # a signal that ends the process
+        _remove(aside, above)
+        raise
 
 
 @contextmanager
