@@ -7,20 +7,19 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
-from functools import lru_cache, partial
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import parent_process
 from typing import Any, ParamSpec, TypeVar
 
-from skinwave.processes import PATIENCE, end, guarded, pool
+from skinwave.processes import PATIENCE, end, pool
 
 P = ParamSpec("P")
 T = TypeVar("T")
 SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-Aside = Callable[..., Future[Any]]  # begin a function with these arguments elsewhere
 Progress = Callable[[str, float], None]  # phase and fraction of it done
 
 
@@ -55,14 +54,14 @@ def peak_memory() -> int:
 def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """What a function returns in a new process: its memory and its caches begin empty."""
     with pool(1, as_part) as other:
-        return other.submit(partial(guarded, function, *args, **kwargs)).result()
+        return other.submit(function, *args, **kwargs).result()
 
 
 @contextmanager
-def helper() -> Iterator[Aside]:
+def helper() -> Iterator[Executor]:
     """A process beside this one, on one thread; what it has not done when this ends is given up."""
     with pool(1, as_worker) as other:
-        yield lambda work, *args: other.submit(partial(guarded, work, *args))
+        yield other
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def guarded(work: Callable[..., T], *args: Any, **kwargs: Any) -> T:
 @contextmanager
 def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
     """So many processes, which call `begin` first; what they have not done at the end of this is
-    given up. What is submitted must be `guarded`.
+    given up.
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
@@ -87,6 +88,7 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
     others = set(active_children())
     with safe_path():
         executor = ProcessPoolExecutor(count, get_context("spawn"), initializer=begin)
+        executor.submit = partial(executor.submit, guarded)  # type: ignore[method-assign]
         try:
             yield executor
         finally:

@@ -135,7 +135,7 @@ def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path
     script.write_text(
         "from skinwave.effort import apart, helper\nimport beside\n"
         "if __name__ == '__main__':\n"
-        "    with helper() as aside:\n        print(apart(beside.two) + aside(beside.two).result())"
+        "    with helper() as aside:\n        print(apart(beside.two) + aside.submit(beside.two).result())"
     )
     said = subprocess.check_output([sys.executable, str(script)], cwd=hostile, text=True)
     assert said.strip() == "4"
@@ -226,7 +226,7 @@ CALLS = {
     "here": ASIDE.format("apart", "meshes.palm_mesh(meshes.Palm(), 1.5e-3)"),
     "apart": ASIDE.format("apart", "apart(meshes.palm_mesh, meshes.Palm(), 1.5e-3)"),
     "helper": ASIDE.format("helper", "with helper() as aside:\n            "
-                           "aside(meshes.palm_mesh, meshes.Palm(), 1.5e-3).result()"),
+                           "aside.submit(meshes.palm_mesh, meshes.Palm(), 1.5e-3).result()"),
 }  # fmt: skip
 
 

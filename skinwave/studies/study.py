@@ -2,14 +2,14 @@
 
 import time
 from collections.abc import Mapping
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 
 from meshes import cache
 from skinwave import document
-from skinwave.effort import Aside, Progress, helper, one_thread, peak_memory
+from skinwave.effort import Progress, helper, one_thread, peak_memory
 from skinwave.files import write_claims, write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
@@ -82,7 +82,7 @@ def run_study(
         maps = _begun_maps(scenes, aside, progress, solver)
         groups, prepared, figures = _answered(scenes, folder, aside, coarser, progress, h, solver)
         threads.enter_context(one_thread())
-        figures["overview"] = aside(overview_png, groups)
+        figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
         outcome = Outcome(
             verdicts=evaluate(runs),
@@ -108,14 +108,14 @@ def run_study(
 
 
 def _begun_coarser(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Aside, h: float | None, solver: str
+    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, h: float | None, solver: str
 ) -> dict[Body, Future[None]]:
     """The coarser meshes that answers are assessed by, begun aside and left in the cache."""
     if cache.folder() is None:
         return {}
     solids = {s.body: s for group in scenes.values() for s in group.values()}
     return {
-        body: aside(_cache_coarser, scene, h, solver)
+        body: aside.submit(_cache_coarser, scene, h, solver)
         for body, scene in solids.items()
         if body.kind != "none"
     }
@@ -126,11 +126,11 @@ def _cache_coarser(scene: Scene, h: float | None, solver: str) -> None:
 
 
 def _begun_maps(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Aside, progress: Progress, solver: str
+    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, solver: str
 ) -> Maps:
     """The maps of the Tacton that is shown first; those of elements are begun at once, aside."""
     begun = {
-        scene.body: aside(element_maps, scene, solver)
+        scene.body: aside.submit(element_maps, scene, solver)
         for scene in scenes[first_of(scenes)].values()
         if scene.body.kind != "none" and not has_wavenumber_integral(scene)
     }
@@ -147,7 +147,7 @@ def _begun_maps(
 def _answered(
     scenes: Mapping[str, Mapping[str, Scene]],
     folder: Path,
-    aside: Aside,
+    aside: Executor,
     coarser: Mapping[Body, Future[None]],
     progress: Progress,
     h: float | None,
@@ -170,7 +170,7 @@ def _answered(
                 write_run(folder / name / column, run)
             groups.setdefault(name, []).append(run)
             if len(groups[name]) == len(scenes[name]):
-                figures[name] = aside(tacton_png, name, groups[name])
+                figures[name] = aside.submit(tacton_png, name, groups[name])
             progress(f"answer {name} by {column}", (k + 1) / len(every))
     if not groups:
         raise KeyboardInterrupt
