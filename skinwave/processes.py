@@ -82,13 +82,14 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
     """So many processes, which call `begin` first; what they have not done at the end of this is
     given up.
     """
-    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures import Future, ProcessPoolExecutor
     from multiprocessing import active_children, get_context
 
     others = set(active_children())
     with safe_path():
         executor = ProcessPoolExecutor(count, get_context("spawn"), initializer=begin)
-        executor.submit = partial(executor.submit, guarded)  # type: ignore[method-assign]
+        submit: Callable[..., Future[Any]] = executor.submit
+        executor.submit = partial(submit, guarded)  # type: ignore[method-assign]
         try:
             yield executor
         finally:
