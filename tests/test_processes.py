@@ -1,8 +1,6 @@
-"""What a hostile working folder, SIGTERM, Ctrl-C and kill -9 do to every command."""
+"""What a hostile working folder does to every command, and what ends with what."""
 
-import json
 import os
-import random
 import shutil
 import signal
 import subprocess
@@ -12,9 +10,7 @@ import time
 from pathlib import Path
 
 import corpus
-import numpy as np
 import pytest
-from test_interruption import opens
 
 import skinwave
 from skinwave.processes import SAFE_PATH, ended_by_signals, safe_path
@@ -135,7 +131,8 @@ def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path
     script.write_text(
         "from skinwave.effort import apart, helper\nimport beside\n"
         "if __name__ == '__main__':\n"
-        "    with helper() as aside:\n        print(apart(beside.two) + aside.submit(beside.two).result())"
+        "    with helper() as aside:\n"
+        "        print(apart(beside.two) + aside.submit(beside.two).result())"
     )
     said = subprocess.check_output([sys.executable, str(script)], cwd=hostile, text=True)
     assert said.strip() == "4"
@@ -167,9 +164,10 @@ def test_signals_end_by_an_exit_and_are_as_before(monkeypatch):
     handled = signal.getsignal(signal.SIGHUP)
     try:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
-        with pytest.raises(SystemExit) as ended, ended_by_signals():
+        with ended_by_signals():
             signal.raise_signal(signal.SIGHUP)
-            signal.raise_signal(signal.SIGTERM)
+            with pytest.raises(SystemExit) as ended:
+                signal.raise_signal(signal.SIGTERM)
         assert ended.value.code == 143
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
