@@ -16,6 +16,7 @@ from skinwave.processes import ended_by_signals, safe_path
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
 UNCACHED = (
+    "cache",
     "convert",
     "doctor",
     "plot",
@@ -84,7 +85,8 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="skinwave",
         description="Waves in skin and paper under mid-air ultrasound haptics.",
-        epilog=f"{CACHE}: folder where meshes and reduced bodies are cached; empty for none.",
+        epilog=f"{CACHE}: folder where meshes and reduced bodies are cached, 5 GiB at most, those "
+        "used longest ago leave first; empty for none.",
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")

@@ -95,6 +95,7 @@ def drawn(template, name, number, after):
         temporary.mkdir()
         before, token = contents(folder), uuid.uuid4().hex
         env = os.environ | {"TMPDIR": str(temporary), "SKINWAVE_CACHE": str(Path(place, "cache"))}
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a background job
         with subprocess.Popen(words(name), cwd=folder, env=env | {"TOKEN": token}, **QUIET) as one:
             time.sleep(after)
             one.send_signal(number)

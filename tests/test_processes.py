@@ -228,8 +228,17 @@ CALLS = {
 }  # fmt: skip
 
 
+@pytest.fixture
+def interruptible():
+    """Interrupts are not ignored, as they are in a background job and what it starts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.slow
 @LOOKED_UP
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
 @pytest.mark.parametrize("call", CALLS)
 def test_a_mesher_ends_with_what_asked_for_it(tmp_path, call, number):
@@ -252,6 +261,7 @@ def test_a_mesher_ends_with_what_asked_for_it(tmp_path, call, number):
 
 @pytest.mark.slow
 @LOOKED_UP
+@pytest.mark.usefixtures("interruptible")
 def test_a_rerun_hands_on_what_ends_it(tmp_path):
     """In a process with as many threads as the record has."""
     (tmp_path / "good.toml").write_text(corpus.GOOD)
