@@ -195,7 +195,7 @@ def draws(count, names, seed=corpus.SEED):
     rng = random.Random(seed)
     for k in range(count):
         name = names[k % len(names)]
-        number = SIGNALS[(k + k // len(names)) % 3]
+        number = SIGNALS[(k % len(names) + k // len(names)) % 3]
         after = LONGEST * rng.random() ** 2 + 0.2  # soon, for short ones
         yield name, number, after
 
