@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 SAFE_PATH = "PYTHONSAFEPATH"
 ENDING = ("SIGTERM", "SIGHUP")
+AGAIN = 5.0  # s
 PATIENCE = 2.0  # s that a process has to remove what it made, before it is killed
 
 
@@ -43,19 +44,41 @@ def safe_path() -> Iterator[None]:
 def ended_by_signals() -> Iterator[None]:
     """SIGTERM and SIGHUP meanwhile raise SystemExit, so that what was made aside is removed.
 
-    A signal that is ignored or handled already stays so, as under `nohup`.
+    A signal that is ignored or handled already stays so, as under `nohup`. Compiled code that is
+    being imported may make an ImportError of the exit, or nothing: hence it comes again, and holds
+    whatever else is raised.
     """
-    numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
-    if threading.current_thread() is not threading.main_thread():
-        numbers = []  # Python lets no other thread set handlers
-    handled = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    came: list[int] = []
+
+    def handle(number: int, _: object) -> None:
+        came.append(number)
+        _again(partial(sys.exit, 128 + number))
+        end(number)
+
+    handled = [number for number in _numbers() if signal.getsignal(number) is signal.SIG_DFL]
     for number in handled:
-        signal.signal(number, end)
+        signal.signal(number, handle)
     try:
         yield
     finally:
         for number in handled:
             signal.signal(number, signal.SIG_DFL)
+        if came:
+            _again(None)
+            sys.exit(128 + came[0])
+
+
+def _numbers() -> list[signal.Signals]:
+    if threading.current_thread() is not threading.main_thread():
+        return []  # Python lets no other thread set handlers
+    return [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+
+
+def _again(call: Callable[[], Any] | None) -> None:
+    """Call something every few seconds from now on, or no longer."""
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, (lambda *_: call()) if call else signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN if call else 0.0, AGAIN)
 
 
 def end(number: int, _: object = None) -> None:

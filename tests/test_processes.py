@@ -1,5 +1,6 @@
 """What a hostile working folder does to every command, and what ends with what."""
 
+import contextlib
 import os
 import shutil
 import signal
@@ -159,17 +160,52 @@ def test_the_environment_is_as_before(monkeypatch):
         assert os.environ.get(SAFE_PATH) == before
 
 
-@POSIX
-def test_signals_end_by_an_exit_and_are_as_before(monkeypatch):
-    handled = signal.getsignal(signal.SIGHUP)
+def ended(work):
+    """The code of the exit by which some work ends that gets a signal."""
+    with pytest.raises(SystemExit) as exit, ended_by_signals():
+        work()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
+    return exit.value.code
+
+
+def taken_for(raised):
     try:
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+        signal.raise_signal(signal.SIGTERM)
+    except SystemExit:
+        if raised is not None:
+            raise raised from None
+
+
+@POSIX
+@pytest.mark.parametrize("raised", [SystemExit(5), None, ImportError("numpy"), ValueError("bad")])
+def test_a_signal_ends_all_whatever_it_is_taken_for(raised):
+    """An ImportError by numpy, while it is imported."""
+    assert ended(lambda: taken_for(raised)) == 143
+
+
+@POSIX
+def test_a_signal_that_is_lost_comes_again(monkeypatch):
+    monkeypatch.setattr("skinwave.processes.AGAIN", 0.05)
+    went_on = []
+
+    def work():
+        taken_for(None)
+        time.sleep(10)
+        went_on.append(True)
+
+    assert ended(work) == 143
+    assert not went_on
+
+
+@POSIX
+def test_an_ignored_signal_stays_ignored():
+    """As under nohup."""
+    handled = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
         with ended_by_signals():
             signal.raise_signal(signal.SIGHUP)
-            with pytest.raises(SystemExit) as ended:
-                signal.raise_signal(signal.SIGTERM)
-        assert ended.value.code == 143
-        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, handled)
