@@ -1,6 +1,5 @@
 """What a hostile working folder does to every command, and what ends with what."""
 
-import contextlib
 import os
 import shutil
 import signal
@@ -162,12 +161,12 @@ def test_the_environment_is_as_before(monkeypatch):
 
 def ended(work):
     """The code of the exit by which some work ends that gets a signal."""
-    with pytest.raises(SystemExit) as exit, ended_by_signals():
+    with pytest.raises(SystemExit) as stopped, ended_by_signals():
         work()
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
-    return exit.value.code
+    return stopped.value.code
 
 
 def taken_for(raised):
