@@ -3,19 +3,37 @@
 One file an entry, named by a hash of everything that it depends on. Entries are written aside
 and renamed, so that two processes cannot spoil each other's. Each holds a digest of its name and
 contents: an entry that cannot be read, was altered or bears another's name is a miss, and rebuilt.
-`SKINWAVE_CACHE` names another folder, or nothing at all to keep none.
+Above `LIMIT` the entries that were used longest ago are removed; a file with a name that is none of
+ours never is. `SKINWAVE_CACHE` names another folder, or nothing at all to keep none.
 """
 
 import contextlib
 import hashlib
 import json
 import os
+import re
+import stat
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+LIMIT = 5 * 2**30  # bytes of all entries
+OURS = re.compile(r"[0-9a-f]{32}(\.npz|\.\w+\.part)")  # entries, and what is being written
+ABANDONED = 86_400.0  # s after which what was being written no longer is
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contents:
+    """How many entries there are in a folder, and their size in bytes."""
+
+    folder: Path
+    entries: int
+    size: int
 
 
 def folder() -> Path | None:
@@ -55,9 +73,11 @@ def load(name: str) -> dict[str, Any] | None:
         record = json.loads(str(arrays.pop("meta")))
         if record.pop("digest") != _contents(name, record["meta"], arrays):
             return None
-        return arrays | {"meta": record["meta"]}
     except Exception:  # whatever zip files, array headers or JSON make of spoilt bytes
         return None
+    with contextlib.suppress(OSError):  # not ours to change
+        os.utime(home / f"{name}.npz")  # used now
+    return arrays | {"meta": record["meta"]}
 
 
 def store(name: str, meta: Mapping[str, Any], **arrays: np.ndarray) -> None:
@@ -69,13 +89,87 @@ def store(name: str, meta: Mapping[str, Any], **arrays: np.ndarray) -> None:
     record = json.dumps({"digest": _contents(name, meta, arrays), "meta": meta})
     with contextlib.suppress(OSError):
         home.mkdir(parents=True, exist_ok=True)
-        handle, aside = tempfile.mkstemp(dir=home, suffix=".part")
+        handle, aside = tempfile.mkstemp(dir=home, prefix=f"{name}.", suffix=".part")
         try:
             with os.fdopen(handle, "wb") as file:
                 np.savez(file, meta=np.array(record), **arrays)  # type: ignore[arg-type]
             os.replace(aside, home / f"{name}.npz")
-        except OSError:
+        except BaseException:
             os.unlink(aside)
+            raise
+        _keep_within(LIMIT, home, f"{name}.npz")
+
+
+def contents() -> Contents | None:
+    """What is kept, and where; None if nothing is.
+
+    Raises
+    ------
+    ValueError
+        If the folder cannot be read.
+    """
+    home = folder()
+    return None if home is None else _summed(home, _ours(home))
+
+
+def clear() -> Contents | None:
+    """Remove all entries; which there were.
+
+    Raises
+    ------
+    ValueError
+        If the folder cannot be read, or an entry cannot be removed.
+    """
+    home = folder()
+    if home is None:
+        return None
+    found = _ours(home)
+    try:
+        for path in found:
+            path.unlink(missing_ok=True)  # another process may do the same
+    except OSError as error:
+        raise ValueError(
+            f"{home} cannot be cleared ({error.strerror}); make it writable or remove it yourself"
+        ) from error
+    return _summed(home, found)
+
+
+def _keep_within(limit: int, home: Path, newest: str) -> None:
+    """Remove what was used longest ago until the rest is within a limit; the newest stays."""
+    found = sorted(_statuses(home), key=lambda each: each[1].st_mtime_ns)
+    size = sum(status.st_size for _, status in found)
+    for path, status in found:
+        abandoned = path.suffix == ".part" and time.time() - status.st_mtime > ABANDONED
+        if abandoned or (size > limit and path.suffix == ".npz" and path.name != newest):
+            path.unlink(missing_ok=True)
+            size -= status.st_size
+
+
+def _ours(home: Path) -> dict[Path, os.stat_result]:
+    """Files of the cache, by their names, and what is known of each; no links, no folders."""
+    try:
+        return dict(_statuses(home))
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise ValueError(
+            f"the cache {home} cannot be read ({error.strerror}); name another with SKINWAVE_CACHE"
+        ) from error
+
+
+def _statuses(home: Path) -> Iterator[tuple[Path, os.stat_result]]:
+    for path in home.iterdir():
+        if OURS.fullmatch(path.name):
+            with contextlib.suppress(FileNotFoundError):  # removed by another process meanwhile
+                status = path.lstat()
+                if stat.S_ISREG(status.st_mode):
+                    yield path, status
+
+
+def _summed(home: Path, found: Mapping[Path, os.stat_result]) -> Contents:
+    entries = [status.st_size for path, status in found.items() if path.suffix == ".npz"]
+    size = sum(status.st_size for status in found.values())
+    return Contents(folder=home, entries=len(entries), size=size)
 
 
 def _contents(name: str, meta: object, arrays: Mapping[str, np.ndarray]) -> str:

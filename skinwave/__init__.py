@@ -6,8 +6,12 @@
 Names are looked up when they are first used, so that `skinwave --help` answers at once.
 """
 
-from importlib import import_module
-from typing import Any
+from skinwave.safe_path import leave_out_working_folder
+
+leave_out_working_folder()
+
+from importlib import import_module  # noqa: E402
+from typing import Any  # noqa: E402
 
 _HOMES = {
     "BODIES": "scene",

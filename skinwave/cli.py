@@ -11,11 +11,13 @@ from contextlib import contextmanager
 
 import skinwave
 from skinwave.commands import COMMANDS
+from skinwave.processes import ended_by_signals, safe_path
 from skinwave.streams import CLOSED, explained, flushed, reader_gone
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
 UNCACHED = (
+    "cache",
     "convert",
     "doctor",
     "plot",
@@ -26,7 +28,13 @@ UNCACHED = (
 
 @flushed
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
+    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong.
+
+    Raises
+    ------
+    SystemExit
+        With 128 and the signal's number, if SIGTERM or SIGHUP ends it.
+    """
     typed = list(sys.argv[1:] if arguments is None else arguments)
     if typed[:1] == ["--version"]:  # looked up here, because help need not wait for it
         print(f"skinwave {skinwave.__version__}")
@@ -34,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(_joined(typed))
     options.typed = typed
     try:
-        with _cache_as_asked(options):
+        with safe_path(), ended_by_signals(), _cache_as_asked(options):
             return int(options.command(options))
     except KeyboardInterrupt as interrupt:
         kept = str(interrupt) or "nothing was finished"
@@ -83,7 +91,8 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="skinwave",
         description="Waves in skin and paper under mid-air ultrasound haptics.",
-        epilog=f"{CACHE}: folder where meshes and reduced bodies are cached; empty for none.",
+        epilog=f"{CACHE}: folder where meshes and reduced bodies are cached, 5 GiB at most, those "
+        "used longest ago leave first; empty for none.",
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")

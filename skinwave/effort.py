@@ -7,12 +7,14 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import parent_process
 from typing import ParamSpec, TypeVar
+
+from skinwave.processes import PATIENCE, end, pool
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -51,21 +53,15 @@ def peak_memory() -> int:
 
 def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """What a function returns in a new process: its memory and its caches begin empty."""
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(function, *args, **kwargs).result()
+    with pool(1, as_part) as other:
+        return other.submit(function, *args, **kwargs).result()
 
 
 @contextmanager
 def helper() -> Iterator[Executor]:
     """A process beside this one, on one thread; what it has not done when this ends is given up."""
-    others = set(active_children())
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=as_worker)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in set(active_children()) - others:
-            child.terminate()
+    with pool(1, as_worker) as other:
+        yield other
 
 
 @contextmanager
@@ -78,15 +74,25 @@ def one_thread() -> Iterator[None]:
 
 
 def as_worker() -> None:
-    """Begin a process: interrupts are the parent's, a thread each, none outlives its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Begin a process as a part of its parent, on one thread."""
     for name in THREADS:
         os.environ.setdefault(name, "1")
+    as_part()
+
+
+def as_part() -> None:
+    """Begin a process: interrupts are the parent's, it does not outlive that, and removes what it
+    made aside when it is ended.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, end)
 
     def watch() -> None:
         parent = parent_process()
         if parent is not None:
             parent.join()
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(PATIENCE)
             os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

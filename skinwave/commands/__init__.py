@@ -4,6 +4,7 @@ The one line of a module is its help. Whatever is slow to import is imported in 
 """
 
 from skinwave.commands import (
+    cache,
     compare,
     convert,
     doctor,
@@ -39,4 +40,5 @@ COMMANDS = {
     "rerun": rerun,
     "same": same,
     "doctor": doctor,
+    "cache": cache,
 }

@@ -3,6 +3,7 @@
 import argparse
 import os
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -45,8 +46,21 @@ def run(options: argparse.Namespace) -> int:
 
 def _with_threads(options: argparse.Namespace, threads: dict[str, str]) -> int:
     """The same command in a process with as many threads as the record has."""
-    words = [sys.executable, "-m", "skinwave", *options.typed]
-    return subprocess.run(words, env=os.environ | threads, check=False).returncode
+    words = [sys.executable, "-P", "-m", "skinwave", *options.typed]
+    # In a group of its own: what interrupts or ends this process is handed on to it once.
+    with subprocess.Popen(words, env=os.environ | threads, **_own_group()) as again:
+        try:
+            return again.wait()
+        except KeyboardInterrupt:
+            again.send_signal(signal.SIGINT)
+            return again.wait()
+        except SystemExit:
+            again.terminate()
+            raise
+
+
+def _own_group() -> dict[str, Any]:
+    return {} if sys.platform == "win32" else {"process_group": 0}
 
 
 def _command_again(

@@ -33,7 +33,7 @@ def renderer() -> Renderer:
     """What draws in this environment, probed once a process."""
     try:
         done = subprocess.run(
-            [sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=PATIENCE
+            [sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=PATIENCE
         )
     except subprocess.TimeoutExpired:
         return Renderer(found=False, said=f"a window is not made within {PATIENCE:g} s")

@@ -28,6 +28,7 @@ def turntable(view: View, frame: int) -> str | None:
         save(kept, view)
         command = [
             sys.executable,
+            "-P",
             "-m",
             "skinwave.pictures.turntable",
             str(kept),

@@ -5,15 +5,15 @@ Nothing that loads numpy is imported here: a worker process sets its threads bef
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from functools import partial
 from importlib.util import find_spec
-from multiprocessing import active_children, get_context
 from typing import Any
 
 from skinwave.effort import as_worker
+from skinwave.processes import guarded, pool
 
 LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker
@@ -119,23 +119,22 @@ def _run_here(
     from dask import multiprocessing, threaded
     from dask.callbacks import Callback
 
-    graph = {k: (partial(work, item),) for k, item in items.items()}
-    get = threaded.get if scheduler == "threads" else multiprocessing.get
-    others = set(active_children())
-    pool: Executor
-    if scheduler == "threads":
-        pool = ThreadPoolExecutor(count)
-    else:
-        pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=as_worker)
+    own = scheduler == "processes"
+    get: Callable[..., Any] = multiprocessing.get if own else threaded.get
+    called = partial(guarded, work) if own else work
+    graph = {k: (partial(called, item),) for k, item in items.items()}
+    several = pool(count, as_worker) if own else _threads(count)
+    with several as executor, Callback(posttask=finished):
+        get(graph, list(graph), pool=executor, num_workers=count, chunksize=1)
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[Executor]:
+    executor = ThreadPoolExecutor(count)
     try:
-        with Callback(posttask=finished):
-            get(graph, list(graph), pool=pool, num_workers=count, chunksize=1)
-        pool.shutdown()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in set(active_children()) - others:
-            child.terminate()
-        raise
+        yield executor
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
 
 
 def _run_on_cluster(

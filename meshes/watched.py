@@ -1,0 +1,38 @@
+"""Run by `meshes.child`: a script that ends as soon as the process that started it is gone.
+
+    python watched.py SCRIPT ARGUMENT...
+
+That process holds the other end of this one's standard input and writes nothing to it.
+"""
+
+import os
+import runpy
+import signal
+import sys
+import threading
+
+
+def main() -> None:
+    """Watch, and run SCRIPT."""
+    threading.Thread(target=_end_with_input, daemon=True).start()
+    _end_with_parent()
+    sys.argv = sys.argv[1:]
+    runpy.run_path(sys.argv[0], run_name="__main__")
+
+
+def _end_with_input() -> None:
+    os.read(0, 1)
+    os._exit(1)
+
+
+def _end_with_parent() -> None:
+    """The same by the kernel of Linux, also while compiled code lets no other thread run."""
+    if sys.platform == "linux":
+        import ctypes
+
+        set_parent_death_signal = 1
+        ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    main()

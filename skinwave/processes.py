@@ -1,0 +1,132 @@
+"""Processes that this one starts: none imports from the working folder, none outlives it.
+
+Only what Python has loaded anyway is imported here, because the command line begins with it.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+    from multiprocessing.process import BaseProcess
+
+T = TypeVar("T")
+SAFE_PATH = "PYTHONSAFEPATH"
+ENDING = ("SIGTERM", "SIGHUP")
+AGAIN = 5.0  # s
+PATIENCE = 2.0  # s that a process has to remove what it made, before it is killed
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """A Python that is started meanwhile imports nothing from the working folder.
+
+    `multiprocessing` starts its processes by `python -c`, which would look there first.
+    """
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        os.environ.pop(SAFE_PATH)
+        if before is not None:
+            os.environ[SAFE_PATH] = before
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """SIGTERM and SIGHUP meanwhile raise SystemExit, so that what was made aside is removed.
+
+    A signal that is ignored or handled already stays so, as under `nohup`. Compiled code that is
+    being imported may make an ImportError of the exit, or nothing: hence it comes again, and holds
+    whatever else is raised.
+    """
+    came: list[int] = []
+
+    def handle(number: int, _: object) -> None:
+        came.append(number)
+        _again(partial(sys.exit, 128 + number))
+        end(number)
+
+    handled = [number for number in _numbers() if signal.getsignal(number) is signal.SIG_DFL]
+    for number in handled:
+        signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        for number in handled:
+            signal.signal(number, signal.SIG_DFL)
+        if came:
+            _again(None)
+            sys.exit(128 + came[0])
+
+
+def _numbers() -> list[signal.Signals]:
+    if threading.current_thread() is not threading.main_thread():
+        return []  # Python lets no other thread set handlers
+    return [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+
+
+def _again(call: Callable[[], Any] | None) -> None:
+    """Call something every few seconds from now on, or no longer."""
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, (lambda *_: call()) if call else signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN if call else 0.0, AGAIN)
+
+
+def end(number: int, _: object = None) -> None:
+    """Handle a signal by SystemExit with the code that a shell gives it; the next one is ignored,
+    so that nothing interrupts the removal of what was made.
+    """
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(128 + number)
+
+
+def guarded(work: Callable[..., T], *args: Any, **kwargs: Any) -> T:
+    """What `work` returns; a signal that ends it ends the process, too.
+
+    A pool would take the SystemExit for the result, and begin what is next.
+    """
+    try:
+        return work(*args, **kwargs)
+    except SystemExit as error:
+        os._exit(error.code if isinstance(error.code, int) else 1)
+
+
+@contextmanager
+def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
+    """So many processes, which call `begin` first; what they have not done at the end of this is
+    given up.
+    """
+    from concurrent.futures import Future, ProcessPoolExecutor
+    from multiprocessing import active_children, get_context
+
+    others = set(active_children())
+    with safe_path():
+        executor = ProcessPoolExecutor(count, get_context("spawn"), initializer=begin)
+        submit: Callable[..., Future[Any]] = executor.submit
+        executor.submit = partial(submit, guarded)  # type: ignore[method-assign]
+        try:
+            yield executor
+        finally:
+            executor.shutdown(wait=False, cancel_futures=True)
+            stop(set(active_children()) - others)
+
+
+def stop(processes: "Iterable[BaseProcess]") -> None:
+    """End processes: first by a signal that lets them remove what they made, then by force."""
+    ended = list(processes)
+    for process in ended:
+        process.terminate()
+    last = time.monotonic() + PATIENCE
+    for process in ended:
+        process.join(max(0.0, last - time.monotonic()))
+        process.kill()
+        process.join()

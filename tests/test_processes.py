@@ -1,0 +1,318 @@
+"""What a hostile working folder does to every command, and what ends with what."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+
+import corpus
+import pytest
+
+import skinwave
+from skinwave.processes import SAFE_PATH, ended_by_signals, safe_path
+
+ROOT = Path(skinwave.__file__).parents[1]
+THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich", "PIL", "dask",
+         "pyarrow", "threadpoolctl", "tomli_w", "meshio", "pytetwild", "pymetis", "mkl", "imageio",
+         "trame", "trame_pyvista", "packaging", "pooch", "tornado", "aiohttp")  # fmt: skip
+OURS = ("fem", "meshes", "simple_model")
+MARK = "with open({0!r}, 'a') as file:\n    file.write(__name__ + chr(10))\n"
+QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
+LOOKED_UP = pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="looks processes up")
+
+
+def loaded_before_us():
+    """What `python -m` itself looks for before any of this program is run."""
+    code = "import runpy, sys; print(*{name.split('.')[0] for name in sys.modules})"
+    return set(subprocess.check_output([sys.executable, "-P", "-c", code], text=True).split())
+
+
+def as_module():
+    return [sys.executable, "-m", "skinwave"], loaded_before_us() | {"skinwave"}
+
+
+def as_program():
+    program = shutil.which("skinwave", path=sysconfig.get_path("scripts"))
+    if program is None:
+        pytest.skip("the program is not installed here")
+    return [program], set()
+
+
+@pytest.fixture(params=[as_module, as_program])
+def hostile(request, tmp_path):
+    """A folder with modules named as ours, others' and the standard library's; the command."""
+    command, left_out = request.param()
+    place, ran = tmp_path / "here", tmp_path / "ran"
+    place.mkdir()
+    for name in {*sys.stdlib_module_names, *OURS, *THIRD, "skinwave"} - left_out:
+        (place / f"{name}.py").write_text(MARK.format(str(ran)))
+    (place / "small.toml").write_text(corpus.GOOD)
+    return command, place, ran
+
+
+def run_there(hostile, *arguments, code=0, threads="1", timeout=None):
+    """Run a command there; after so many s it is told to end."""
+    command, place, ran = hostile
+    env = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), threads)
+    env |= {"TMPDIR": str(place.parent)}
+    process = subprocess.Popen(
+        [*command, *arguments], cwd=place, env=env, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        said = process.communicate(timeout=timeout)[1]
+    except subprocess.TimeoutExpired:
+        process.terminate()
+        said, code = process.communicate(timeout=60)[1], 143
+    assert process.returncode == code, said
+    assert not ran.exists(), ran.read_text()
+
+
+def test_nothing_of_a_hostile_folder_is_imported(hostile):
+    run_there(hostile, "--version")
+    run_there(hostile, "run", "small.toml", "--h", "10", "--out", "out", "--quiet")
+    run_there(hostile, "run", "nothing.toml", code=2)
+
+
+@pytest.mark.slow
+def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
+    """Those that take minutes are told to end when their own processes have begun."""
+    from skinwave.cli import COMMANDS
+
+    small = ["small.toml", "--h", "10", "--quiet"]
+    surface(hostile[1] / "body.stl")
+    asked = {
+        "run": [*small, "--out", "out"],
+        "plan": ["small.toml"],
+        "rerun": ["out", "--quiet"],
+        "same": ["out", "out-rerun"],
+        "compare": [*small, "--out", "both"],
+        "sweep": [*small, "--vary", "tacton.am_frequency_hz=100,150", "--model", "fem", "--out",
+                  "swept", "--workers", "1"],
+        "plot": ["swept"],
+        "convert": ["small.toml", "out.csv"],
+        "mesh": ["body.stl", "--h", "6", "--out", "body.vtu"],
+        "doctor": [],
+        "cache": [],
+        "report": small,
+        "film": ["out", "--out", "film.gif"],
+        "relax": small,
+        "tradeoff": ["small.toml", "--quiet"],
+        "verify": ["--quick", "--quiet"],
+    }  # fmt: skip
+    assert set(COMMANDS) == {*asked, "web"}  # which has a test of its own
+    for name, arguments in asked.items():
+        threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
+        code = 2 if name == "film" else 0  # no report is there
+        run_there(hostile, name, *arguments, threads=threads, code=code, timeout=30)
+
+
+def surface(path):
+    """A block of rubber with round edges, so that meshing takes a second."""
+    import pyvista
+
+    box = pyvista.Cube(x_length=0.06, y_length=0.06, z_length=0.02).triangulate().subdivide(4)
+    box.save(path)
+
+
+def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path):
+    """A user's own script, whose folder is searched, but not that in which it is run."""
+    hostile, script, ran = tmp_path / "here", tmp_path / "there/script.py", tmp_path / "ran"
+    hostile.mkdir()
+    script.parent.mkdir()
+    for name in {*sys.stdlib_module_names, *OURS, *THIRD} - {"__main__"}:
+        (hostile / f"{name}.py").write_text(MARK.format(str(ran)))
+    (script.parent / "beside.py").write_text("def two():\n    return 2\n")
+    script.write_text(
+        "from skinwave.effort import apart, helper\nimport beside\n"
+        "if __name__ == '__main__':\n"
+        "    with helper() as aside:\n"
+        "        print(apart(beside.two) + aside.submit(beside.two).result())"
+    )
+    said = subprocess.check_output([sys.executable, str(script)], cwd=hostile, text=True)
+    assert said.strip() == "4"
+    assert not ran.exists(), ran.read_text()
+
+
+def test_another_programs_working_folder_stays(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/__init__.py").write_text("import skinwave")
+    (tmp_path / "mine/__main__.py").write_text("import beside")
+    (tmp_path / "beside.py").write_text("print('found')")
+    words = [sys.executable, "-m", "mine"]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    assert subprocess.check_output(words, cwd=tmp_path, env=env, text=True) == "found\n"
+
+
+def test_the_environment_is_as_before(monkeypatch):
+    for before in (None, "", "1"):
+        monkeypatch.delenv(SAFE_PATH, raising=False)
+        if before is not None:
+            monkeypatch.setenv(SAFE_PATH, before)
+        with safe_path():
+            assert os.environ[SAFE_PATH] == "1"
+        assert os.environ.get(SAFE_PATH) == before
+
+
+def ended(work):
+    """The code of the exit by which some work ends that gets a signal."""
+    with pytest.raises(SystemExit) as stopped, ended_by_signals():
+        work()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
+    return stopped.value.code
+
+
+def taken_for(raised):
+    try:
+        signal.raise_signal(signal.SIGTERM)
+    except SystemExit:
+        if raised is not None:
+            raise raised from None
+
+
+@POSIX
+@pytest.mark.parametrize("raised", [SystemExit(5), None, ImportError("numpy"), ValueError("bad")])
+def test_a_signal_ends_all_whatever_it_is_taken_for(raised):
+    """An ImportError by numpy, while it is imported."""
+    assert ended(lambda: taken_for(raised)) == 143
+
+
+@POSIX
+def test_a_signal_that_is_lost_comes_again(monkeypatch):
+    monkeypatch.setattr("skinwave.processes.AGAIN", 0.05)
+    went_on = []
+
+    def work():
+        taken_for(None)
+        time.sleep(10)
+        went_on.append(True)
+
+    assert ended(work) == 143
+    assert not went_on
+
+
+@POSIX
+def test_an_ignored_signal_stays_ignored():
+    """As under nohup."""
+    handled = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ended_by_signals():
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, handled)
+
+
+def below(process):
+    """Numbers of the processes that a process has started, and of those that they have."""
+    try:
+        folders = Path(f"/proc/{process}/task").iterdir()
+        found = [int(n) for folder in folders for n in (folder / "children").read_text().split()]
+    except OSError:
+        return []
+    return found + [n for child in found for n in below(child)]
+
+
+def alive(number):
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def gone(numbers, patience=10.0):
+    """Which of these processes are left after a while."""
+    last = time.monotonic() + patience
+    while (left := [n for n in numbers if alive(n)]) and time.monotonic() < last:
+        time.sleep(0.05)
+    return left
+
+
+def works_at(process, what):
+    """Wait until a script with this name runs below a process; all that run there."""
+    last = time.monotonic() + 90
+    while time.monotonic() < last and process.poll() is None:
+        numbers = below(process.pid)
+        for number in numbers:
+            try:
+                if what in Path(f"/proc/{number}/cmdline").read_text():
+                    return numbers
+            except OSError:
+                pass
+        time.sleep(0.05)
+    raise AssertionError(f"{what} never ran; {process.poll()}")
+
+
+MESHING = "import meshes; meshes.palm_mesh(meshes.Palm(), 1.5e-3)"
+ASIDE = (
+    "from skinwave.effort import {0}\nfrom skinwave.processes import ended_by_signals\n"
+    "import meshes\nif __name__ == '__main__':\n    with ended_by_signals():\n        {1}"
+)
+CALLS = {
+    "here": ASIDE.format("apart", "meshes.palm_mesh(meshes.Palm(), 1.5e-3)"),
+    "apart": ASIDE.format("apart", "apart(meshes.palm_mesh, meshes.Palm(), 1.5e-3)"),
+    "helper": ASIDE.format("helper", "with helper() as aside:\n            "
+                           "aside.submit(meshes.palm_mesh, meshes.Palm(), 1.5e-3).result()"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def interruptible():
+    """Interrupts are not ignored, as they are in a background job and what it starts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.slow
+@LOOKED_UP
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("call", CALLS)
+def test_a_mesher_ends_with_what_asked_for_it(tmp_path, call, number):
+    places = [tmp_path / name for name in ("work", "temporary")]
+    for place in places:
+        place.mkdir()
+    (tmp_path / "script.py").write_text(CALLS[call])
+    env = os.environ | {"SKINWAVE_CACHE": "", "TMPDIR": str(places[1])}
+    words = [sys.executable, str(tmp_path / "script.py")]
+    with subprocess.Popen(words, cwd=places[0], env=env, **QUIET) as parent:
+        numbers = works_at(parent, "tetwild_child.py")
+        time.sleep(1)
+        parent.send_signal(number)
+        code = parent.wait(30)
+    assert not gone(numbers)
+    assert code == {signal.SIGTERM: 143, signal.SIGINT: -2, signal.SIGKILL: -9}[number]
+    if number != signal.SIGKILL:
+        assert not list(places[1].iterdir())
+
+
+@pytest.mark.slow
+@LOOKED_UP
+@pytest.mark.usefixtures("interruptible")
+def test_a_rerun_hands_on_what_ends_it(tmp_path):
+    """In a process with as many threads as the record has."""
+    (tmp_path / "good.toml").write_text(corpus.GOOD)
+    words = [sys.executable, "-m", "skinwave"]
+    run = ["run", "good.toml", "--h", "3", "--model", "fem-transient", "--quiet", "--no-cache"]
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    asked = os.environ | threads | {"TMPDIR": str(tmp_path / "temporary")}
+    (tmp_path / "temporary").mkdir()
+    subprocess.run([*words, *run, "--out", "out"], cwd=tmp_path, env=asked, check=True, **QUIET)
+    asked |= dict.fromkeys(threads, "2")
+    before = sorted(tmp_path.rglob("*"))
+    for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 1)):
+        with subprocess.Popen([*words, "rerun", "out"], cwd=tmp_path, env=asked, **QUIET) as again:
+            numbers = works_at(again, "rerun")
+            time.sleep(1.5)
+            again.send_signal(number)
+            assert again.wait(30) == code
+        assert not gone(numbers)
+        assert sorted(tmp_path.rglob("*")) == before
