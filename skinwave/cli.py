@@ -8,9 +8,11 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NoReturn
 
 import skinwave
 from skinwave.commands import COMMANDS
+from skinwave.plain_text import printable, say
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
@@ -35,13 +37,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with _cache_as_asked(options):
             return int(options.command(options))
     except KeyboardInterrupt:
-        print("skinwave: interrupted; nothing was finished", file=sys.stderr)
+        say("skinwave: interrupted; nothing was finished", sys.stderr)
         return 1
     except (ValueError, ArithmeticError, MemoryError, OSError) as error:
         if options.debug:
             raise
         said = " ".join(str(error).split()) or "not enough memory; take larger elements"
-        print(f"skinwave: {said}", file=sys.stderr)
+        say(f"skinwave: {said}", sys.stderr)
         return 2
 
 
@@ -72,9 +74,16 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     return found
 
 
+class _Parser(argparse.ArgumentParser):
+    """One whose errors a terminal shows and does not obey; of its kind are those of commands."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message, keep=""))
+
+
 def parser() -> argparse.ArgumentParser:
     """The parser of all commands; its results have `command`, which does it, and its name."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="skinwave",
         description="Waves in skin and paper under mid-air ultrasound haptics.",
         epilog=f"{CACHE}: folder where meshes and reduced bodies are cached; empty for none.",

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from skinwave.files import output_file
+from skinwave.plain_text import cell
 
 ROWS = "rows"  # the folder of the files within that of a sweep
 KEY, INDEX = "key", "index"  # the columns that name a row and that order rows
@@ -97,13 +98,13 @@ def numbered(wanted: Sequence[str], there: Mapping[str, int | None]) -> dict[str
 
 def write_csv(out: Path, rows: Iterable[Row]) -> None:
     """rows.csv: as read, but one column for each probe of what is told at all of them."""
-    flat = [dict(cell for name, value in row.items() for cell in _cells(name, value))
+    flat = [dict(each for name, value in row.items() for each in _cells(name, value))
             for row in rows]  # fmt: skip
     columns = list(dict.fromkeys(name for row in flat for name in row))
     text = io.StringIO()
     lines = csv.DictWriter(text, columns)
     lines.writeheader()
-    lines.writerows(flat)
+    lines.writerows({name: cell(value) for name, value in row.items()} for row in flat)
     with output_file(out / "rows.csv", overwrite=True) as file:
         file.write(text.getvalue().encode())
 
