@@ -112,14 +112,12 @@ def test_a_bar_shows_brackets(monkeypatch):
 
 
 def test_output_that_is_no_utf_8_takes_every_name(tmp_path):
-    (tmp_path / "s.toml").write_text(
-        'name = "掌"\n[tacton]\nduration_s = 0.01\n[body]\nkind="none"'
-    )
-    command = [sys.executable, "-m", "skinwave", "run", "s.toml", "--model", "point-kernel"]
+    (tmp_path / "s.toml").write_text("[tacton]\nam_frequency_hz = 100\nduration_s = 0.01\n")
+    command = [sys.executable, "-m", "skinwave", "convert", "s.toml", "掌.wav", "--rate", "1000"]
     asked = os.environ | {"PYTHONIOENCODING": "ascii"}
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, env=asked)
     assert ended.returncode == 0, ended.stderr
-    assert (tmp_path / "s-out/index.html").is_file()
+    assert ended.stdout.startswith(b"wrote \\u638c.wav")
 
 
 FORMULAE = ["=1+1", "+A1", "-A1", "@SUM(1)", "\t=1", '=HYPERLINK("x")']
