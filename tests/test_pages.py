@@ -13,13 +13,15 @@ from simple_model import Effort, Response
 from skinwave import document
 from skinwave.cli import main
 from skinwave.document import Html, joined, markup
-from skinwave.scene_file import dumps, loads
+from skinwave.scene_file import loads
 from skinwave.studies import relax_page, tradeoff
+from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Ladder, Rung
 from skinwave.studies.tradeoff import Candidate, Measured, Study
 from skinwave.verify import page as verify_page
 from skinwave.verify.case import Case, Check, Entry, Result
 
+FIRST_ASSUMPTION = next(iter(ASSUMPTIONS))
 CHROMIUM = "/usr/bin/chromium"
 ARGUMENTS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
@@ -51,7 +53,14 @@ def response(model="point-kernel", **fields):
 
 def relaxed(folder):
     rungs = [Rung(name="a", dropped=(), model=HOSTILE, response=response())]
-    rungs += [Rung(name="b", dropped=("b",), model="m", response=response("other"))]
+    rungs += [
+        Rung(
+            name=FIRST_ASSUMPTION,
+            dropped=(FIRST_ASSUMPTION,),
+            model="m",
+            response=response("other"),
+        )
+    ]
     failed = Rung(name="f", dropped=(), model="m", error=HOSTILE)
     scene = loads(table())
     found = Ladder(scene=scene, rungs=(*rungs, failed), beside=(), but_one=())
@@ -208,7 +217,3 @@ def test_every_page_has_its_policy(tmp_path):
     for path in sources:  # pages come from `document.page` alone
         if path.name not in ("document.py", "front.py"):
             assert "<!doctype" not in path.read_text(encoding="utf-8").lower(), path
-
-
-def test_a_scene_of_any_name_comes_back():
-    assert loads(dumps(loads(table()))).name == HOSTILE
