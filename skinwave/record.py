@@ -8,9 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from meshes import cache
+from meshes import cache, reading
 from simple_model import Response
 from skinwave.effort import threads, versions
 from skinwave.run import Run
@@ -110,8 +108,7 @@ def hashes(folder: Path) -> dict[str, str]:
     path = responses(folder)
     if path is None:
         return {}
-    with np.load(path) as file:
-        return {name: cache.digest(file[name]) for name in file.files}
+    return {name: cache.digest(array) for name, array in reading.arrays(path).items()}
 
 
 def _plain(value: Any) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from meshes import reading
 from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, MovingPressure, sensation_level
 from simple_model.steady import along_path, load_lines, path_knots, summed
@@ -223,13 +224,12 @@ def load(path: Path) -> View:
         If the file is none of these.
     """
     try:
-        with np.load(path) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = reading.arrays(path)
         meta = json.loads(str(arrays["meta"]))
         meta |= {"scene": loads(meta["scene"]), "effort": Effort(**meta["effort"])}
         meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
         return View(**{n: arrays[n] for n in ARRAYS}, **meta)
-    except (OSError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
 
 
