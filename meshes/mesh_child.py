@@ -8,6 +8,7 @@ of standard error.
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def main() -> int:
         print(error, file=sys.stderr)
         return child.REFUSED
     names = sorted(mesh.facets)
-    facets = {f"facets{k}": mesh.facets[name] for k, name in enumerate(names)}
+    facets: dict[str, Any] = {f"facets{k}": mesh.facets[name] for k, name in enumerate(names)}
     listed = np.array(names, np.str_)
     np.savez(target, points=mesh.points, tets=mesh.tets, region=mesh.region, names=listed, **facets)
     return 0

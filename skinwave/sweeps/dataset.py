@@ -10,10 +10,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from meshes import reading
 from skinwave.files import output_file
 from skinwave.plain_text import cell
 
 ROWS = "rows"  # the folder of the files within that of a sweep
+LARGEST = 500_000_000  # bytes of one file
+MOST_ROWS, MOST_COLUMNS = 1_000_000, 1000  # of one file
 KEY, INDEX = "key", "index"  # the columns that name a row and that order rows
 
 Row = Mapping[str, Any]
@@ -117,13 +120,45 @@ def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
 
 def _table(out: Path, columns: list[str] | None) -> Any:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     parts = sorted((out / ROWS).glob("part-*.parquet"))
     try:
-        tables = [
-            pq.ParquetFile(pa.BufferReader(part.read_bytes())).read(columns) for part in parts
-        ]
-        return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
-    except (OSError, pa.ArrowException) as error:
-        raise ValueError(f"{out} cannot be read ({' '.join(str(error).split())})") from None
+        tables = [_part(reading.content(part, LARGEST), columns) for part in parts]
+        found = pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
+    except (OSError, KeyError, pa.ArrowException) as error:
+        said = " ".join(str(error).split())[:200]
+        raise ValueError(f"{out} cannot be read ({said}); choose another folder") from None
+    if tables:
+        _check_columns(out, found)
+    return found
+
+
+def _part(content: bytes, columns: list[str] | None) -> Any:
+    """The table in one file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(pa.BufferReader(content))
+    told = file.metadata
+    unpacked = sum(told.row_group(k).total_byte_size for k in range(told.num_row_groups))
+    if told.num_rows > MOST_ROWS or unpacked > LARGEST or told.num_columns > MOST_COLUMNS:
+        raise OSError(f"{told.num_rows:,} rows of {unpacked / 1e6:,.0f} MB are no part of a sweep")
+    known = file.schema_arrow.names
+    if len(set(known)) < len(known):
+        raise OSError("columns have the same name")
+    return file.read([c for c in columns if c in known] if columns else None)
+
+
+def _check_columns(out: Path, table: Any) -> None:
+    """Refuse a table that is no sweep's."""
+    import pyarrow as pa
+
+    kinds = {KEY: pa.types.is_string, INDEX: pa.types.is_integer}
+    known = set(table.column_names)
+    wrong = [name for name, fits in kinds.items()
+             if name in known and not fits(table.schema.field(name).type)]  # fmt: skip
+    if KEY not in known or wrong or table[KEY].null_count:
+        what = wrong[0] if wrong else KEY
+        raise ValueError(
+            f"{out} holds a table without '{what}' of a sweep; choose the folder of a sweep"
+        )

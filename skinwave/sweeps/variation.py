@@ -292,4 +292,4 @@ def _refuse_words(found: Sequence[Case]) -> None:
 
 def _content(file: str) -> bytes:
     with reading.opened(file) as opened:
-        return hashlib.file_digest(opened, "sha256").digest()
+        return hashlib.file_digest(opened, "sha256").digest()  # type: ignore[arg-type]
