@@ -214,5 +214,7 @@ def _unreadable(path: Path, error: BaseException, said: str = "") -> MeshError:
     cure = {".msh": "save it as version 2.2 (gmsh -format msh22)", ".vtk": "save it as .vtu"}.get(
         path.suffix.lower(), "save it again from the program that it comes from"
     )
+    if isinstance(error, MemoryError):
+        error = ValueError("it asks for more memory than a mesh of its size needs")
     reason = " ".join((str(error) if str(error) not in ("", "1") else said).split())
     return MeshError(f"{path} cannot be read ({reason[:200] or type(error).__name__}); {cure}")

@@ -18,7 +18,9 @@ from skinwave.scene_keys import ONLY_OF, PATH, SECTIONS, as_table, as_text, chec
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
 NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
-DEEP = re.compile(rb"""(?<![\w"'-])(?:[\w-]++[ \t]*+\.[ \t]*+){16}""")  # is slow
+DEEP = re.compile(  # keys of many parts, which take squares of their number
+    rb"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
+)
 
 
 def read(path: str | Path) -> Scene:

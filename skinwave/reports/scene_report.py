@@ -266,7 +266,7 @@ def _trust(album: Album) -> list[str]:
                 f"an estimated {significant(100 * effort.estimate, 2)} %."
             )
     trust: Mapping[str, Any] = album.trust or {}
-    if "misfit" in trust:
+    if {"misfit", "model"} <= trust.keys():
         found.append(
             f"The waveforms drawn here differ from those of the planned model, {trust['model']}, "
             f"by {significant(100 * trust['misfit'], 2)} % over all probes."

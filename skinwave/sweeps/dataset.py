@@ -155,10 +155,20 @@ def _check_columns(out: Path, table: Any) -> None:
 
     kinds = {KEY: pa.types.is_string, INDEX: pa.types.is_integer}
     known = set(table.column_names)
-    wrong = [name for name, fits in kinds.items()
-             if name in known and not fits(table.schema.field(name).type)]  # fmt: skip
+    wrong = [field.name for field in table.schema
+             if not kinds.get(field.name, _is_cell)(field.type)]  # fmt: skip
     if KEY not in known or wrong or table[KEY].null_count:
-        what = wrong[0] if wrong else KEY
+        what = (wrong or [KEY])[0][:40]
         raise ValueError(
-            f"{out} holds a table without '{what}' of a sweep; choose the folder of a sweep"
+            f"{out} holds a table without '{what}' as a sweep has it; choose the folder of a sweep"
         )
+
+
+def _is_cell(kind: Any) -> bool:
+    """Whether a column is of a type that `append` writes, or releases before did."""
+    from pyarrow import types
+
+    if types.is_list(kind):
+        return bool(types.is_floating(kind.value_type))
+    plain = (types.is_string, types.is_integer, types.is_floating, types.is_boolean, types.is_null)
+    return any(fits(kind) for fits in plain)

@@ -188,7 +188,7 @@ def _value(text: str) -> Any:
     """A value as the scene file would have it; a word needs no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         number = _number(text)
         return text.strip() if number is None else number
 
