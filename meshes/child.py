@@ -54,7 +54,7 @@ def run(
 
     Where the platform knows such limits, it gets no more than `memory` in bytes.
     """
-    command = [sys.executable, "-P", str(Path(__file__).with_name(script)), *map(str, arguments)]
+    command = [sys.executable, "-P", str(Path(__file__).parent / script), *map(str, arguments)]
     try:
         ended = subprocess.run(
             _limited(command, memory), cwd=folder, timeout=timeout, capture_output=True, text=True,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import step
+from skinwave.files import folder_name
 from skinwave.pictures.views import View
 
 FIELD_FRAMES = 8  # of a period, written for ParaView
@@ -66,12 +67,12 @@ def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
     surface with `pressure_pa` about its mean.
     """
     frames = np.unique(np.arange(count) * len(view.times) // count)
-    names = []
+    names, stem = [], folder_name(view.column)
     for k, frame in enumerate(frames):
         ending = "vtu" if len(view.tets) else "vtp"
-        names.append(f"{view.column}_{k:03d}.{ending}")
+        names.append(f"{stem}_{k:03d}.{ending}")
         _grid(view, int(frame)).save(folder / names[-1])
-    path = folder / f"{view.column}.pvd"
+    path = folder / f"{stem}.pvd"
     path.write_text(_collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
     return path
 

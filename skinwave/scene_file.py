@@ -19,7 +19,7 @@ LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 k
 PROSE = 1_000_000  # bytes of it that are no numbers
 NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
 DEEP = re.compile(  # keys of many parts, which take squares of their number
-    rb"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
+    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
 )
 
 
@@ -48,7 +48,7 @@ def content(path: str | Path) -> str:
     Raises
     ------
     ValueError
-        If it cannot be read, is no UTF-8, too long, or has too many words or too long keys.
+        If it cannot be read, is no UTF-8, too long, or has too many words.
     """
     found = reading.content(path, LARGEST)
     try:
@@ -56,8 +56,6 @@ def content(path: str | Path) -> str:
             raise ValueError(
                 f"more than {PROSE / 1e6:g} MB of it are no numbers, which no scene has; cut it"
             )
-        if DEEP.search(found):
-            raise ValueError("a key of it has more than 16 parts; give it those of a scene")
         return found.decode("utf-8-sig")
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
@@ -65,6 +63,8 @@ def content(path: str | Path) -> str:
 
 def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
+    if DEEP.search(text):
+        raise ValueError("a key has more than 16 parts, which none of a scene has; shorten it")
     try:
         table = tomllib.loads(text)
     except ValueError as error:

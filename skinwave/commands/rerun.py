@@ -64,7 +64,9 @@ def _command_again(
         raise ValueError(f"the record's command '{name}' is none of {', '.join(REPEATED)}")
     again = parser().parse_args([name, str(given)])
     for key in asked.keys() - {place}:
-        if key not in vars(again) or key in REPORTING or not _is_option(asked[key]):
+        default, value = vars(again).get(key), asked[key]
+        is_known = key in vars(again) and key not in REPORTING
+        if not is_known or not _is_option(value) or (value is None and default is not None):
             raise ValueError(f"the record's option '{key}' is none of {name}; make the result anew")
     given_options = {key: value for key, value in asked.items() if value is not None}
     fitting(given_options, NUMBERS, "options of the record")

@@ -9,6 +9,7 @@ import numpy as np
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
+from skinwave.files import folder_name
 from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
@@ -123,6 +124,7 @@ def _write_data(folder: Path, album: Album) -> None:
     for name, runs in tactons(album).items():
         for k, run in enumerate(runs):
             stem = run.column if len(tactons(album)) == 1 else f"{name}-{run.column}"
+            stem = folder_name(stem)  # names in the files of a result may be paths
             write_probes(folder / f"{stem}_probes", run.response)
             if k == len(runs) - 1:
                 write_sound(folder, run.response, strongest_probe([run]))
