@@ -281,6 +281,7 @@ def meshes() -> dict[str, Write]:
     node = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n"
     texts: dict[str, bytes | str] = {
         "generate.inp": f"{node}*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n",
+        "memory.inp": f"{node}*ELSET,ELSET=a,GENERATE\n1,2000000000,1\n",
         "nset.inp": f"{node}*NSET,NSET=a,GENERATE\n1,1000000000000,1\n",
         "itself.inp": "*INCLUDE,INPUT=itself.inp\n",
         "device.inp": "*INCLUDE,INPUT=/dev/zero\n",
