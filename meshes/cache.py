@@ -41,7 +41,10 @@ def folder() -> Path | None:
     if (named := os.environ.get("SKINWAVE_CACHE")) is not None:
         return Path(named) if named else None
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    return Path(base or Path.home() / ".cache") / "skinwave"
+    try:
+        return Path(base or Path.home() / ".cache") / "skinwave"
+    except RuntimeError:  # nobody has a home here
+        return None
 
 
 def key(*parts: object) -> str:

@@ -1,14 +1,48 @@
 """Work that may crash or never end, in a process of its own."""
 
+import math
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+from meshes.reading import on_disk
 from meshes.tetmesh import MeshError
 
+# Limits of what reads a file: of every megabyte that it takes on the disk, beside those of any.
+LEAST_SECONDS, SECONDS = 8.0, 1.0
+LEAST_BYTES, BYTES = 800_000_000, 20
+LARGEST = 2_000_000_000  # bytes of a file
+REFUSED = 3  # code of a script that said what is wrong with a file
 
-def run(script: str, *arguments: object, folder: str | os.PathLike[str], timeout: float) -> None:
+
+class Refused(MeshError):
+    """What a script said of a file that it refused, and ended with `REFUSED`."""
+
+
+def read(script: str, path: Path, *arguments: object, folder: str | os.PathLike[str]) -> None:
+    """Run a script that reads a file, with time and memory by the file's size; raises what `run`
+    does, and MeshError where it takes too long or the file is too large.
+    """
+    if (size := path.stat().st_size) > LARGEST:
+        raise MeshError(
+            f"it is larger ({size / 1e6:,.0f} MB) than the limit of {LARGEST / 1e6:,.0f} MB"
+        )
+    seconds = LEAST_SECONDS + SECONDS * on_disk(path) / 1e6
+    memory = LEAST_BYTES + BYTES * on_disk(path)
+    try:
+        run(script, path.resolve(), *arguments, folder=folder, timeout=seconds, memory=memory)
+    except TimeoutError:
+        raise MeshError(f"reading it took longer than {seconds:.0f} s") from None
+
+
+def run(
+    script: str,
+    *arguments: object,
+    folder: str | os.PathLike[str],
+    timeout: float,
+    memory: float = math.inf,
+) -> None:
     """Run a script of this package in a folder; it ends with this process, however that ends.
 
     Raises
@@ -17,9 +51,12 @@ def run(script: str, *arguments: object, folder: str | os.PathLike[str], timeout
         If it fails; with the last line that it wrote.
     TimeoutError
         If it takes longer than `timeout` in second.
+
+    Where the platform knows such limits, it gets no more than `memory` in bytes.
     """
     scripts = [str(Path(__file__).with_name(name)) for name in ("watched.py", script)]
-    command = [sys.executable, "-P", *scripts, *map(str, arguments)]
+    limit = str(int(memory)) if math.isfinite(memory) else "0"
+    command = [sys.executable, "-P", scripts[0], limit, scripts[1], *map(str, arguments)]
     watched, held = os.pipe()  # `watched.py` ends when this process no longer holds its other end
     try:
         ended = subprocess.run(
@@ -31,6 +68,8 @@ def run(script: str, *arguments: object, folder: str | os.PathLike[str], timeout
     finally:
         os.close(watched)
         os.close(held)
+    if ended.returncode == REFUSED:
+        raise Refused(ended.stderr.strip().splitlines()[-1])
     if ended.returncode != 0:
         said = ended.stderr.strip().splitlines()[-1:] or ["it said nothing"]
         raise MeshError(f"it ended with code {ended.returncode}, {said[0][:200]}")

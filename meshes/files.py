@@ -33,7 +33,6 @@ from meshes.tetmesh import MeshError, TetMesh
 VOLUME_FORMATS = (".vtu", ".msh", ".inp", ".vtk")
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused by gmsh itself
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
-LONGEST_READ = 300.0  # s that VTK may take for a file
 
 
 def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
@@ -51,8 +50,28 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
         If the file cannot be read, holds no tetrahedra, or numbers nodes in an unknown order.
     """
     path = existing(path, VOLUME_FORMATS)
-    scale = scale_of(unit)
-    raw = _by_vtk(path) if path.suffix.lower() == ".vtk" else _meshio_read(path)
+    scale_of(unit)
+    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
+        source, target = path, Path(folder, "mesh.npz")
+        try:
+            if path.suffix.lower() == ".vtk":  # of whose newer versions meshio knows nothing
+                source = Path(folder, "mesh.vtu")
+                child.read("vtk_child.py", path, source, folder=folder)
+            child.read("mesh_child.py", source, unit, target, folder=folder)
+        except child.Refused as error:
+            raise MeshError(str(error).replace(str(source.resolve()), str(path))) from None
+        except MeshError as error:
+            raise _unreadable(path, error) from None
+        with np.load(target) as found:
+            facets = {str(name): found[f"facets{k}"] for k, name in enumerate(found["names"])}
+            return TetMesh(
+                points=found["points"], tets=found["tets"], region=found["region"], facets=facets
+            )
+
+
+def read_here(path: Path, scale: float) -> TetMesh:
+    """What `read` does, in this process: only for `mesh_child.py`, which has limits."""
+    raw = _meshio_read(path)
     try:
         return _mesh(path, raw, scale)
     except MeshError:
@@ -191,20 +210,11 @@ def _meshio_read(path: Path) -> Any:
         raise _unreadable(path, error, said.getvalue()) from None
 
 
-def _by_vtk(path: Path) -> Any:
-    """A legacy VTK file, of whose newer versions meshio knows nothing, by way of a `.vtu`."""
-    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
-        target = Path(folder, "mesh.vtu")
-        try:
-            child.run("vtk_child.py", path.resolve(), target, folder=folder, timeout=LONGEST_READ)
-        except MeshError as error:
-            raise _unreadable(path, error) from None
-        return _meshio_read(target)
-
-
 def _unreadable(path: Path, error: BaseException, said: str = "") -> MeshError:
     cure = {".msh": "save it as version 2.2 (gmsh -format msh22)", ".vtk": "save it as .vtu"}.get(
         path.suffix.lower(), "save it again from the program that it comes from"
     )
+    if isinstance(error, MemoryError):
+        error = ValueError("it asks for more memory than a mesh of its size needs")
     reason = " ".join((str(error) if str(error) not in ("", "1") else said).split())
     return MeshError(f"{path} cannot be read ({reason[:200] or type(error).__name__}); {cure}")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from meshes import child
-from meshes.files import LONGEST_READ, existing, scale_of
+from meshes.files import existing, scale_of
 from meshes.placing import turned
 from meshes.surface import Surface
 from meshes.tetmesh import MeshError
@@ -33,7 +33,7 @@ def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z
     with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
         target = Path(folder, "surface.npz")
         try:
-            child.run("vtk_child.py", path.resolve(), target, folder=folder, timeout=LONGEST_READ)
+            child.read("vtk_child.py", path, target, folder=folder)
         except MeshError as error:
             raise MeshError(
                 f"{path} cannot be read ({error}); save it again from the program that it is from"

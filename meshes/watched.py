@@ -1,10 +1,12 @@
-"""Run by `meshes.child`: a script that ends as soon as the process that started it is gone.
+"""Run by `meshes.child`: a script that ends as soon as the process that started it is gone, and
+that gets so many bytes of memory at most, where the platform knows such limits; 0 is no limit.
 
-    python watched.py SCRIPT ARGUMENT...
+    python watched.py BYTES SCRIPT ARGUMENT...
 
 That process holds the other end of this one's standard input and writes nothing to it.
 """
 
+import contextlib
 import os
 import runpy
 import signal
@@ -16,7 +18,8 @@ def main() -> None:
     """Watch, and run SCRIPT."""
     threading.Thread(target=_end_with_input, daemon=True).start()
     _end_with_parent()
-    sys.argv = sys.argv[1:]
+    _limit_memory(int(sys.argv[1]))
+    sys.argv = sys.argv[2:]
     runpy.run_path(sys.argv[0], run_name="__main__")
 
 
@@ -32,6 +35,15 @@ def _end_with_parent() -> None:
 
         set_parent_death_signal = 1
         ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+
+
+def _limit_memory(most: int) -> None:
+    """Of data, not of addresses: libraries of VTK map more than a gigabyte that they never touch."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        if most:
+            resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 if __name__ == "__main__":

@@ -8,9 +8,11 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NoReturn
 
 import skinwave
 from skinwave.commands import COMMANDS
+from skinwave.plain_text import printable, say
 from skinwave.processes import ended_by_signals, safe_path
 from skinwave.streams import CLOSED, explained, flushed, reader_gone
 
@@ -46,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return int(options.command(options))
     except KeyboardInterrupt as interrupt:
         kept = str(interrupt) or "nothing was finished"
-        print(f"skinwave: interrupted; {kept}", file=sys.stderr)
+        say(f"skinwave: interrupted; {kept}", sys.stderr)
         return 1
     except (ValueError, ArithmeticError, MemoryError, OSError) as error:
         if reader_gone(error):
@@ -55,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         text = explained(error) if isinstance(error, OSError) else str(error)
         said = " ".join(text.split()) or "not enough memory; take larger elements"
-        print(f"skinwave: {said}", file=sys.stderr)
+        say(f"skinwave: {said}", sys.stderr)
         return 2
 
 
@@ -86,9 +88,16 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     return found
 
 
+class _Parser(argparse.ArgumentParser):
+    """One whose errors a terminal shows and does not obey; of its kind are those of commands."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message, keep=""))
+
+
 def parser() -> argparse.ArgumentParser:
     """The parser of all commands; its results have `command`, which does it, and its name."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="skinwave",
         description="Waves in skin and paper under mid-air ultrasound haptics.",
         epilog=f"{CACHE}: folder where meshes and reduced bodies are cached, 5 GiB at most, those "

@@ -1,15 +1,20 @@
-"""Parts of a page: one HTML file with its pictures inside."""
+"""Parts of a page: one HTML file with its pictures inside.
 
+Text is escaped wherever it enters a page; only `Html`, which is made here, is taken as it is.
+"""
+
+import hashlib
 import re
 from base64 import b64encode
 from collections.abc import Iterable
-from html import escape
+from html import escape, unescape
 from string import Template
 
 from simple_model import Effort
 
 _PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>$title</title>
+<html lang="en"><head><meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="$policy"><title>$title</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <link rel="icon" href="data:,">
 <style>
@@ -39,25 +44,69 @@ $body
 """)
 
 
+# What a page may load: pictures inside it and its own styles. No network, form or script but those
+# of a page within it, by their digests: it inherits this policy.
+POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; "
+    "form-action 'none'"
+)
+_INNER = re.compile(r'<iframe [^>"]*"allow-scripts"[^>]* srcdoc="([^"]*)"')
+_SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script\s*>", re.DOTALL | re.IGNORECASE)
+
+
+class Html(str):
+    """HTML, as against text. What operations of `str` make of it is text again, so that a part
+    that was put together without `markup` or `joined` is shown with its tags, and never obeyed.
+    """
+
+    __slots__ = ()
+
+
+def markup(template: str, *values: str) -> Html:
+    """The template with values in the place of its {}; those that are text are escaped."""
+    return Html(template.format(*map(escaped, values)))
+
+
+def joined(parts: Iterable[str], between: str = "\n") -> Html:
+    """Parts one after another; those that are text are escaped."""
+    return Html(between.join(map(escaped, parts)))
+
+
+def escaped(part: str) -> Html:
+    """HTML as it is, text escaped."""
+    return part if isinstance(part, Html) else Html(escape(part))
+
+
 def page(title: str, *parts: str) -> str:
-    """A complete page of parts that are HTML already."""
-    return _PAGE.substitute(title=escape(title), body="\n".join(parts))
+    """A complete page with its policy; parts that are text are escaped."""
+    body = joined(parts)
+    return _PAGE.substitute(policy=_policy(body), title=escape(title), body=body)
 
 
-def section(heading: str, *parts: str) -> str:
+def _policy(body: Html) -> str:
+    """The policy of a page; escaped text has no quotes, so that what is found is an inner page."""
+    inner = (unescape(found) for found in _INNER.findall(body))
+    scripts = [script for page in inner for script in _SCRIPT.findall(page)]
+    if not scripts:
+        return POLICY
+    digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    return f"{POLICY}; script-src " + " ".join(f"'sha256-{digest}'" for digest in digests)
+
+
+def section(heading: str, *parts: str) -> Html:
     """A headed part of the page."""
-    return f"<h2>{escape(heading)}</h2>\n" + "\n".join(parts)
+    return joined([markup("<h2>{}</h2>", heading), *parts])
 
 
-def paragraph(text: str) -> str:
-    """Plain text as a paragraph."""
-    return f"<p>{escape(text)}</p>"
+def paragraph(text: str) -> Html:
+    """A paragraph."""
+    return markup("<p>{}</p>", text)
 
 
-def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> str:
+def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Html:
     """All warnings of some answers by name, for the top of a page; nothing if there are none."""
-    shown = "".join(paragraph(f"Take care: {text}.") for text in worst_warnings(efforts))
-    return f'<div class="warning" role="note">{shown}</div>' if shown else ""
+    shown = joined((paragraph(f"Take care: {text}.") for text in worst_warnings(efforts)), "")
+    return markup('<div class="warning" role="note">{}</div>', shown) if shown else Html()
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
@@ -79,31 +128,32 @@ def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
-def picture(drawn: bytes, caption: str, name: str = "", kind: str = "png") -> str:
+def picture(drawn: bytes, caption: str, name: str = "", kind: str = "png") -> Html:
     """A picture inside the page: PNG, or another kind that browsers know."""
-    return (
-        f'<figure id="{escape(name)}"><img alt="{escape(caption)}" '
-        f'src="data:image/{kind};base64,{b64encode(drawn).decode()}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
+    return markup(
+        '<figure id="{}"><img alt="{}" src="data:image/{};base64,{}">'
+        "<figcaption>{}</figcaption></figure>",
+        name, caption, kind, b64encode(drawn).decode(), caption,
+    )  # fmt: skip
 
 
-def inner_page(page: str, caption: str) -> str:
-    """A page within the page, on screens only."""
-    frame = f'<iframe title="{escape(caption)}" srcdoc="{escape(page)}"></iframe>'
-    return f'<figure class="screen">{frame}<figcaption>{escape(caption)}</figcaption></figure>'
+def inner_page(page: str, caption: str) -> Html:
+    """A page within the page, on screens only; its scripts reach nothing outside of it."""
+    return markup(
+        '<figure class="screen"><iframe sandbox="allow-scripts" title="{}" srcdoc="{}"></iframe>'
+        "<figcaption>{}</figcaption></figure>",
+        caption, str(page), caption,
+    )  # fmt: skip
 
 
-def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Html:
     """A table; cells that read as numbers are set to the right."""
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
-    return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
+    head = joined((markup("<th>{}</th>", cell) for cell in header), "")
+    body = joined((markup("<tr>{}</tr>", joined(map(_cell, row), "")) for row in rows), "")
+    return markup('<div class="wide"><table><tr>{}</tr>{}</table></div>', head, body)
 
 
-def _cell(cell: str) -> str:
-    if cell.startswith("<"):
-        return f"<td>{cell}</td>"
+def _cell(cell: str) -> Html:
     number = cell.replace(",", "").replace("+", "").replace("-", "").replace(".", "")
-    kind = ' class="number"' if number.replace("e", "").isdigit() else ""
-    return f"<td{kind}>{escape(cell)}</td>"
+    is_number = number.replace("e", "").isdigit()
+    return markup('<td class="number">{}</td>' if is_number else "<td>{}</td>", cell)

@@ -10,7 +10,7 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from skinwave.effort import Progress, SkinwaveWarning
-from skinwave.pictures.motion import Waves, from_rest, probe_response, waves
+from skinwave.pictures.motion import Waves, check_values, from_rest, probe_response, waves
 from skinwave.planning.assessment import told
 from skinwave.scene import Scene
 
@@ -50,6 +50,7 @@ def field(
         If the scene has no body, a number is out of range or the tolerance is out of reach.
     """
     moved = waves(scene, tolerance, progress, h=h, solver=solver)
+    check_values(len(times), len(moved.mesh.points))
     displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
     at_probes = assessed_probes(scene, moved, h, tolerance, solver)
     for sentence in at_probes.effort.warnings:

@@ -14,6 +14,7 @@ import numpy as np
 
 from simple_model import Effort
 from skinwave import outputs, record
+from skinwave.plain_text import cell
 from skinwave.run import Run
 from skinwave.scene_file import dumps
 from skinwave.studies.claims import Verdict
@@ -124,7 +125,7 @@ def _write_csv(path: Path, columns: Iterable[str], rows: Iterable[tuple[object, 
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
-        writer.writerows(rows)
+        writer.writerows(map(cell, row) for row in rows)
 
 
 def _short(value: float) -> str:

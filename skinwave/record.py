@@ -1,6 +1,7 @@
 """What is needed to repeat a result, and what tells whether it came out again: record.json."""
 
 import json
+import re
 import shlex
 from argparse import Namespace
 from collections.abc import Mapping
@@ -8,16 +9,19 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from meshes import cache
+from meshes import cache, reading
 from simple_model import Response
-from skinwave.effort import threads, versions
+from skinwave.effort import THREADS, threads, versions
+from skinwave.fitting import fitting
 from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 
 FILE, FORMAT = "record.json", 1
+FITTING = {
+    "format": float, "threads": {str: str},
+    "command": {"typed": str, "name": str, "options": {str: object}},
+}  # fmt: skip
 RESPONSES = ("responses.npz", "response.npz")  # today's name, and that of version 0.2
 # Options that say where and how to report, not what to compute.
 REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
@@ -86,18 +90,26 @@ def read(folder: Path) -> dict[str, Any]:
         If there is none, or none that can be read.
     """
     path = folder / FILE
+    if not path.exists():
+        raise ValueError(f"{path} cannot be read; name a folder that run, compare or report wrote")
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        if record["format"] != FORMAT or not isinstance(record["command"]["options"], dict):
-            raise ValueError(f"format {record['format']}")
-    except OSError as error:
-        raise ValueError(
-            f"{path} cannot be read ({error.strerror}); name a folder that run, compare or report "
-            "wrote"
-        ) from None
-    except (ValueError, KeyError, TypeError) as error:
+        record = fitting(reading.parsed(path), FITTING, "record")
+        if record["format"] != FORMAT:
+            raise ValueError(f"format {record['format']}, not {FORMAT}")
+        _check_threads(record["threads"])
+        for key, kind in (("scene", str), ("expected_error", float)):
+            if record.setdefault(key, None) is not None:
+                fitting(record[key], kind, key)
+    except ValueError as error:
         raise ValueError(f"{path} is no record ({error}); make the result anew") from None
     return dict(record)
+
+
+def _check_threads(counted: Mapping[str, str]) -> None:
+    """Refuse what is set in the environment of a process and is no number of threads."""
+    for name, value in counted.items():
+        if name not in THREADS or not re.fullmatch(r"[0-9]{1,4}(,[0-9]{1,4})*", value):
+            raise ValueError(f"threads has '{name[:40]}' = '{value[:40]}', no number of threads")
 
 
 def responses(folder: Path) -> Path | None:
@@ -110,8 +122,7 @@ def hashes(folder: Path) -> dict[str, str]:
     path = responses(folder)
     if path is None:
         return {}
-    with np.load(path) as file:
-        return {name: cache.digest(file[name]) for name in file.files}
+    return {name: cache.digest(array) for name, array in reading.arrays(path).items()}
 
 
 def _plain(value: Any) -> Any:

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from meshes import reading
 from skinwave import record
 
 LINES = "lines.csv"
+LARGEST_CSV = 64_000_000  # bytes
 WRITTEN = 1.1e-5  # of a number in lines.csv, whose six digits may differ by one in the last
 
 
@@ -95,11 +97,7 @@ def _by(where: str, a: float, b: float, largest: float, rtol: float) -> Differen
 
 
 def _loaded(path: Path) -> dict[str, NDArray]:
-    try:
-        with np.load(path) as file:
-            arrays = {name: file[name] for name in file.files}
-    except Exception as error:  # whatever zip files and array headers make of spoilt bytes
-        raise ValueError(f"{path} cannot be read ({error}); make the result anew") from None
+    arrays = reading.arrays(path)
     for name, array in arrays.items():
         if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
             raise ValueError(f"{path} holds '{name}', which is not finite numbers; make it anew")
@@ -107,7 +105,7 @@ def _loaded(path: Path) -> dict[str, NDArray]:
 
 
 def _lines(name: str, first: Path, second: Path, rtol: float) -> Iterator[Difference]:
-    a, b = ([*csv.DictReader(p.read_text(encoding="utf-8").splitlines())] for p in (first, second))
+    a, b = ([*csv.DictReader(reading.text(p, LARGEST_CSV).splitlines())] for p in (first, second))
     if [*map(list, a)] != [*map(list, b)]:
         yield Difference(words=f"{name} has {len(a)} rows in one and {len(b)} in the other, or "
                                "other columns")  # fmt: skip

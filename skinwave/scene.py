@@ -264,6 +264,8 @@ BODIES = {
     "skin-slab": Body(),
     "palm": Body(kind="palm", width=0.085),
 }
+SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
+MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
 
@@ -292,6 +294,12 @@ class Scene:
     def __post_init__(self) -> None:
         if not self.probes:
             raise ValueError("points_mm is empty; give at least one probe")
+        if (values := len(self.probes) * self.tacton.duration * SAMPLE_RATE) > MOST_VALUES:
+            raise ValueError(
+                f"{len(self.probes):,} probes for {self.tacton.duration:g} s at "
+                f"{SAMPLE_RATE:g} Hz are {values:,.0f} values, the limit is {MOST_VALUES:,}; "
+                "give fewer probes or a shorter Tacton"
+            )
         if self.body.kind in ("none", "mesh"):
             return
         half = np.array([self.body.width, self.body.height]) / 2

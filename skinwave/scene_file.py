@@ -1,5 +1,6 @@
 """Scenes as TOML files, read and written."""
 
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -7,13 +8,19 @@ from typing import Any
 
 import tomli_w
 
+from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
 from simple_model.trajectory import BY_POINTS
 from skinwave.scene import BODIES, KINDS, Body, Placement, Scene
 from skinwave.scene_keys import ONLY_OF, PATH, SECTIONS, as_table, as_text, checked
 
-LARGEST = 32_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
+LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
+PROSE = 1_000_000  # bytes of it that are no numbers
+NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
+DEEP = re.compile(  # keys of many parts, which take squares of their number
+    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
+)
 
 
 def read(path: str | Path) -> Scene:
@@ -24,24 +31,40 @@ def read(path: str | Path) -> Scene:
     ValueError
         If the file cannot be read, or is not a scene: what, got, limit, cure in one sentence.
     """
+    text = content(path)
     try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise ValueError(f"larger than {LARGEST / 1e6:g} MB, which no scene is; check the path")
-        scene = loads(content.decode("utf-8-sig"))
+        scene = loads(text)
         if scene.body.file:  # is named from where the scene is
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
         return scene
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def content(path: str | Path) -> str:
+    """The text of a scene file, of a size that is parsed within seconds.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read, is no UTF-8, too long, or has too many words.
+    """
+    found = reading.content(path, LARGEST)
+    try:
+        if len(found) > PROSE and len(found.translate(None, NUMBERS)) > PROSE:
+            raise ValueError(
+                f"more than {PROSE / 1e6:g} MB of it are no numbers, which no scene has; cut it"
+            )
+        return found.decode("utf-8-sig")
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
 
 def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
+    if DEEP.search(text):
+        raise ValueError("a key has more than 16 parts, which none of a scene has; shorten it")
     try:
         table = tomllib.loads(text)
     except ValueError as error:

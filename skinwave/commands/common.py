@@ -9,6 +9,8 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skinwave.plain_text import printable, say
+
 if TYPE_CHECKING:
     from simple_model import Response
     from skinwave.effort import Progress
@@ -73,7 +75,7 @@ def required_plan(
 def warn(sentences: Iterable[str]) -> None:
     """Say what is less than was asked for."""
     for sentence in sentences:
-        print(f"skinwave: warning: {sentence}", file=sys.stderr)
+        say(f"skinwave: warning: {' '.join(sentence.split())}", sys.stderr)
 
 
 def told(response: "Response") -> dict[str, Any]:
@@ -88,9 +90,9 @@ def told(response: "Response") -> dict[str, Any]:
 def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:
     """The closing line, or all that it sums up as JSON."""
     if options.json:
-        print(json.dumps(summary))
+        say(json.dumps(summary))
     elif not options.quiet:
-        print(sentence)
+        say(sentence)
 
 
 def metre(millimetre: float | None) -> float | None:
@@ -116,7 +118,7 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
             name = follow(phase, fraction).name
             if name not in phases[-1:]:
                 phases.append(name)
-                print(name, file=sys.stderr, flush=True)
+                say(name, sys.stderr)
 
         yield log
         return
@@ -128,13 +130,15 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
         TimeElapsedColumn,
     )
 
-    columns = (TextColumn("{task.description:<36}"), BarColumn(), TimeElapsedColumn())
-    left = TextColumn("{task.fields[left]}")
+    columns = (TextColumn("{task.description:<36}", markup=False), BarColumn(), TimeElapsedColumn())
+    left = TextColumn("{task.fields[left]}", markup=False)
     with Progress(*columns, left, console=Console(stderr=True)) as bar:
         task = bar.add_task("", total=1.0, left="")
 
         def show(phase: str, fraction: float) -> None:
             step = follow(phase, fraction)
-            bar.update(task, description=step.name, completed=step.done, left=step.time_left)
+            bar.update(
+                task, description=printable(step.name, ""), completed=step.done, left=step.time_left
+            )
 
         yield show

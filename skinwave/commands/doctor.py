@@ -3,6 +3,8 @@
 import argparse
 import json
 
+from skinwave.plain_text import say
+
 
 def options(parser: argparse.ArgumentParser) -> None:
     """What a user may ask of it."""
@@ -16,13 +18,13 @@ def run(options: argparse.Namespace) -> int:
 
     found = examine()
     if options.json:
-        print(json.dumps([{"what": f.what, "value": f.value, "cure": f.cure} for f in found]))
+        say(json.dumps([{"what": f.what, "value": f.value, "cure": f.cure} for f in found]))
         return 0
     width = max(len(finding.what) for finding in found)
     for finding in found:
-        print(f"{finding.what:<{width}}  {finding.value}")
+        say(f"{finding.what:<{width}}  {finding.value}")
         if finding.cure:
-            print(f"{'':<{width}}  -> {finding.cure}")
+            say(f"{'':<{width}}  -> {finding.cure}")
     missing = sum(bool(finding.cure) for finding in found)
-    print(f"{missing} of {len(found)} could be better" if missing else "nothing is missing")
+    say(f"{missing} of {len(found)} could be better" if missing else "nothing is missing")
     return 0

@@ -4,6 +4,7 @@ import argparse
 import json
 
 from skinwave.commands.common import add_mesh, add_model, add_reporting, add_scene, required_plan
+from skinwave.plain_text import say
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -23,9 +24,9 @@ def run(options: argparse.Namespace) -> int:
     required = required_plan(options, read(options.scene))
     if options.json:
         table = asdict(replace(required, prepared=None))
-        print(json.dumps({key: value for key, value in table.items() if key != "prepared"}))
+        say(json.dumps({key: value for key, value in table.items() if key != "prepared"}))
         return 0
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
     for row in required.rows:
-        print(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
+        say(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
     return 0

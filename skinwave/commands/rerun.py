@@ -12,6 +12,9 @@ from typing import Any
 
 from skinwave.commands.common import add_output, progress_of, summarise
 
+REPEATED = ("run", "compare", "report")
+NUMBERS = {"h?": float, "dt?": float, "tolerance?": float, "frames?": float}
+
 
 def options(parser: argparse.ArgumentParser) -> None:
     """What a user may ask of it."""
@@ -68,19 +71,37 @@ def _command_again(
 ) -> int:
     """The command of the command line, with the options that it had."""
     from skinwave.cli import parser
+    from skinwave.fitting import fitting
+    from skinwave.record import REPORTING
 
     name, asked = kept["command"]["name"], kept["command"]["options"]
     place = "source" if "source" in asked else "scene"
     given = str(scene) if kept["scene"] is not None else asked.get(place)
-    try:
-        again = parser().parse_args([name] if given is None else [name, str(given)])
-    except SystemExit:
-        raise ValueError(f"the record's command '{name}' is none that can be repeated") from None
+    if name not in REPEATED:
+        raise ValueError(f"the record's command '{name}' is none of {', '.join(REPEATED)}")
+    again = parser().parse_args([name] if given is None else [name, str(given)])
+    for key in asked.keys() - {place}:
+        default, value = vars(again).get(key), asked[key]
+        is_known = key in vars(again) and key not in REPORTING
+        if not is_known or not _is_option(value) or (value is None and default is not None):
+            raise ValueError(f"the record's option '{key}' is none of {name}; make the result anew")
+    given_options = {key: value for key, value in asked.items() if value is not None}
+    fitting(given_options, NUMBERS, "options of the record")
     vars(again).update({key: value for key, value in asked.items() if key != place})
     for key in ("overwrite", "quiet", "json", "debug"):
         setattr(again, key, getattr(options, key))
-    again.out, again.typed = out, shlex.split(kept["command"]["typed"])[1:]
+    try:
+        again.out, again.typed = out, shlex.split(kept["command"]["typed"])[1:]
+    except ValueError:
+        raise ValueError("the record's command cannot be split; make the result anew") from None
     return int(again.command(again))
+
+
+def _is_option(value: Any) -> bool:
+    """Whether a value is one of JSON that an option has."""
+    if isinstance(value, list):
+        return all(isinstance(item, str) for item in value)
+    return value is None or isinstance(value, str | bool | int | float)
 
 
 def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path, out: Path) -> int:
@@ -89,6 +110,7 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     from math import nan
 
     from skinwave.files import fill
+    from skinwave.fitting import fitting
     from skinwave.outputs import output_folder
     from skinwave.pictures.motion import probe_response, waves
     from skinwave.run import Run
@@ -96,6 +118,13 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     from skinwave.simulation import compute
 
     asked, by = kept["command"]["options"], kept["command"]["name"]
+    kinds = {"h": float, "dt": float, "solver": str, "model": str, "tacton": str, "body": str}
+    given = {key: value for key, value in asked.items() if value is not None}
+    fitting(given, {f"{key}?": kind for key, kind in kinds.items()}, "options of the record")
+    if missing := kinds.keys() - asked.keys():
+        raise ValueError(f"options of the record lack '{min(missing)}'; make the result anew")
+    if kept["scene"] is None:
+        raise ValueError("the record has no scene; make the result anew")
     its, h, solver = read(scene), asked["h"], asked["solver"]
     with (
         output_folder(

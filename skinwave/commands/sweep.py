@@ -18,6 +18,7 @@ from skinwave.commands.common import (
     progress_of,
     summarise,
 )
+from skinwave.plain_text import say
 
 if TYPE_CHECKING:
     from skinwave.effort import Progress
@@ -91,8 +92,8 @@ def run(options: argparse.Namespace) -> int:
     summarise(options, summary, sentence)
     if found.missing:
         why = "interrupted" if found.interrupted else "workers were killed"
-        print(f"skinwave: {why}; {found.missing} runs are missing, the same command goes on with "
-              "them", file=sys.stderr)  # fmt: skip
+        say(f"skinwave: {why}; {found.missing} runs are missing, the same command goes on with "
+            "them", sys.stderr)  # fmt: skip
     return 1 if found.missing else 0
 
 
@@ -116,6 +117,6 @@ def _progress(options: argparse.Namespace, runs: int) -> "Iterator[Progress]":
         if at < fraction < 1:
             left = f", {(now - started) * (1 - fraction) / (fraction - at):.0f} s left"
         told = f"{round(fraction * runs)} of {runs} runs" if phase == "run" else phase
-        print(told + left, file=sys.stderr, flush=True)
+        say(told + left, sys.stderr)
 
     yield log

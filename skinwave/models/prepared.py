@@ -15,9 +15,8 @@ from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.models.bodies import Build, air, default_size, surface_load, surface_motion
 from skinwave.models.full import assembled, energy_balance, meshed
-from skinwave.scene import Body, Scene
+from skinwave.scene import SAMPLE_RATE, Body, Scene
 
-SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
 BAND = 1000.0  # Hz up to which the reduced model must be right
 REDUCTION_TOLERANCE = 1e-3
 FORMAT = 2  # of what is cached of a body

@@ -229,7 +229,7 @@ def _with_transition(frame: Mapping[str, Any], key: str) -> tuple[Mapping[str, A
 
 def _brush(brush: Mapping[str, Any], number: _Numbers) -> Brush:
     name, params = brush.get("name"), _get(brush, "params", dict)
-    if name not in BRUSHES:
+    if not isinstance(name, str) or name not in BRUSHES:
         raise ValueError(f"brush {str(name)[:40]!r} is unknown; use one of {', '.join(BRUSHES)}")
     return Brush(
         name=name,

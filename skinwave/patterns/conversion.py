@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from meshes import reading
 from skinwave import scene_file
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
 from skinwave.patterns.pattern import Options, Pattern, onto
@@ -9,7 +10,7 @@ from skinwave.scene import Scene
 
 READERS = (".toml", ".adaptics", ".csv", ".wav")
 WRITERS = (".toml", ".adaptics", ".csv", ".wav", ".py")
-LARGEST = 256_000_000  # bytes of a pattern
+LARGEST = {".adaptics": 16_000_000, ".csv": 128_000_000, ".wav": 32_000_000}  # bytes
 
 
 def convert(
@@ -46,15 +47,10 @@ def read_pattern(
     if suffix == ".toml":
         return scene_file.read(path), ()
     base = base or scene_file.loads("")
+    content = reading.content(path, LARGEST[suffix])
     try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise ValueError(f"larger than {LARGEST / 1e6:g} MB, which no pattern is; cut it")
         pattern = _read(suffix, content, options, base)
         return onto(base, pattern, path.stem), pattern.notes
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror}); check the path") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 

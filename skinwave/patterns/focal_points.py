@@ -87,7 +87,8 @@ def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fals
         times, places, levels = np.array([0.0, 1.0]), *(
             np.repeat(x, 2, axis=1) for x in (places, levels)
         )  # fmt: skip
-    last = times[-1] + (times[-1] - times[-2])
+    with np.errstate(over="ignore"):
+        last = times[-1] + (times[-1] - times[-2])
     if not 0 < last <= LONGEST * (1 + 1e-9):
         raise ValueError(f"the points last {last:g} s, outside 0..{LONGEST:g} s; cut them")
     clock = np.concatenate([j * last + np.append(times, last) for j in range(n)])
@@ -160,7 +161,7 @@ def _tidy(rows: list[tuple[int, list[str]]]) -> np.ndarray:
             hint = meant(name, COLUMNS) or f"; columns are {','.join(COLUMNS)}"
             raise ValueError(f"column '{name[:40]}' is unknown{hint}")
     if len(set(header)) < len(header):
-        raise ValueError(f"a column is there twice in {','.join(header)}; leave one out")
+        raise ValueError(f"a column is there twice in {','.join(header)[:80]}; leave one out")
     if missing := [name for name in NEEDED if name not in header]:
         raise ValueError(f"column {missing[0]} is missing; columns are {','.join(COLUMNS)}")
     if len(rows) < 2:

@@ -50,7 +50,8 @@ class Options:
 def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
     """The base scene with the pattern in place of its Tacton."""
     pressure = replace(base.pressure, tacton=pattern.tacton, **pattern.pressure)
-    return replace(base, name=pattern.name or name, pressure=pressure)
+    named = (pattern.name or name).encode("utf-8", "replace").decode()  # half a letter is none
+    return replace(base, name=named, pressure=pressure)
 
 
 def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:

@@ -20,6 +20,8 @@ from skinwave.models.prepared import BAND, reduced_lines, sample_times
 from skinwave.scene import Scene
 from skinwave.simulation import check_knobs
 
+MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Waves:
@@ -100,6 +102,21 @@ def waves(
         mesh=mesh, basis=basis, frequencies=frequencies, lines=lines,
         poles=poles.values, start=start, effort=effort,
     )  # fmt: skip
+
+
+def check_values(frames: int, nodes: int) -> None:
+    """Refuse the motion of a whole body at more times than memory has room for.
+
+    Raises
+    ------
+    ValueError
+        If it is so.
+    """
+    if (values := 3 * frames * nodes) > MOST_VALUES:
+        raise ValueError(
+            f"{frames:,} times of {nodes:,} nodes are {values:,} values, the limit is "
+            f"{MOST_VALUES:,}; ask for fewer times or take larger elements"
+        )
 
 
 def from_rest(moved: Waves, times: Floats) -> Floats:

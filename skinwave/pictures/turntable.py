@@ -16,6 +16,7 @@ from skinwave.pictures.render import add_marks, look, place, prepared, scale
 from skinwave.pictures.views import View, load, save
 
 PATIENCE = 120.0  # s
+ICON = "https://kitware.github.io/vtk-js/icon/favicon-"  # which the page would load of the network
 EXTRA = "the extra [web], trame-pyvista, is not installed"
 
 
@@ -38,7 +39,9 @@ def turntable(view: View, frame: int) -> str | None:
         # An existing folder keeps the exporter from asking a network for what it does not need.
         quiet = os.environ | {"VTK_WASM_DIR_OVERRIDE": folder}
         done = subprocess.run(command, capture_output=True, env=quiet, timeout=PATIENCE)
-        return page.read_text(encoding="utf-8") if done.returncode == 0 else None
+        if done.returncode != 0:
+            return None
+        return page.read_text(encoding="utf-8").replace(ICON, "data:,")
 
 
 def _export(view: View, frame: int, path: str) -> None:

@@ -13,11 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from meshes import reading
 from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, MovingPressure, sensation_level
+from simple_model.response import UNITS
 from simple_model.steady import along_path, load_lines, path_knots, summed
+from skinwave.fitting import effort_of, fitting
 from skinwave.models.speeds import repeated, shown_part, strongest_tone, surface_speed
-from skinwave.pictures.motion import Waves, line_amplitudes, vibration
+from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
 from skinwave.run import is_skin
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
@@ -126,6 +129,7 @@ def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | N
     period, frames = part or shown_part(scene.pressure, fastest_line(moved))
     surface, triangles = _upper(mesh.facets["top"])
     times = np.arange(frames) * period / frames
+    check_values(frames, len(mesh.points))
     motion = vibration(moved, times) @ moved.basis.T
     read = fem.probe_operator(mesh, mesh.points[surface])
     frequencies, amplitudes = line_amplitudes(moved, read)
@@ -223,13 +227,14 @@ def load(path: Path) -> View:
         If the file is none of these.
     """
     try:
-        with np.load(path) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = reading.arrays(path)
         meta = json.loads(str(arrays["meta"]))
-        meta |= {"scene": loads(meta["scene"]), "effort": Effort(**meta["effort"])}
+        fitting(meta, FITTING, "meta")
+        meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
         meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
-        return View(**{n: arrays[n] for n in ARRAYS}, **meta)
-    except (OSError, KeyError, TypeError, ValueError) as error:
+        fields: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
+        return _checked(View(**fields))
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
 
 
@@ -237,6 +242,30 @@ ARRAYS = (
     "points", "tets", "surface", "triangles", "times", "motion", "rms", "sensation",
 )  # fmt: skip
 META = ("body", "model", "unit", "period", "tone", "speed")
+FITTING = {"body": str, "model": str, "unit": str, "period": float, "tone": float, "scene": str}
+
+
+def _checked(view: View) -> View:
+    """The view, if its arrays fit each other."""
+    n, s, f = len(view.points), len(view.surface), len(view.times)
+    shapes = {
+        "points": (n, 3), "surface": (s,), "triangles": (len(view.triangles), 3), "times": (f,),
+        "motion": (f, n, 3), "rms": (s,), "sensation": (s,), "tets": view.tets.shape,
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        array = getattr(view, name)
+        is_index, most = name in ("surface", "triangles", "tets"), s if name == "triangles" else n
+        if array.shape != shape or array.dtype.kind not in ("iu" if is_index else "fiu"):
+            raise ValueError(f"'{name}' is of shape {array.shape} and type {array.dtype}")
+        if is_index and array.size and not 0 <= array.min() <= array.max() < most:
+            raise ValueError(f"'{name}' has indices beyond {most}")
+        if not is_index and (np.isnan(array).any() or np.isposinf(array).any()):
+            raise ValueError(f"'{name}' is not finite")
+    if not (n and s and f and view.period > 0 and view.unit in UNITS):
+        raise ValueError("it is empty, or its period or unit are none")
+    if view.tets.ndim != 2 or (len(view.tets) and view.tets.shape[1] not in (4, 10)):
+        raise ValueError(f"'tets' is of shape {view.tets.shape}")
+    return view
 
 
 def _trace(arrays: Mapping[str, Any], name: str) -> Trace | None:

@@ -12,8 +12,8 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats
 from skinwave.models.bodies import coarsest_size, default_size
-from skinwave.models.prepared import SAMPLE_RATE as RATE
 from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene
 
 COARSENING = 2.0  # of the default element size

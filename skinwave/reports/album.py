@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Effort, Response, published
+from meshes import reading
+from simple_model import Response, published
 from simple_model.choices import choose
 from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.fields import assessed_probes
 from skinwave.files import write_lines, write_run
+from skinwave.fitting import EFFORT, PLAN, TRUST, effort_of, fitting
 from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.pictures.motion import Waves, waves
@@ -226,8 +228,8 @@ def open_album(folder: Path) -> Album:
     scene = read(own) if own.exists() else runs[-1].scene
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
-        views={view.column: view for view in views}, planned=_json(folder / "plan.json"),
-        trust=_json(folder / "trust.json"),
+        views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
+        trust=_json(folder / "trust.json", TRUST),
     )  # fmt: skip
 
 
@@ -255,22 +257,30 @@ def _kernel_of(path: Path, scene: Scene, model: str) -> str:
 
 def _run(path: Path) -> Run:
     scene = read(path.parent / "scene.toml")
+    arrays = reading.arrays(path)
+    effort = _json(path.parent / "effort.json", EFFORT) or {}
+    expected = (_json(path.parent / record.FILE, {}) or {}).get("expected_error")
     try:
-        with np.load(path) as file:
-            model = next(n for n in file.files if n not in ("t", "probes", "displacement"))
-            times, probes, motion = file["t"], file["probes"], file[model]
-            model = _kernel_of(path, scene, model)
-    except (OSError, ValueError, KeyError, StopIteration) as error:
+        if any(array.dtype.kind not in "fiu" for array in arrays.values()):
+            raise ValueError("it has arrays of other things than numbers")
+        name = next(n for n in arrays if n not in ("t", "probes", "displacement"))
+        model = _kernel_of(path, scene, name)
+        response = Response(
+            model=model, times=arrays["t"], probes=arrays["probes"], displacement=arrays[name],
+            unit="Pa" if model.startswith("point-kernel") else "m",
+            effort=effort_of(effort, "effort.json"),
+            expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
+        )  # fmt: skip
+        if len(response.times) < 2 or not len(response.probes) or response.probes.shape[1] != 2:
+            raise ValueError("it has no probe in a plane, or less than two samples")
+    except (ValueError, KeyError, TypeError, StopIteration) as error:
         raise ValueError(f"{path} is no result ({error}); run its scene again") from None
-    effort, kept = _json(path.parent / "effort.json"), _json(path.parent / record.FILE) or {}
-    response = Response(
-        model=model, times=times, probes=probes, displacement=motion,
-        unit="Pa" if model.startswith("point-kernel") else "m",
-        effort=Effort(**effort) if effort else Effort(),
-        expected_error=np.nan if kept.get("expected_error") is None else kept["expected_error"],
-    )  # fmt: skip
     return Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
 
 
-def _json(path: Path) -> dict[str, Any] | None:
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
+    """What a file holds, if there is one, as `fitting` takes it."""
+    if not path.exists():
+        return None
+    found: dict[str, Any] = fitting(reading.parsed(path), pattern, str(path))
+    return found

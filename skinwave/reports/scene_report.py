@@ -1,7 +1,6 @@
 """The report of a scene: one page that needs no network, built from a folder of results alone."""
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
-from skinwave.files import distinct_names
+from skinwave.files import distinct_names, folder_name
 from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
 from skinwave.pictures.levels import felt_lines, strongest_probe
@@ -126,7 +125,7 @@ def _write_data(folder: Path, album: Album) -> None:
     names = distinct_names(groups) if len(groups) > 1 else [""]
     for name, runs in zip(names, groups.values(), strict=True):
         for k, run in enumerate(runs):
-            stem = f"{name}-{run.column}" if name else run.column
+            stem = folder_name(f"{name}-{run.column}" if name else run.column)
             write_probes(folder / f"{stem}_probes", run.response)
             if k == len(runs) - 1:
                 write_sound(folder, run.response, strongest_probe([run]))
@@ -136,9 +135,9 @@ def _write_data(folder: Path, album: Album) -> None:
 
 def _asked(album: Album) -> str:
     rows = _asked_rows(album.scene)
-    text = escape(dumps(album.scene))
-    scene = (
-        f'<details class="screen"><summary>The scene in full</summary><pre>{text}</pre></details>'
+    scene = document.markup(
+        '<details class="screen"><summary>The scene in full</summary><pre>{}</pre></details>',
+        dumps(album.scene),
     )
     return document.section("What was asked", document.table(["", ""], rows), scene)
 
@@ -179,7 +178,7 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    said = "".join(map(document.paragraph, untold(runs)))
+    said = document.joined(map(document.paragraph, untold(runs)), "")
     known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
     if not known and not any(run.unnamed for run in runs):
         return said or document.paragraph("A constant pressure on a focus at rest has no line.")
@@ -198,7 +197,8 @@ def _lines(runs: Sequence[Run]) -> str:
         header += [f"{answered(run)}, {'Pa' if run.response.unit == 'Pa' else 'µm'} peak"]
         header += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
-    return f"<h3>Lines at ({x:g}, {y:g}) mm</h3>" + document.table(header, rows) + said
+    heading = document.markup("<h3>{}</h3>", f"Lines at ({x:g}, {y:g}) mm")
+    return document.joined([heading, document.table(header, rows), said], "")
 
 
 def _share(run: Run, name: str, probe: int) -> float:
@@ -241,7 +241,7 @@ def _level(level: float | None) -> str:
 
 def _comparison(album: Album) -> list[str]:
     groups = tactons(album)
-    parts = []
+    parts: list[str] = []
     if any(len(runs) > 1 for runs in groups.values()):
         parts.append(tables.agreement_table(groups))
     long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
@@ -269,13 +269,13 @@ def _trust(album: Album) -> list[str]:
                 f"an estimated {significant(100 * effort.estimate, 2)} %."
             )
     trust: Mapping[str, Any] = album.trust or {}
-    if "misfit" in trust:
+    if {"misfit", "model"} <= trust.keys():
         found.append(
             f"The waveforms drawn here differ from those of the planned model, {trust['model']}, "
             f"by {significant(100 * trust['misfit'], 2)} % over all probes."
         )
     found.append("The pressure of a device is uncertain by a factor of 2, and all motion with it.")
-    parts = [document.paragraph(text) for text in dict.fromkeys(found)]
+    parts: list[str] = [document.paragraph(text) for text in dict.fromkeys(found)]
     if trust.get("cases"):
         parts.append(document.paragraph(
             "Cases of skinwave verify as this installation answered them; the whole suite holds "
@@ -300,7 +300,7 @@ def _again(album: Album) -> list[str]:
     command = (album.trust or {}).get("command") or "skinwave report scene.toml"
     said = renderer().said if renderer().found else "none"
     return [
-        f"<p><code>{escape(command)}</code></p>",
+        document.markup("<p><code>{}</code></p>", command),
         document.paragraph(f"Computed with {named}; drawn with {said}. The scene:"),
-        f"<pre>{escape(dumps(album.scene))}</pre>",
+        document.markup("<pre>{}</pre>", dumps(album.scene)),
     ]

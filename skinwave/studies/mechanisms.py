@@ -21,6 +21,7 @@ from skinwave import document
 from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
+from skinwave.plain_text import cell
 from skinwave.run import JUDGED
 from skinwave.scene import BODIES, PROBES, Body, Scene
 from skinwave.simulation import compute
@@ -211,7 +212,7 @@ def write(folder: Path, found: Findings) -> None:
         writer.writerow(["tacton", "body", "mechanism", "line", "frequency_hz", "displacement_um"])
         for x in found.lines:
             cells = [x.tacton, x.body, x.mechanism, x.line]
-            writer.writerow([*cells, f"{x.frequency:.6g}", f"{1e6 * x.amplitude:.6g}"])
+            writer.writerow([*map(cell, cells), f"{x.frequency:.6g}", f"{1e6 * x.amplitude:.6g}"])
     drawn = png(figure(found.ratios), dpi=130)
     (folder / "amplitude.png").write_bytes(drawn)
     parts = [

@@ -14,6 +14,7 @@ from skinwave import document
 from skinwave.comparison import compare
 from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import png
+from skinwave.plain_text import cell
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Effect, Ladder, Rung, followed_lines
 
@@ -135,7 +136,7 @@ def _write_lines(path: Path, found: Ladder) -> None:
                 for p, (x, y) in enumerate(found.scene.probes):
                     changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
                     row = [rung.name, rung.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
-                    writer.writerow(row)
+                    writer.writerow(map(cell, row))
 
 
 def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
-from html import escape
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -50,7 +49,7 @@ def write_single(folder: Path, run: Run) -> None:
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *map(document.paragraph, untold([run])),
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
-        document.section("The scene", f"<pre>{escape(dumps(run.scene))}</pre>"),
+        document.section("The scene", document.markup("<pre>{}</pre>", dumps(run.scene))),
     ]
     title = f"{run.tacton} on {run.body}: {run.model}"
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")

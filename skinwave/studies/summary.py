@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from skinwave.document import paragraph, table
+from skinwave.document import Html, joined, markup, paragraph, table
 from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import label
 from skinwave.pictures.surfaces import SURFACES, surfaces_figure
@@ -32,7 +32,7 @@ def top(shown: Shown, draw: Callable[[Figure, str], str], name: str = "") -> lis
     draw : makes a part of the page of a figure and its caption
     name : of the Tacton, on a page of several
     """
-    parts = [paragraph(text) for text in sentences(shown)]
+    parts: list[str] = [paragraph(text) for text in sentences(shown)]
     if name:
         parts[0] = paragraph(f"{name}, one of the Tactons below: {sentences(shown)[0]}")
     if shown.surfaces and shown.changes[shown.body.column].strongest:
@@ -73,7 +73,7 @@ def small_table(columns: Sequence[Propagation], name: str) -> str:
     return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
 
 
-def beside_published(kernel: Run, published: Run) -> str:
+def beside_published(kernel: Run, published: Run) -> Html:
     """What the drive law and the focus change: the kernel as published beside the same load."""
     names = [n for n in kernel.frequencies if n in published.frequencies]
     levels = [
@@ -92,9 +92,11 @@ def beside_published(kernel: Run, published: Run) -> str:
     drives = " against ".join(
         f"{r.scene.pressure.drive}, {r.scene.pressure.focus}" for r in (kernel, published)
     )
-    return (
+    return markup(
         "<details><summary>Kernel as published beside the same load: what the drive law and the "
-        f"focus change</summary>{paragraph(drives + '; largest at any probe.')}{folded}</details>"
+        "focus change</summary>{}{}</details>",
+        paragraph(drives + "; largest at any probe."),
+        folded,
     )
 
 
@@ -204,7 +206,7 @@ def _reach(found: Reach | None) -> str:
     return f"{'> ' * found.beyond}{1e3 * found.metre:.0f}"
 
 
-def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> str:
+def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Html:
     """Tacton -> body -> what propagation changes, a row each."""
     rows = [
         [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
@@ -216,4 +218,4 @@ def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> str:
     header = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
     header += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
     header += ["felt most"]
-    return paragraph(ABOUT_MAPS) + table(header, rows)
+    return joined([paragraph(ABOUT_MAPS), table(header, rows)], "")

@@ -1,14 +1,13 @@
 """Tables of a run for its page: claims, agreement, cost."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Effort
 from skinwave.comparison import compare, moving_rms
-from skinwave.document import paragraph, table
+from skinwave.document import Html, joined, markup, paragraph, table
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label
 from skinwave.propagation import strongest_component
@@ -19,7 +18,7 @@ SILENT = 0.01  # of the strongest probe: where the reference moves less, no misf
 ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
 
 
-def claims_table(verdicts: list[Verdict]) -> str:
+def claims_table(verdicts: list[Verdict]) -> Html:
     """Claims down, kernels and bodies across: holds or fails, and what decides."""
     columns = list(dict.fromkeys(v.column for v in verdicts))
     found = {(v.claim, v.column): v for v in verdicts}
@@ -31,7 +30,7 @@ def claims_table(verdicts: list[Verdict]) -> str:
     return table(["claim", *map(label, columns)], rows)
 
 
-def agreement_table(runs: Mapping[str, Sequence[Run]]) -> str:
+def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Html:
     """Each Tacton's answers, a pair at a time between which one thing changes: drive law and focus
     from the published kernel to that under the same load, propagation from this to a body.
     """
@@ -81,7 +80,7 @@ def _between(values: Floats) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None = None) -> str:
+def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None = None) -> Html:
     """Seconds by phase, size and memory of each prepared body, and of the whole."""
     rows = []
     for name, effort in efforts.items():
@@ -100,7 +99,7 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
     counted = f"{tactons} Tacton{'s' * (tactons != 1)}"
     summary = f"{counted} took {spent:.0f} s in all, peak memory {peak:.2f} GiB. {named}"
-    return table(header, rows) + paragraph(summary)
+    return joined([table(header, rows), paragraph(summary)], "")
 
 
 def _spread(spread: dict[int, float]) -> str:
@@ -111,4 +110,4 @@ def _verdict(verdict: Verdict | None) -> str:
     if verdict is None:
         return "not judged"
     kind, word = ("yes", "holds") if verdict.holds else ("no", "fails")
-    return f'<span class="{kind}">{word}</span><br><small>{escape(verdict.sentence)}</small>'
+    return markup('<span class="{}">{}</span><br><small>{}</small>', kind, word, verdict.sentence)

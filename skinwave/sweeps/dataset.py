@@ -12,11 +12,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from meshes import reading
 from skinwave import marks, record
 from skinwave.outputs import output_file, unwritable
+from skinwave.plain_text import cell
 
 ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
 OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
+LARGEST = 500_000_000  # bytes of one file
+MOST_ROWS, MOST_COLUMNS = 1_000_000, 1000  # of one file
 KEY, INDEX, STATUS = "key", "index", "status"  # columns: a row's name, its place, how it ended
 
 Row = Mapping[str, Any]
@@ -151,13 +155,13 @@ def numbered(wanted: Sequence[str], there: Mapping[str, int | None]) -> dict[str
 
 def write_csv(out: Path, rows: Iterable[Row]) -> None:
     """rows.csv: as read, but one column for each probe of what is told at all of them."""
-    flat = [dict(cell for name, value in row.items() for cell in _cells(name, value))
+    flat = [dict(each for name, value in row.items() for each in _cells(name, value))
             for row in rows]  # fmt: skip
     columns = list(dict.fromkeys(name for row in flat for name in row))
     text = io.StringIO()
     lines = csv.DictWriter(text, columns)
     lines.writeheader()
-    lines.writerows(flat)
+    lines.writerows({name: cell(value) for name, value in row.items()} for row in flat)
     with output_file(out / CSV, overwrite=True) as file:
         file.write(text.getvalue().encode())
 
@@ -170,13 +174,55 @@ def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
 
 def _table(out: Path, columns: list[str] | None) -> Any:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     parts = sorted((out / ROWS).glob("part-*.parquet"))
     try:
-        tables = [
-            pq.ParquetFile(pa.BufferReader(part.read_bytes())).read(columns) for part in parts
-        ]
-        return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
-    except (OSError, pa.ArrowException) as error:
-        raise ValueError(f"{out} cannot be read ({' '.join(str(error).split())})") from None
+        tables = [_part(reading.content(part, LARGEST), columns) for part in parts]
+        found = pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
+    except (OSError, KeyError, pa.ArrowException) as error:
+        said = " ".join(str(error).split())[:200]
+        raise ValueError(f"{out} cannot be read ({said}); choose another folder") from None
+    if tables:
+        _check_columns(out, found)
+    return found
+
+
+def _part(content: bytes, columns: list[str] | None) -> Any:
+    """The table in one file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(pa.BufferReader(content))
+    told = file.metadata
+    unpacked = sum(told.row_group(k).total_byte_size for k in range(told.num_row_groups))
+    if told.num_rows > MOST_ROWS or unpacked > LARGEST or told.num_columns > MOST_COLUMNS:
+        raise OSError(f"{told.num_rows:,} rows of {unpacked / 1e6:,.0f} MB are no part of a sweep")
+    known = file.schema_arrow.names
+    if len(set(known)) < len(known):
+        raise OSError("columns have the same name")
+    return file.read([c for c in columns if c in known] if columns else None)
+
+
+def _check_columns(out: Path, table: Any) -> None:
+    """Refuse a table that is no sweep's."""
+    import pyarrow as pa
+
+    kinds = {KEY: pa.types.is_string, INDEX: pa.types.is_integer}
+    known = set(table.column_names)
+    wrong = [field.name for field in table.schema
+             if not kinds.get(field.name, _is_cell)(field.type)]  # fmt: skip
+    if KEY not in known or wrong or table[KEY].null_count:
+        what = (wrong or [KEY])[0][:40]
+        raise ValueError(
+            f"{out} holds a table without '{what}' as a sweep has it; choose the folder of a sweep"
+        )
+
+
+def _is_cell(kind: Any) -> bool:
+    """Whether a column is of a type that `append` writes, or releases before did."""
+    from pyarrow import types
+
+    if types.is_list(kind):
+        return bool(types.is_floating(kind.value_type))
+    plain = (types.is_string, types.is_integer, types.is_floating, types.is_boolean, types.is_null)
+    return any(fits(kind) for fits in plain)

@@ -51,9 +51,9 @@ def finished(rows: Sequence[Row]) -> list[Row]:
     ValueError
         If none has.
     """
-    found = [row for row in rows if row["status"] == "done"]
+    found = [row for row in rows if row.get("status") == "done"]
     if not found:
-        raise ValueError(f"none of {len(rows)} runs has an answer: {rows[0]['error']}")
+        raise ValueError(f"none of {len(rows)} runs has an answer: {rows[0].get('error')}")
     return found
 
 

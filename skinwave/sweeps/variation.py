@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from meshes import reading
 from simple_model.choices import choose, meant
 from skinwave.scene import BODIES, Scene, solid_of, with_body
-from skinwave.scene_file import dumps, loads, read
+from skinwave.scene_file import content, dumps, loads, read
 from skinwave.scene_keys import MATERIAL, SECTIONS
 
 DESIGNS = ("factorial", "zip", "lhs")
@@ -134,7 +135,7 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[Case]:
         If the file is no scene, no combination makes one, or a word is refused by each it is in.
     """
     base = read(path)
-    table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    table = tomllib.loads(content(path))
     if base.body.file:
         table["body"]["file"] = base.body.file
     complete = tomllib.loads(dumps(base))
@@ -187,7 +188,7 @@ def _value(text: str) -> Any:
     """A value as the scene file would have it; a word needs no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         number = _number(text)
         return text.strip() if number is None else number
 
@@ -290,7 +291,5 @@ def _refuse_words(found: Sequence[Case]) -> None:
 
 
 def _content(file: str) -> bytes:
-    try:
-        return hashlib.sha256(Path(file).read_bytes()).digest()
-    except OSError as error:
-        raise ValueError(f"{file}: cannot be read ({error.strerror}); check the path") from None
+    with reading.opened(file) as opened:
+        return hashlib.file_digest(opened, "sha256").digest()  # type: ignore[arg-type]

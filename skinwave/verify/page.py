@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -66,8 +65,12 @@ def summary_table(results: list[Result]) -> str:
 def _summary(results: list[Result]) -> str:
     rows = [
         [
-            f'<a href="#{r.entry.name}">{escape(r.case.title)}</a>'
-            f"<br><small>{escape(_quantity(r.case.worst))}</small>",
+            document.markup(
+                '<a href="#{}">{}</a><br><small>{}</small>',
+                r.entry.name,
+                r.case.title,
+                _quantity(r.case.worst),
+            ),
             *_numbers(r.case.worst),
             _verdict(r.case.passed),
             f"{r.seconds:.1f}",
@@ -82,17 +85,19 @@ def _shown(result: Result) -> str:
     case = result.case
     rows = [[_quantity(c), *_numbers(c), _verdict(c.passed)] for c in case.checks]
     parts = [
-        f'<h3 id="{result.entry.name}">{escape(case.title)} {_verdict(case.passed)}</h3>',
-        f"<p><small>Source: {escape(case.source)}.<br>Mesh: {escape(case.mesh)}.</small></p>",
+        document.markup(
+            '<h3 id="{}">{} {}</h3>', result.entry.name, case.title, _verdict(case.passed)
+        ),
+        document.markup("<p><small>Source: {}.<br>Mesh: {}.</small></p>", case.source, case.mesh),
         document.table(["quantity", *HEADER, ""], rows),
     ]
     if case.said:
-        parts.append(f"<p>It says: <code>{escape(case.said)}</code></p>")
+        parts.append(document.markup("<p>It says: <code>{}</code></p>", case.said))
     if case.note:
         parts.append(document.paragraph(case.note))
     if case.plot:
         parts.append(document.picture(png(_figure(case.plot), 90), case.title))
-    return "\n".join(parts)
+    return document.joined(parts)
 
 
 def _figure(plot: Plot) -> Figure:
@@ -145,4 +150,4 @@ def _word(passed: bool) -> str:
 
 
 def _verdict(passed: bool) -> str:
-    return f'<span class="{"yes" if passed else "no"}">{_word(passed)}</span>'
+    return document.markup('<span class="{}">{}</span>', "yes" if passed else "no", _word(passed))

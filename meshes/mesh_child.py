@@ -1,0 +1,36 @@
+"""Run by `meshes.files` in a process of its own: meshio's readers, and what they make of a file.
+
+    python mesh_child.py FILE UNIT OUTPUT.npz
+
+They take whatever time and memory a file asks for. What is wrong with the file is the last line
+of standard error.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def main() -> int:
+    """Write the mesh in FILE to OUTPUT.npz; 1 if there is none."""
+    from meshes import child, files
+    from meshes.tetmesh import MeshError
+
+    source, unit, target = sys.argv[1:]
+    try:
+        mesh = files.read_here(Path(source), files.scale_of(unit))
+    except MeshError as error:
+        print(error, file=sys.stderr)
+        return child.REFUSED
+    names = sorted(mesh.facets)
+    facets: dict[str, Any] = {f"facets{k}": mesh.facets[name] for k, name in enumerate(names)}
+    listed = np.array(names, np.str_)
+    np.savez(target, points=mesh.points, tets=mesh.tets, region=mesh.region, names=listed, **facets)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # where this package is
+    sys.exit(main())

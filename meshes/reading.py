@@ -1,0 +1,127 @@
+"""The door for files of users: regular files of a limited size, whatever their contents claim."""
+
+import json
+import os
+import stat
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+LARGEST_TEXT = 16_000_000  # bytes of JSON, and of other text
+UNPACKED = 500_000_000  # bytes that any archive of arrays may unpack to,
+GROWTH = 8  # or so many times what it takes on the disk
+
+PathLike = str | os.PathLike[str]
+
+
+@contextmanager
+def opened(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
+    """A regular file of at most `limit` bytes, open for reading.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be opened, is a pipe, a device or a folder, or is larger.
+    """
+    try:  # a pipe without a writer would be waited for
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _BINARY)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: cannot be read ({_reason(error)}); check the path") from None
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise ValueError(f"{path}: cannot be read (it is no regular file); check the path")
+    with os.fdopen(handle, "rb") as file:
+        size = os.fstat(handle).st_size
+        if size > limit:
+            raise ValueError(
+                f"{path}: larger ({size / 1e6:,.0f} MB) than the limit of {limit / 1e6:g} MB; "
+                "check the path"
+            )
+        yield file
+
+
+def content(path: PathLike, limit: int) -> bytes:
+    """All bytes of a regular file of at most `limit`; raises what `opened` does."""
+    with opened(path, limit) as file:
+        try:
+            return file.read(limit + 1)
+        except OSError as error:
+            raise ValueError(f"{path}: cannot be read ({_reason(error)}); check it") from None
+
+
+def text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
+    """The UTF-8 text of a regular file of at most `limit` bytes; raises what `opened` does."""
+    try:
+        return content(path, limit).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: no UTF-8 text ({error.reason}); save it as such") from None
+
+
+def on_disk(path: PathLike) -> int:
+    """Bytes that a file takes on the disk: none where it is sparse."""
+    found = os.stat(path)
+    return min(found.st_size, 512 * getattr(found, "st_blocks", found.st_size))
+
+
+def arrays(path: PathLike) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file, by name.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or unpacks to more than `UNPACKED` bytes and `GROWTH` times its size.
+    """
+    with opened(path) as file:
+        try:
+            _check_unpacked(file, max(UNPACKED, GROWTH * on_disk(path)))
+            with np.load(file, allow_pickle=False) as archive:
+                return {name: archive[name] for name in archive.files}
+        except Exception as error:  # whatever archives and headers make of spoilt bytes
+            raise ValueError(
+                f"{path}: cannot be read ({_reason(error)}); make the result anew"
+            ) from None
+
+
+def parsed(path: PathLike) -> Any:
+    """What a JSON file holds.
+
+    Raises
+    ------
+    ValueError
+        If it holds none.
+    """
+    found = text(path)
+    try:
+        return json.loads(found)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: no JSON ({_reason(error)}); make the result anew") from None
+
+
+_BINARY = getattr(os, "O_BINARY", 0)
+
+
+def _check_unpacked(file: BinaryIO, limit: float) -> None:
+    """Refuse an archive whose members, or the arrays that their headers tell of, are too large."""
+    total = 0
+    with zipfile.ZipFile(file) as archive:
+        for member in archive.infolist():
+            with archive.open(member) as start:
+                version = np.lib.format.read_magic(start)
+                read = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
+                shape, _, kind = read(start)
+            told = kind.itemsize * int(np.prod(shape, dtype=object))
+            total += max(told, member.file_size)
+            if told > member.file_size:
+                raise ValueError(f"'{member.filename}' is shorter than its header tells")
+    if total > limit:
+        raise ValueError(f"unpacks to {total / 1e6:,.0f} MB, the limit is {limit / 1e6:,.0f} MB")
+    file.seek(0)
+
+
+def _reason(error: BaseException) -> str:
+    said = getattr(error, "strerror", None) or " ".join(str(error).split())
+    return said[:200] or type(error).__name__

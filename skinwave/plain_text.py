@@ -1,0 +1,41 @@
+"""Text of a user's file or name where a terminal or spreadsheet could obey it, not show it.
+
+Of pages, `skinwave.document` takes care.
+"""
+
+import sys
+from typing import TextIO
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for the start of one
+
+
+def printable(text: str, keep: str = "\n") -> str:
+    """The text with control, bidirectional and other invisible characters as escapes."""
+    return "".join(c if c.isprintable() or c in keep else _escape(c) for c in text)
+
+
+def say(text: str, file: TextIO | None = None) -> None:
+    """Print a text so that a terminal shows it, and never obeys it or fails at a letter."""
+    file = file or sys.stdout
+    code = getattr(file, "encoding", None) or "utf-8"
+    shown = printable(text).encode(code, "backslashreplace").decode(code)
+    print(shown, file=file, flush=True)
+
+
+def cell(value: object) -> object:
+    """A value of a CSV row; text that a spreadsheet would compute gets an apostrophe before it."""
+    is_formula = isinstance(value, str) and value.startswith(FORMULA) and not _is_number(value)
+    return f"'{value}" if is_formula else value
+
+
+def _escape(letter: str) -> str:
+    n = ord(letter)  # as JSON has it, so that what was JSON still is
+    return f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

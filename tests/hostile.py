@@ -1,0 +1,499 @@
+"""Hostile files beyond those of `corpus.py`: from one seed, and so the same ones every time.
+
+Each is by name a function that writes into a folder and gives the arguments of a command.
+"""
+
+import copy
+import io
+import json
+import os
+import random
+import struct
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+from scipy.io import wavfile
+
+from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
+
+SEED = 1907
+Write = Callable[[Path], list[str]]
+QUICK = {
+    "name": "small",
+    "tacton": {"am_frequency_hz": 200.0, "duration_s": 0.02, "shape": "circle", "size_mm": 10.0,
+               "speed_m_per_s": 6.0},
+    "focus": {"height_mm": 200.0},
+    "body": {"kind": "none"},
+    "probes": {"points_mm": [[0.0, 0.0], [5.0, 0.0]]},
+}  # fmt: skip
+DEEP: list = []
+for _ in range(200):
+    DEEP = [DEEP]
+VALUES = (
+    None, True, "", "x", "\x1b[2J", "\u202e", "../../x", [], {}, [[]], [None], {"a": {}}, -1, 0,
+    1e308, -1e308, 5e-324, float("nan"), float("inf"), 10**400, 2**63, ["a"], [1e308, -1e308], DEEP,
+)  # fmt: skip
+
+
+def changed(table: object, rng: random.Random) -> object:
+    """The table with one value anywhere in it replaced, left out, or put elsewhere."""
+    table = copy.deepcopy(table)
+    places = list(_places(table))
+    holder, key = rng.choice(places)
+    how = rng.randrange(6)
+    if how == 0:
+        del holder[key]
+    elif how == 1 and len(places) > 1:
+        other, place = rng.choice(places)
+        holder[key] = copy.deepcopy(other[place])
+    else:
+        holder[key] = rng.choice(VALUES)
+    return table
+
+
+def _places(node: object):
+    items = node.items() if isinstance(node, dict) else enumerate(node)
+    for key, value in list(items):
+        yield node, key
+        if isinstance(value, dict | list):
+            yield from _places(value)
+
+
+def file(name: str, content: bytes | str, *arguments: str) -> Write:
+    """A command on one file, "FILE" among its arguments."""
+
+    def write(folder: Path) -> list[str]:
+        raw = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
+        (folder / name).write_bytes(raw)
+        return [name if word == "FILE" else word for word in arguments]
+
+    return write
+
+
+RUN = ("run", "FILE", "--model", "point-kernel", "--quiet")
+
+
+def scenes() -> dict[str, Write]:
+    """Scenes, some of which are still answered."""
+    rng, good = random.Random(SEED), tomli_w.dumps(QUICK)
+    texts = {
+        "dotted keys on one line": ".".join(["a"] * 20_000) + " = 1",
+        "dotted keys by the thousand": "\n".join(
+            ".".join(["a"] * 400) + f".k{k} = 1" for k in range(2000)
+        ),
+        "dotted headers": "\n".join("[" + "a . " * 300 + f"k{k}]" for k in range(2000)),
+        "dotted keys within": "x = {" + "a." * 20_000 + "b = 1}",
+        "quoted dotted keys": ".".join(['"a"'] * 20_000) + " = 1",
+        "a key of 15 MB": "k" * 15_000_000 + " = 1",
+        "a quoted key of 15 MB": '"' + "k" * 15_000_000 + '" = 1',
+        "a key of 900 kB": "k" * 900_000 + " = 1",
+        "keys by the hundred thousand": "\n".join(f"k{k} = 1" for k in range(120_000)),
+        "headers by the hundred thousand": "[[a]]\n" * 160_000,
+        "15 MB of comments": "#\n" * 7_500_000,
+        "3 MB of numbers": "x = [" + "1.5, " * 600_000 + "]",
+        "probes that fill memory": "[tacton]\nduration_s = 10\n[probes]\npoints_mm = ["
+        + "[0, 0], " * 40_000 + "]\n[body]\nkind = 'none'\n",
+        "integer of 4,301 digits": f"[tacton]\nsize_mm = {'9' * 4301}",
+        "name with a terminal's escape": 'name = "\\u001b]0;x\\u0007"\nx = 1',
+        "key with a terminal's escape": '"\\u001b[2J" = 1',
+        "surrogate": "name = '\ud800'",
+        "escaped surrogate": 'name = "\\uD800"',
+        "zero byte": "name = 'a\0b'",
+        "UTF-7": "+AFs-tacton+AF0-",
+        "two marks of order": "\ufeff\ufeffname = 'a'",
+        "mesh is the scene": "[body]\nkind = 'mesh'\nfile = 'scene.toml'",
+        "mesh is a folder": "[body]\nkind = 'mesh'\nfile = '.'",
+        "mesh has a zero byte": '[body]\nkind = "mesh"\nfile = "a\\u0000.stl"',
+        "dates": "name = 1979-05-27T07:32:00Z",
+        "inline tables in a list": "[probes]\npoints_mm = [" + "{a = 1}, " * 20_000 + "]",
+    }  # fmt: skip
+    found = {f"scene, {name}": file("scene.toml", text, *RUN) for name, text in texts.items()}
+    for k in range(50):
+        table = QUICK
+        for _ in range(rng.choice((1, 1, 2, 3))):
+            table = changed(table, rng)
+        found[f"scene, changed {k}"] = file("scene.toml", _as_toml(table), *RUN)
+    for k in range(15):
+        spoilt = bytearray(good.encode())
+        for _ in range(3):
+            at = rng.randrange(len(spoilt))
+            spoilt[at : at + 1] = rng.randbytes(rng.randrange(4))
+        found[f"scene, spoilt {k}"] = file("scene.toml", bytes(spoilt), *RUN)
+    return found
+
+
+def _as_toml(table: object) -> str:
+    def plain(node: object) -> object:
+        if isinstance(node, dict):
+            return {key: plain(value) for key, value in node.items() if value is not None}
+        if isinstance(node, list):
+            return [plain(value) for value in node if value is not None]
+        return node
+
+    return "x = " + "[" * 500 if table is DEEP else _dumped(plain(table))
+
+
+def _dumped(table: object) -> str:
+    try:
+        return tomli_w.dumps(table)
+    except (RecursionError, ValueError):
+        return "x = " + "[" * 500 + "]" * 500
+
+
+def _adaptics() -> dict:
+    def f64(value: float) -> dict:
+        return {"type": "f64", "value": value}
+
+    linear = {"name": "linear", "params": {}}
+    params = {"radius": f64(10.0), "am_freq": f64(120.0), "stm_freq": f64(80.0)}
+    constant = {"name": "constant", "params": {"value": f64(1.0)}}
+    frames = [
+        {
+            "time": time, "type": "standard", "cjumps": [],
+            "brush": {"brush": {"name": "circle", "params": params}, "transition": linear},
+            "intensity": {"intensity": constant, "transition": linear},
+            "coords": {"coords": {"x": time / 10, "y": 0.0, "z": 0.0}, "transition": linear},
+        }
+        for time in (0.0, 50.0)
+    ]  # fmt: skip
+    one = f64(1.0)
+    transform = {
+        "geometric_transforms": {
+            "translate": {"x": f64(0.0), "y": f64(0.0), "z": f64(200.0)}, "rotation": f64(0.0),
+            "scale": {"x": one, "y": one, "z": one},
+        },
+        "intensity_factor": one, "playback_speed": one,
+    }  # fmt: skip
+    return {
+        "$DATA_FORMAT": FORMAT, "$REVISION": REVISIONS[-1], "name": "pattern", "keyframes": frames,
+        "pattern_transform": transform, "user_parameter_definitions": {"p": {"default": 1.0}},
+    }  # fmt: skip
+
+
+def _wav(change: Callable[[bytearray], None] = lambda raw: None) -> bytes:
+    stream = io.BytesIO()
+    wavfile.write(stream, 1000, np.sin(np.arange(100)).astype(np.float32))
+    raw = bytearray(stream.getvalue())
+    change(raw)
+    return bytes(raw)
+
+
+def _put(at: int, form: str, value: int) -> Callable[[bytearray], None]:
+    return lambda raw: struct.pack_into(form, raw, at, value)
+
+
+def patterns() -> dict[str, Write]:
+    """Patterns of every kind, some of which are still converted."""
+    rng = random.Random(SEED)
+    found = {}
+
+    def add(name: str, suffix: str, content: bytes | str) -> None:
+        arguments = ("convert", "FILE", "out.toml", "--quiet")
+        more = ("--rate", "1000") if suffix == ".csv" else ()
+        found[f"pattern, {name}"] = file(f"in{suffix}", content, *arguments, *more)
+
+    for name in ("", "\ud800", "\x1b[2J", "a\nb", "../../x", "n" * 100_000, "=1+1", "\0", None, []):
+        text = json.dumps(_adaptics() | {"name": name})
+        add(f"named {str(name)[:8]!a}", ".adaptics", text)
+    for k in range(40):
+        add(f"changed {k}", ".adaptics", json.dumps(changed(_adaptics(), rng)))
+    add("JSON nested deeply", ".adaptics", '{"a":' * 100_000)
+    add("JSON of a million lists", ".adaptics", "[" + "[]," * 1_000_000 + "[]]")
+    add("JSON with huge integers", ".adaptics", "[" + "9" * 1_000_000 + "]")
+    unhashable = json.dumps(_adaptics()).replace('"circle"', '["circle"]')
+    add("a brush that is a list", ".adaptics", unhashable)
+    lies = {
+        "RIFF of 4 GB": _put(4, "<I", 2**32 - 1),
+        "no channels": _put(22, "<H", 0),
+        "65,535 channels": _put(22, "<H", 65535),
+        "rate of 0": _put(24, "<I", 0),
+        "rate of 4 GHz": _put(24, "<I", 2**32 - 1),
+        "no bits": _put(34, "<H", 0),
+        "65,535 bits": _put(34, "<H", 65535),
+        "block of 0": _put(32, "<H", 0),
+        "unknown format": _put(20, "<H", 0x1234),
+        "format chunk of 4 GB": _put(16, "<I", 2**32 - 1),
+        "format chunk of 0": _put(16, "<I", 0),
+    }
+    for name, lie in lies.items():
+        add(f"WAV, {name}", ".wav", _wav(lie))
+    for at in range(36, 60, 4):
+        add(f"WAV, 4 GB at {at}", ".wav", _wav(_put(at, "<I", 2**32 - 8)))
+    for cut in (0, 4, 11, 20, 43, 57, 60):
+        add(f"WAV, cut at {cut}", ".wav", _wav()[:cut])
+    rows = "t_s,point,x_m,y_m,z_m,intensity\n0,0,0,0,0.2,1\n0.01,0,0.001,0,0.2,1\n"
+    tables = {
+        "quotes without end": rows + '"',
+        "a cell of 1 MB": rows + "9" * 1_000_000,
+        "zero bytes": rows + "\0,\0\n",
+        "point of 1e18": rows.replace("0,0,0,0,0.2", "0,1000000000000000000,0,0,0.2"),
+        "times of 1e308": rows.replace("0.01", "1e308"),
+        "UTF-16": rows.encode("utf-16"),
+        "lone surrogate": rows + "\ud800",
+        "columns by the thousand": ",".join(["x_m"] * 100_000) + "\n",
+        "digits of another script": rows.replace("0.001", "\u0660\u066b\u0661"),
+        "underscores": rows.replace("0.001", "1_0"),
+        "rows of nothing": "\n" * 1_000_000,
+    }
+    for name, text in tables.items():
+        add(f"CSV, {name}", ".csv", text)
+    return found
+
+
+def special_files() -> dict[str, Write]:
+    """What is no file at all, in the place of each kind of file."""
+    commands = {
+        "scene": ("x.toml", *RUN), "swept": ("x.toml", "sweep", "FILE", "--vary",
+                                            "tacton.size_mm=1,2"),
+        "AdapTics": ("x.adaptics", "convert", "FILE", "o.toml"),
+        "CSV": ("x.csv", "convert", "FILE", "o.toml", "--rate", "9"),
+        "WAV": ("x.wav", "convert", "FILE", "o.toml"),
+    }  # fmt: skip
+    for suffix in ("stl", "ply", "obj", "glb", "vtp", "vtu", "msh", "inp", "vtk"):
+        commands[suffix] = (f"x.{suffix}", "mesh", "FILE", "--quiet")
+    kinds = {"pipe": os.mkfifo, "folder": os.mkdir, "device": lambda p: os.symlink("/dev/zero", p)}
+    kinds["sparse file of 100 GB"] = _sparse
+    found = {}
+    for of, (name, *arguments) in commands.items():
+        for kind, make in kinds.items():
+
+            def write(folder: Path, name=name, arguments=arguments, make=make) -> list[str]:
+                make(folder / name)
+                return [name if word == "FILE" else word for word in arguments]
+
+            found[f"{kind} as {of}"] = write
+    return found
+
+
+def _sparse(path: Path) -> None:
+    with open(path, "wb") as file:
+        file.truncate(100 * 10**9)
+
+
+def meshes() -> dict[str, Write]:
+    """Meshes and surfaces that ask for more than they hold; each is read by another process."""
+    rng = random.Random(SEED)
+    node = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n"
+    texts: dict[str, bytes | str] = {
+        "generate.inp": f"{node}*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n",
+        "memory.inp": f"{node}*ELSET,ELSET=a,GENERATE\n1,2000000000,1\n",
+        "nset.inp": f"{node}*NSET,NSET=a,GENERATE\n1,1000000000000,1\n",
+        "itself.inp": "*INCLUDE,INPUT=itself.inp\n",
+        "device.inp": "*INCLUDE,INPUT=/dev/zero\n",
+        "count.msh": "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000000\n",
+        "count4.msh": "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1000000000000 1 9\n",
+        "faces.stl": b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 100,
+        "index.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 999999999999\n",
+        "count.ply": "ply\nformat binary_little_endian 1.0\nelement vertex 2000000000\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n",
+        "length.glb": b"glTF" + struct.pack("<III", 2, 2**32 - 1, 2**31),
+        "points.vtp": '<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="1000000000000" '
+        'NumberOfPolys="1"></Piece></PolyData></VTKFile>',
+        "points.vtu": '<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece '
+        'NumberOfPoints="1000000000000" NumberOfCells="1"></Piece></UnstructuredGrid></VTKFile>',
+        "count.vtk": "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+        "POINTS 1000000000000 double\n",
+        "escape\x1b[2J.stl": "solid \x1b[2J",
+    }
+    found = {f"mesh, {n!a}": file(n, text, "mesh", "FILE", "--quiet") for n, text in texts.items()}
+    for suffix in ("stl", "ply", "obj", "vtu", "msh", "inp"):
+        found[f"mesh, junk.{suffix}"] = file(
+            f"junk.{suffix}", rng.randbytes(2000), "mesh", "FILE", "--quiet"
+        )
+    return found
+
+
+def _answered(folder: Path) -> Path:
+    """A folder of a result, made once by the command itself."""
+    scene = folder / "scene.toml"
+    scene.write_text(tomli_w.dumps(QUICK))
+    command = [sys.executable, "-m", "skinwave", *RUN, "--out", "result"]
+    subprocess.run([w if w != "FILE" else "scene.toml" for w in command], cwd=folder, check=True)
+    return folder / "result"
+
+
+def bomb(path: Path, gigabytes: int) -> None:
+    """An archive of one array that unpacks to so much, of a few megabytes at most."""
+    header = io.BytesIO()
+    count = gigabytes * 125_000_000
+    told = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
+    np.lib.format.write_array_header_1_0(header, told)
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("t.npy", "w", force_zip64=True) as member,
+    ):
+        member.write(header.getvalue())
+        for _ in range(10):
+            member.write(bytes(1_000_000))
+
+
+def results(made: Path) -> dict[str, Write]:
+    """Result folders with something damaged, foreign or of another version in them; `made` is a
+    sound one.
+    """
+    rng, found = random.Random(SEED), {}
+    files = {path.name: path.read_bytes() for path in made.iterdir() if path.is_file()}
+
+    def add(name: str, damaged: str, content: bytes | Callable[[Path], object], *commands: str):
+        def write(folder: Path, command: str) -> list[str]:
+            for other in ("a", "b"):
+                (folder / other).mkdir()
+                for known, sound in files.items():
+                    (folder / other / known).write_bytes(sound)
+            (folder / "a" / damaged).unlink(missing_ok=True)
+            if callable(content):
+                content(folder / "a" / damaged)
+            else:
+                (folder / "a" / damaged).write_bytes(content)
+            second = ["b"] if command == "same" else ["--out", "o", "--quiet"]
+            return [command, "a", *second]
+
+        for command in commands:
+            found[f"result, {name}, {command}"] = lambda folder, c=command: write(folder, c)
+
+    arrays = dict(np.load(io.BytesIO(files["responses.npz"])))
+    both = ("report", "same")
+
+    def stored(**fields: object) -> bytes:
+        stream = io.BytesIO()
+        np.savez(stream, **fields)
+        return stream.getvalue()
+
+    npz = {
+        "no array": stored(),
+        "objects": stored(**(arrays | {"t": np.array([{}], object)})),
+        "text": stored(**(arrays | {"t": np.array(["a"] * len(arrays["t"]))})),
+        "nan": stored(**(arrays | {"t": arrays["t"] * np.nan})),
+        "a number": stored(**(arrays | {"t": np.array(1.0)})),
+        "no samples": stored(**{n: a[:0] for n, a in arrays.items()}),
+        "one sample": stored(**(arrays | {n: a[:1] for n, a in arrays.items() if n != "probes"})),
+        "complex": stored(**(arrays | {"t": arrays["t"] + 1j})),
+        "another model": stored(t=arrays["t"], probes=arrays["probes"], **{"\x1b[2J": arrays["t"]}),
+        "cut": files["responses.npz"][:500],
+        "empty": b"",
+        "text file": b"x" * 1000,
+    }
+    for name, content in npz.items():
+        add(f"npz, {name}", "responses.npz", content, *both)
+    add("npz of 100 GB", "responses.npz", lambda path: bomb(path, 100), *both, "rerun")
+    add("npz, pipe", "responses.npz", os.mkfifo, *both)
+    add("npz, sparse", "responses.npz", _sparse, *both)
+    for k in range(6):
+        spoilt = bytearray(files["responses.npz"])
+        for _ in range(20):
+            spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
+        add(f"npz, spoilt {k}", "responses.npz", bytes(spoilt), "report")
+    plan = {"rows": [{"what": "a", "value": "b", "reason": "c"}], "tolerance": 0.05,
+            "warnings": ["w"]}  # fmt: skip
+    case = {"title": "t", "source": "s", "value": 1.0, "reference": 1.0, "error": 0.0, "bar": 1.0,
+            "passed": True}  # fmt: skip
+    trust = {"command": "skinwave", "model": "fem", "misfit": 0.1, "cases": [case]}
+    tables = {
+        "record.json": (json.loads(files["record.json"]), ("rerun",), 20),
+        "effort.json": (json.loads(files["effort.json"]), ("report",), 8),
+        "plan.json": (plan, ("report",), 8),
+        "trust.json": (trust, ("report",), 8),
+    }
+    for name, (table, commands, count) in tables.items():
+        for k in range(count):
+            text = json.dumps(changed(table, rng)).encode()
+            add(f"{name}, changed {k}", name, text, *commands)
+        add(f"{name}, deep", name, b"[" * 100_000, *commands)
+        add(f"{name}, no UTF-8", name, b"\xff\xfe{\0}\0", *commands)
+        add(f"{name}, pipe", name, os.mkfifo, *commands)
+    preload = json.loads(files["record.json"])
+    preload["threads"] = {"LD_PRELOAD": "/tmp/x.so", "PYTHONPATH": "."}
+    add("record.json, another environment", "record.json", json.dumps(preload).encode(), "rerun")
+    newer = json.loads(files["record.json"]) | {"format": 99}
+    add("record.json, newer", "record.json", json.dumps(newer).encode(), "rerun")
+    add("scene, spoilt", "scene.toml", b"[", "report")
+    add("lines, no UTF-8", "lines.csv", b"\xff" * 100, "same")
+    add("lines, sparse", "lines.csv", _sparse, "same")
+    add("lines, other columns", "lines.csv", b"a,a\n1\n1,2,3\n", "same")
+    return found
+
+
+def tables() -> dict[str, Write]:
+    """Folders of sweeps that no sweep has written."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    def parquet(**columns: list) -> bytes:
+        stream = io.BytesIO()
+        pq.write_table(pa.table(columns), stream)
+        return stream.getvalue()
+
+    good = {"key": ["k"], "index": [0], "status": ["done"], "peak_um": [1.0]}
+    contents: dict[str, bytes | Callable[[Path], object]] = {
+        "foreign": parquet(a=[1, 2]),
+        "key of numbers": parquet(**(good | {"key": [1]})),
+        "key is missing": parquet(**(good | {"key": [None]})),
+        "index in words": parquet(**(good | {"index": ["first"]})),
+        "no status": parquet(key=["k"], peak_um=[1.0]),
+        "status of numbers": parquet(**(good | {"status": [3.0]})),
+        "nested": parquet(**(good | {"tacton.size_mm": [{"a": [1]}]})),
+        "no rows": parquet(key=pa.array([], pa.string())),
+        "names that are obeyed": parquet(**(good | {"\x1b[2J.x": [1.0], "$\\frac{$": [2.0]})),
+        "many rows": parquet(key=pa.array(["k"]).take(pa.array(np.zeros(3_000_000, int)))),
+        "empty": b"",
+        "cut": parquet(**good)[:-10],
+        "magic only": b"PAR1PAR1",
+        "junk": b"PAR1" + random.Random(SEED).randbytes(300) + struct.pack("<I", 200) + b"PAR1",
+        "pipe": os.mkfifo,
+        "sparse": _sparse,
+    }
+    found = {}
+    for name, content in contents.items():
+        for command in ("plot", "sweep"):
+
+            def write(folder: Path, content=content, command=command) -> list[str]:
+                (folder / "s/rows").mkdir(parents=True)
+                place = folder / "s/rows/part-k.parquet"
+                if callable(content):
+                    content(place)
+                else:
+                    place.write_bytes(content)
+                (folder / "scene.toml").write_text(tomli_w.dumps(QUICK))
+                vary = ["--vary", "tacton.size_mm=nonsense", "--scheduler", "threads"]
+                if command == "sweep":
+                    return ["sweep", "scene.toml", *vary, "--out", "s", "--quiet"]
+                return ["plot", "s", "--quiet", "--x", "peak_um"]
+
+            found[f"table, {name}, {command}"] = write
+    return found
+
+
+def requests() -> dict[str, Write]:
+    """What a command is asked for, on a good scene."""
+    asked = [
+        ["sweep", "FILE", "--vary", vary]
+        for vary in (
+            "tacton.size_mm=" + ",".join(["1"] * 200_001), "tacton.size_mm=1:2:1e18",
+            "tacton.size_mm=nan:1:3", "tacton.size_mm=[" * 500, "tacton.size_mm=1e999",
+            "tacton.size_mm.a.b.c=1", "\x1b[2J=1", "body=/dev/zero", "body=\0", "body=.",
+            "tacton=1", "=", "tacton.foci=" + "[" * 5000, "tacton.size_mm=" + "9" * 5000,
+        )
+    ]  # fmt: skip
+    asked += [["sweep", "FILE", "--vary", "tacton.size_mm=1,2", *more] for more in (
+        ["--design", "\x1b[2J"], ["--samples", "-1"], ["--workers", "-5", "--scheduler", "threads"],
+ ["--seed", "-1"], ["--tolerance", "nan"],
+    )]  # fmt: skip
+    rates = ("nan", "inf", "1e308", "-1", "0")
+    asked += [
+        ["convert", "FILE", f"o{end}", "--rate", x] for end in (".wav", ".csv") for x in rates
+    ]
+    asked += [["convert", "FILE", name] for name in ("\0.wav", "a/b/c.wav", ".wav", "x.\x1b[2J")]
+    text = tomli_w.dumps(QUICK)
+    return {
+        f"request {k}, {' '.join(words)[:40]!a}": file("scene.toml", text, *_named(words))
+        for k, words in enumerate(asked)
+    }
+
+
+def _named(words: list[str]) -> list[str]:
+    return [*words, "--quiet"]

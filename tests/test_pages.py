@@ -1,0 +1,219 @@
+"""Pages show what a user or a file has written, and run none of it."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+from simple_model import Effort, Response
+from skinwave import document
+from skinwave.cli import main
+from skinwave.document import Html, joined, markup
+from skinwave.scene_file import loads
+from skinwave.studies import relax_page, tradeoff
+from skinwave.studies.assumptions import ASSUMPTIONS
+from skinwave.studies.relax import Ladder, Rung
+from skinwave.studies.tradeoff import Candidate, Measured, Study
+from skinwave.verify import page as verify_page
+from skinwave.verify.case import Case, Check, Entry, Result
+
+FIRST_ASSUMPTION = next(iter(ASSUMPTIONS))
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+# Begins as HTML of a cell did, and leaves an attribute, a title, an element of text and a frame.
+HOSTILE = (
+    "<b>'\"></title></pre></script></iframe><script>top.ran=1</script>"
+    "<img src=x onerror=top.ran=1><svg onload=top.ran=1>$title{}"
+)
+RAN = "() => window.ran || document.querySelectorAll('body script, [onerror], [onload]').length"
+
+
+def table(**sections):
+    """A scene of a tenth of a second of work, its name hostile."""
+    point = {"am_frequency_hz": 140, "duration_s": 0.05} | sections.pop("tacton", {})
+    rest = {"probes": {"points_mm": [[0, 0], [5, 0]]}} | sections
+    return tomli_w.dumps({"name": HOSTILE, "tacton": point} | rest)
+
+
+def response(model="point-kernel", **fields):
+    times = np.arange(500) / 1e4
+    motion = np.sin(2 * np.pi * 140 * times)[:, None] * (
+        [1.0, 0.5] if model == "point-kernel" else [0.5, 1.0]
+    )
+    probes = np.array([[0, 0], [5e-3, 0]])
+    return Response(model=model, times=times, probes=probes, displacement=motion, **fields)
+
+
+def relaxed(folder):
+    rungs = [Rung(name="a", dropped=(), model=HOSTILE, response=response())]
+    rungs += [
+        Rung(
+            name=FIRST_ASSUMPTION,
+            dropped=(FIRST_ASSUMPTION,),
+            model="m",
+            response=response("other"),
+        )
+    ]
+    failed = Rung(name="f", dropped=(), model="m", error=HOSTILE)
+    scene = loads(table())
+    found = Ladder(scene=scene, rungs=(*rungs, failed), beside=(), but_one=())
+    relax_page.write(folder, found)
+
+
+def traded(folder):
+    measured = Measured(
+        candidate=Candidate(model=HOSTILE), errors=(0.1,), line_errors={HOSTILE: 0.1}, delay=0.0,
+        cold=1.0, warm=0.1, memory=1, dofs=1,
+    )  # fmt: skip
+    known = replace(measured, candidate=Candidate(model="fem"))
+    found = Study(
+        measured=(measured, known), reference=Candidate(model="fem"), self_convergence=0.001
+    )
+    tradeoff.write(folder, loads(table()), found)
+
+
+def verified(folder):
+    check = Check(what=HOSTILE, value=1.0, reference=1.0, error=0.0, bar=0.1, unit=HOSTILE)
+    case = Case(title=HOSTILE, source=HOSTILE, mesh=HOSTILE, checks=(check,), note=HOSTILE,
+                said=HOSTILE)  # fmt: skip
+    entry = Entry(name=HOSTILE, topic=HOSTILE, run=lambda: case)
+    shown = verify_page.page([Result(entry=entry, case=case, seconds=1.0)], [entry], 0)
+    (folder / "index.html").write_text(shown, encoding="utf-8")
+
+
+def ran(folder):
+    (folder / "scene.toml").write_text(table(body={"kind": "none"}), encoding="utf-8")
+    out = ["--out", str(folder / "out"), "--quiet"]
+    assert main(["run", str(folder / "scene.toml"), *out]) == 0
+
+
+def reported(folder):
+    """Of a folder of results that someone else has made."""
+    ran(folder)
+    result = folder / "out"
+    row = {"what": HOSTILE, "value": HOSTILE, "reason": HOSTILE}
+    plan = {"rows": [row], "tolerance": 0.05, "warnings": [HOSTILE]}
+    check = {"title": HOSTILE, "value": 1.0, "reference": 1.0, "error": 0.0, "bar": 1.0}
+    trust = {"command": HOSTILE, "model": HOSTILE, "misfit": 0.1}
+    trust["cases"] = [check | {"passed": True, "source": HOSTILE}]
+    effort = json.loads((result / "effort.json").read_text())
+    effort |= {"warnings": [HOSTILE], "solver": HOSTILE, "versions": {HOSTILE: HOSTILE}}
+    for name, content in (("plan", plan), ("trust", trust), ("effort", effort)):
+        (result / f"{name}.json").write_text(json.dumps(content))
+    out = ["--out", str(folder / "report"), "--quiet"]
+    assert main(["report", str(result), *out]) == 0
+
+
+def compared(folder):
+    body = {"width_mm": 30, "height_mm": 30, "depth_mm": 6, "sides": "clamped"}
+    (folder / "scene.toml").write_text(table(body=body), encoding="utf-8")
+    out = ["--out", str(folder / "out"), "--quiet"]
+    assert main(["compare", str(folder / "scene.toml"), "--h", "6", *out]) == 0
+
+
+WRITERS = (relaxed, traded, verified, ran, reported, compared)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api")
+    if not Path(CHROMIUM).exists():
+        pytest.skip("no browser here")
+    with playwright.sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+def opened(browser, path, obeyed=False):
+    """A page and what its console said; without its policy if the page is to be `obeyed`."""
+    context = browser.new_context(bypass_csp=obeyed)
+    tab, said = context.new_page(), []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.goto(f"file://{path}")
+    tab.wait_for_timeout(300)
+    return tab, said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
+def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
+    write(tmp_path)
+    pages = sorted(tmp_path.rglob("index.html"))
+    assert pages
+    for path in pages:
+        for obeyed in (False, True):  # escaped, whatever the policy would stop
+            tab, said = opened(browser, path, obeyed)
+            assert said == []
+            assert tab.evaluate(RAN) == 0
+            assert HOSTILE[:40] in tab.inner_text("body")
+            policy = tab.evaluate("document.querySelector('meta[http-equiv]').content")
+            assert policy == document.POLICY
+
+
+@pytest.mark.slow
+def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
+    """The second line of defence, by itself."""
+    page = document.page("t", Html(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
+    (tmp_path / "index.html").write_text(page, encoding="utf-8")
+    tab, said = opened(browser, tmp_path / "index.html")
+    assert not tab.evaluate("window.ran")
+    assert any("Content Security Policy" in text for text in said)
+    tab, _ = opened(browser, tmp_path / "index.html", obeyed=True)
+    assert tab.evaluate("window.ran")  # it would run otherwise
+
+
+@pytest.mark.slow
+def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
+    inner = (
+        "<body><script>document.body.append('drawn');\nlet a = '<é>';</script><script>"
+        "try { top.ran = 1 } catch { document.body.append(' alone') }</script>"
+    )
+    page = document.page("t", document.inner_page(inner, HOSTILE), document.paragraph(HOSTILE))
+    (tmp_path / "index.html").write_text(page, encoding="utf-8")
+    tab, said = opened(browser, tmp_path / "index.html")
+    assert said == []
+    assert tab.frames[1].inner_text("body") == "drawn alone"
+    assert tab.evaluate(RAN) == 0
+    changed = page.replace("drawn", "changed")
+    (tmp_path / "changed.html").write_text(changed, encoding="utf-8")
+    tab, said = opened(browser, tmp_path / "changed.html")
+    assert tab.frames[1].inner_text("body").strip() == "alone"
+    assert len(said) == 1
+
+
+def test_only_html_made_here_is_taken_as_it_is():
+    assert markup("<p>{}</p>", "<b>") == "<p>&lt;b&gt;</p>"
+    assert markup("<p>{}</p>", Html("<b>")) == "<p><b></p>"
+    assert joined(["<b>", Html("<i>")], "") == "&lt;b&gt;<i>"
+    forgotten = Html("<b>") + "<i>"
+    assert not isinstance(forgotten, Html)
+    for made in (
+        document.page("<t>", "<p>"), document.section("<t>", "<p>"), document.paragraph("<p><t>"),
+        document.table(["<t>"], [["<p>", "< -120"]]),
+        document.picture(b"", "<p>\"'", '<t>"'), document.inner_page("<p>", "<t>"),
+        document.warnings_banner([("<t>", Effort(warnings=("<p>",)))]),
+    ):  # fmt: skip
+        assert not re.search(r"<[pt]>[^<]*(?!</p>)<[pt]>|<t>|<p>\"", made)
+        assert "&lt;p&gt;" in made
+        assert "&lt;t&gt;" in made
+
+
+def test_every_page_has_its_policy(tmp_path):
+    verified(tmp_path)
+    page = (tmp_path / "index.html").read_text()
+    assert page.index("Content-Security-Policy") < page.index("<title>")
+    assert "default-src 'none'" in page
+    assert "script-src" not in page
+    sources = [*Path("skinwave").rglob("*.py")] if Path("skinwave").is_dir() else []
+    for path in sources:  # pages come from `document.page` alone
+        if path.name not in ("document.py", "front.py"):
+            assert "<!doctype" not in path.read_text(encoding="utf-8").lower(), path
