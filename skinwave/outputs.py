@@ -7,6 +7,7 @@ there when it began keeps its result beside it and says where.
 
 import contextlib
 import errno
+import json
 import os
 import secrets
 import shlex
@@ -69,6 +70,7 @@ def output_folder(
         _refuse_taken(out, aside)
     except KeyboardInterrupt:
         if aside and any(aside.rglob(record.FILE)):
+            _drop_unfinished(aside)
             raise KeyboardInterrupt(_kept(aside, report)) from None
         _remove(aside, above)
         raise
@@ -184,6 +186,31 @@ def unwritable(out: Path, error: OSError, cure: str) -> ValueError:
     """The sentence that a folder or file cannot be written."""
     room = "make room there or " * (error.errno in FULL)
     return ValueError(f"{out} cannot be written ({error.strerror}); {room}{cure}")
+
+
+def _drop_unfinished(aside: Path) -> None:
+    """Leave finished runs and what was planned, which a page is made from, and no half of a file.
+
+    The folder of a run appears whole, so that all in one with a record is.
+    """
+    runs = {path.parent for path in aside.rglob(record.FILE)}
+    loose = [p for p in aside.rglob("*") if p.is_file() and not runs & {*p.parents}]
+    for path in loose:
+        if path.suffix != ".toml" and not _is_json(path):
+            path.unlink()
+    for folder in sorted((p for p in aside.rglob("*") if p.is_dir()), reverse=True):
+        with contextlib.suppress(OSError):
+            folder.rmdir()  # if it is empty
+
+
+def _is_json(path: Path) -> bool:
+    if path.suffix != ".json":
+        return False
+    try:
+        json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        return False
+    return True
 
 
 def _kept(aside: Path, report: Sequence[str]) -> str:

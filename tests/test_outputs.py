@@ -432,6 +432,8 @@ def test_an_interrupted_report_says_which_command_finishes_it(folder, capsys, mo
     def interrupted(results, out, *given, **options):
         (out / "pictures").mkdir()
         (out / "pictures/half.png").write_bytes(b"half")
+        (out / "plan.json").write_text('{"half": ')
+        (out / "trust.json").write_text("{}")
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -442,6 +444,7 @@ def test_an_interrupted_report_says_which_command_finishes_it(folder, capsys, mo
     (said,) = capsys.readouterr().err.splitlines()
     (left,) = folder.glob("a report.partial-*")
     assert str(left) in said
+    assert sorted(p.name for p in left.iterdir()) == ["point-kernel", "trust.json"]
     command = said.split("; ")[-1].removesuffix(" makes a page of them")
     assert command.endswith("--style talk --format svg")
     words = shlex.split(command)
