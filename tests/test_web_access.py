@@ -474,7 +474,11 @@ def test_the_server_ends_at_once_with_pages_open(tmp_path, monkeypatch, end, doi
                 await asyncio.gather(late, return_exceptions=True)
             return said[1], lasted, gone
 
-    said, lasted, gone = asyncio.run(use())
+    try:
+        said, lasted, gone = asyncio.run(use())
+    finally:
+        process.kill()
+        process.wait()
     print(f"ended {lasted:.2f} s, all gone {gone:.2f} s after {end.name}")
     assert said == ""
     assert process.returncode == 0
