@@ -216,3 +216,15 @@ def test_a_banner_shows_the_worst_of_sentences_that_differ_by_numbers():
     assert "Take care: &lt;not&gt; held (run 1)." in banner
     assert banner.count("<p>") == 2
     assert document.warnings_banner([("a", Effort())]) == ""
+
+
+def test_deprecations_are_errors_where_they_are_ours():
+    """What other packages will no longer do for each other is theirs to mend."""
+    for module in ("fem", "meshes.files", "simple_model.drive", "skinwave.web.serve"):
+        for kind in (DeprecationWarning, PendingDeprecationWarning):
+            with pytest.raises(kind):
+                warnings.warn_explicit("old", kind, "file.py", 1, module=module)
+            warnings.warn_explicit("old", kind, "file.py", 1, module="matplotlib.cm")
+            warnings.warn_explicit("old", kind, "file.py", 1, module="skinwaves")
+    with pytest.raises(UserWarning):
+        warnings.warn_explicit("wrong", UserWarning, "file.py", 1, module="matplotlib.cm")

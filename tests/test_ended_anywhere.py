@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 
 import meshes
+from meshes import palm
 from skinwave import read
 
 pytestmark = [
@@ -36,7 +37,7 @@ COMMANDS = {
     "compare": [*SMALL, "--out", "new"],
     "sweep": [*SMALL, "--vary", "tacton.am_frequency_hz=100,150,200", "--model", "fem", "--csv",
               "--workers", "2", "--out", "new"],
-    "mesh": ["block.stl", "--h", "3", "--out", "new.vtu", "--quiet"],
+    "mesh": ["hand.stl", "--h", "6", "--out", "new.vtu", "--quiet"],
     "convert": ["good.toml", "new.csv", "--quiet"],
     "rerun": ["old", "--out", "new", "--quiet"],
     "report": [*SMALL, "--out", "new"],
@@ -71,16 +72,18 @@ def prepared(folder):
     (folder / "good.toml").write_text(corpus.GOOD)
     (folder / "notes.partial").mkdir()
     (folder / "notes.partial/note.txt").write_text("mine")
-    rounded(folder / "block.stl")
+    hand(folder / "hand.stl")
     run = [*words("run")[:-1], "old"]
     subprocess.run(run, cwd=folder, check=True, **QUIET)
 
 
-def rounded(path):
+def hand(path):
+    """Write the surface of a palm, m."""
     import pyvista
 
-    box = pyvista.Cube(x_length=0.06, y_length=0.06, z_length=0.02).triangulate().subdivide(3)
-    box.save(path)
+    found = palm.surface(meshes.Palm(), 2e-3)
+    corners = np.insert(found.triangles, 0, 3, axis=1)
+    pyvista.PolyData(found.points, corners.ravel()).save(path)
 
 
 def contents(folder):

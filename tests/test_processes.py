@@ -11,6 +11,7 @@ from pathlib import Path
 
 import corpus
 import pytest
+from test_ended_anywhere import hand
 
 import skinwave
 from skinwave.processes import SAFE_PATH, ended_by_signals, safe_path
@@ -85,7 +86,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     from skinwave.cli import COMMANDS
 
     small = ["small.toml", "--h", "10", "--quiet"]
-    surface(hostile[1] / "body.stl")
+    hand(hostile[1] / "body.stl")
     asked = {
         "run": [*small, "--out", "out"],
         "plan": ["small.toml"],
@@ -109,15 +110,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     for name, arguments in asked.items():
         threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
         code = 2 if name == "film" else 0  # no report is there
-        run_there(hostile, name, *arguments, threads=threads, code=code, timeout=30)
-
-
-def surface(path):
-    """A block of rubber with round edges, so that meshing takes a second."""
-    import pyvista
-
-    box = pyvista.Cube(x_length=0.06, y_length=0.06, z_length=0.02).triangulate().subdivide(4)
-    box.save(path)
+        run_there(hostile, name, *arguments, threads=threads, code=code, timeout=20)
 
 
 def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path):

@@ -117,7 +117,8 @@ class Front:
             pass  # its process has ended: the page is closed, and says so
         finally:
             kill(behind.process)
-            await page.close()
+            if page.prepared:
+                await page.close()
         return page
 
     async def _begun(self, asked: dict[str, Any]) -> PageProcess:
