@@ -19,8 +19,10 @@ settings.load_profile("repeatable")
 
 @pytest.fixture(scope="session", autouse=True)
 def fresh_cache(tmp_path_factory):
-    """Tests prepare bodies themselves, whatever this machine prepared before."""
-    os.environ["SKINWAVE_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    """Tests prepare bodies themselves, whatever this machine prepared before; workers share."""
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    os.environ["SKINWAVE_CACHE"] = str(base / "cache")
 
 
 @pytest.fixture(scope="session")

@@ -100,7 +100,11 @@ def run_study(
         with suppress(KeyboardInterrupt):
             first = shown(groups, maps) if outcome.runs == outcome.planned else None
         parts = page_parts(folder, groups, first, outcome, progress, figures)
-        spent = replace(outcome, seconds=time.perf_counter() - started, peak_memory=peak_memory())
+        spent = replace(
+            outcome,
+            seconds=time.perf_counter() - started,
+            peak_memory=peak_memory() + aside.submit(peak_memory).result(),
+        )
         parts += [effort_section(groups, prepared, spent), again(command)]
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
     return spent

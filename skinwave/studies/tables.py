@@ -98,7 +98,7 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
     counted = f"{tactons} Tacton{'s' * (tactons != 1)}"
-    summary = f"{counted} took {spent:.0f} s in all, peak memory {peak:.2f} GiB. {named}"
+    summary = f"{counted} took {spent:.0f} s in all, at most {peak:.2f} GiB in a process. {named}"
     return joined([table(header, rows), paragraph(summary)], "")
 
 
