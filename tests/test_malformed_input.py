@@ -134,8 +134,8 @@ def test_a_process_of_its_own_says_the_same(folder, arguments):
     assert contents(folder) == before
 
 
-NAMES = ["", "..", "../../beside", "/tmp/absolute", "figures", "overview", "lines.csv",
-         "$\\\\frac{$", "掌", "zero \\u0000 byte", "two\\nlines", "n" * 300]  # fmt: skip
+NAMES = ["..", "../../beside", "figures", "$\\\\frac{$", "zero \\u0000 byte", "n" * 300]
+MORE = ["", "/tmp/absolute", "overview", "lines.csv", "掌", "two\\nlines"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -150,6 +150,17 @@ def test_a_scene_of_any_name_is_compared_within_its_folder(folder, name):
     command = ["run", "out", "--model", "point-kernel", "--out", "single", "--quiet"]
     (command[1],) = map(str, (folder / "out").glob("*/point-kernel/scene.toml"))
     assert main(command) == 0
+
+
+@pytest.mark.parametrize("name", MORE)
+def test_a_scene_of_any_name_is_answered_within_its_folder(folder, name):
+    text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")
+    (folder / "named.toml").write_text(text, encoding="utf-8")
+    before = contents(folder)
+    ask = ["run", "named.toml", "--model", "point-kernel", "--out", "out", "--quiet"]
+    assert main(ask) == 0
+    assert {p: c for p, c in contents(folder).items() if "out" not in p.parts} == before
+    assert (folder / "out/responses.npz").exists()
 
 
 def test_overwriting_keeps_the_neighbours_and_a_link(folder):
