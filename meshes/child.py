@@ -54,7 +54,7 @@ def run(
 
     Where the platform knows such limits, it gets no more than `memory` in bytes.
     """
-    scripts = [str(Path(__file__).with_name(name)) for name in ("watched.py", script)]
+    scripts = [str(Path(__file__).parent / name) for name in ("watched.py", script)]
     limit = str(int(memory)) if math.isfinite(memory) else "0"
     command = [sys.executable, "-P", scripts[0], limit, scripts[1], *map(str, arguments)]
     watched, held = os.pipe()  # `watched.py` ends when this process no longer holds its other end

@@ -15,6 +15,7 @@ LINE_BETA, LINE_BINS = LINE_WINDOW[1], 2.5  # it keeps lines apart that are so m
 SETTLE = 0.25  # of a response, before which no line is fitted
 ALIKE = 1e-3  # of what can be told apart: lines as close as that are one, and its amplitude is
 MINOR = 0.05  # of a line: what others that it is not resolved from may have together
+FAINT = 0.02  # of the strongest line: what is weaker may be wrong by more of itself
 UNITS = ("m", "Pa")
 UNEVEN = 1e-6  # of a sampling interval
 
@@ -208,14 +209,15 @@ def hidden(
     *,
     settle: float = SETTLE,
 ) -> NDArray[np.bool_]:
-    """Whether more than 5 % of each line (f,) may be side lobes of those that are not fitted, of
-    which there is so much (f,) as `rest`.
+    """Whether more than 5 % of each line (f,), or of a fiftieth of the strongest, are likely to be
+    side lobes of those that are not fitted, of which there is so much (f,) as `rest`.
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
     x = np.pi * (frequencies[:, None] - frequencies[rest > 0]) / least
     _, beta = _window(_closest(distinct, 1 / least))
-    return _kaiser_transform(x, beta) @ rest[rest > 0] > MINOR * strengths
+    seen = np.sqrt(_kaiser_transform(x, beta) ** 2 @ rest[rest > 0] ** 2)  # of any phases
+    return np.asarray(seen > MINOR * np.maximum(strengths, FAINT * strengths.max(initial=0.0)))
 
 
 def _kaiser_transform(x: Floats, beta: float) -> Floats:

@@ -34,7 +34,7 @@ def flushed(main: Main) -> Main:
             if failed := _unwritten():
                 raise SystemExit(failed) from None
             raise stop
-        return _unwritten() or code
+        return _unwritten(said=code != 0) or code
 
     return ended
 
@@ -58,8 +58,8 @@ def explained(error: OSError) -> str:
     return f"{place} cannot be read or written ({error.strerror}); {cure}"
 
 
-def _unwritten() -> int:
-    """Write what is left; an exit code if that fails, 0 if not."""
+def _unwritten(said: bool = False) -> int:
+    """Write what is left; an exit code if that fails, 0 if not. What was `said` is not repeated."""
     try:
         if sys.stdout:
             sys.stdout.flush()
@@ -68,8 +68,11 @@ def _unwritten() -> int:
         return CLOSED
     except OSError as error:
         _drop(sys.stdout)
-        said = f"standard output cannot be written ({error.strerror}); make room or redirect it"
-        print(f"skinwave: {said}", file=sys.stderr)
+        if not said:
+            sentence = (
+                f"standard output cannot be written ({error.strerror}); make room or redirect it"
+            )
+            print(f"skinwave: {sentence}", file=sys.stderr)
         return 2
     return 0
 

@@ -454,14 +454,14 @@ def test_tactons_are_compared_on_the_body_of_a_file(slab_file, tmp_path, monkeyp
 def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, monkeypatch):
     """Of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
     monkeypatch.chdir(tmp_path)
-    scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.05)))
+    scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.1)))
     (tmp_path / "scene.toml").write_text(dumps(scene))
-    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "8"]
+    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "10"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
     page = (tmp_path / "both/index.html").read_text()
     assert "Body from generic-hand-right.glb, -x towards the device" in page
     assert "thicker sheet" not in page
-    assert "--up -x --h 8" in page
+    assert "--up -x --h 10" in page
     rows = list(csv.DictReader((tmp_path / "both/lines.csv").read_text().splitlines()))
     moved = [
         float(r["displacement_um"]) for r in rows if r["line"] == "f_AM" and r["body"] == "mesh"

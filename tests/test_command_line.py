@@ -175,12 +175,13 @@ def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
-def test_ctrl_c_leaves_what_is_finished(tmp_path):
+def test_ctrl_c_leaves_what_is_finished(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", "")  # or nothing is to be prepared
     command = [sys.executable, "-m", "skinwave", "compare", "--out", str(tmp_path / "cut")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stderr is not None
         for line in process.stderr:  # phases are named, a line each
-            if line.startswith("paper-sheet: assemble"):
+            if line.startswith("skin-slab: assemble"):
                 process.send_signal(signal.SIGINT)
                 break
         process.stderr.read()
@@ -188,7 +189,7 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
     page = (tmp_path / "cut/index.html").read_text()
     assert "Interrupted: 30 of 60 runs" in page
     assert len(list((tmp_path / "cut").glob("*/point-kernel/responses.npz"))) == 15
-    assert not os.path.exists(tmp_path / "cut.partial")
+    assert [path.name for path in tmp_path.iterdir()] == ["cut"]
 
 
 def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, monkeypatch):

@@ -81,6 +81,7 @@ def test_nothing_of_a_hostile_folder_is_imported(hostile):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("hostile", [as_module], indirect=True)
 def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     """Those that take minutes are told to end when their own processes have begun."""
     from skinwave.cli import COMMANDS
@@ -110,7 +111,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     for name, arguments in asked.items():
         threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
         code = 2 if name == "film" else 0  # no report is there
-        run_there(hostile, name, *arguments, threads=threads, code=code, timeout=20)
+        run_there(hostile, name, *arguments, threads=threads, code=code, timeout=6)
 
 
 def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path):

@@ -77,8 +77,8 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
 def test_the_limit_of_memory_holds(tmp_path):
     (tmp_path / "hungry.py").write_text("x = bytearray(2_000_000_000)\n")
     with pytest.raises(MeshError, match="MemoryError"):
-        child.run(tmp_path / "hungry.py", folder=tmp_path, timeout=60, memory=500e6)
-    child.run(tmp_path / "hungry.py", folder=tmp_path, timeout=60, memory=4e9)
+        child.run(str(tmp_path / "hungry.py"), folder=tmp_path, timeout=60, memory=500e6)
+    child.run(str(tmp_path / "hungry.py"), folder=tmp_path, timeout=60, memory=4e9)
 
 
 @pytest.mark.parametrize(
