@@ -14,6 +14,7 @@ import skinwave
 from skinwave.commands import COMMANDS
 from skinwave.plain_text import printable, say
 from skinwave.processes import ended_by_signals, safe_path
+from skinwave.safe_path import leave_out_working_settings
 from skinwave.streams import CLOSED, explained, flushed, reader_gone
 
 CACHE = "SKINWAVE_CACHE"
@@ -43,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     options = parser().parse_args(_joined(typed))
     options.typed = typed
+    leave_out_working_settings()
     try:
         with safe_path(), ended_by_signals(), _cache_as_asked(options):
             return int(options.command(options))

@@ -23,9 +23,9 @@ FITTING = {
     "command": {"typed": str, "name": str, "options": {str: object}},
 }  # fmt: skip
 RESPONSES = ("responses.npz", "response.npz")  # today's name, and that of version 0.2
-# Options that say where and how to report, not what to compute.
+# Options that say where to compute and how to report, not what to compute.
 REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
-             "typed")  # fmt: skip
+             "typed", "scheduler")  # fmt: skip
 
 
 def of_command(options: Namespace) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def hostile(request, tmp_path):
 
 
 def run_there(hostile, *arguments, code=0, threads="1", timeout=None):
-    """Run a command there; after so many s it is told to end."""
+    """What a command says there; after so many s it is told to end."""
     command, place, ran = hostile
     env = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), threads)
     env |= {"TMPDIR": str(place.parent)}
@@ -72,12 +72,23 @@ def run_there(hostile, *arguments, code=0, threads="1", timeout=None):
         said, code = process.communicate(timeout=60)[1], 143
     assert process.returncode == code, said
     assert not ran.exists(), ran.read_text()
+    return said
 
 
 def test_nothing_of_a_hostile_folder_is_imported(hostile):
     run_there(hostile, "--version")
     run_there(hostile, "run", "small.toml", "--h", "10", "--out", "out", "--quiet")
     run_there(hostile, "run", "nothing.toml", code=2)
+
+
+def test_settings_of_a_hostile_folder_are_left_out(hostile):
+    """matplotlib would have `latex` typeset its text, and warn of what it does not know."""
+    settings = "text.usetex: True\nno_such_key: 1\n"
+    (hostile[1] / "matplotlibrc").write_text(settings)
+    said = run_there(hostile, "run", "small.toml", "--h", "10", "--out", "out", "--quiet")
+    assert "no_such_key" not in said
+    said = run_there(hostile, "compare", "small.toml", "--h", "10", "--out", "both", "--quiet")
+    assert "no_such_key" not in said
 
 
 @pytest.mark.slow

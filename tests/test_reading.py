@@ -163,13 +163,29 @@ def test_a_record_sets_nothing_but_threads(result, capsys, monkeypatch):
     ("name", "options"),
     [
         ("web", {}), ("convert", {}), ("run", {"command": "x"}), ("run", {"h": "x"}),
-        ("run", {"tolerance": None}), ("run", {"unknown": 1}), ("run", {"model": {}}),
+        ("run", {"tolerance": "x"}), ("run", {"unknown": 1}), ("run", {"model": {}}),
+        ("run", {"scheduler": "tcp://127.0.0.1:1"}), ("run", {"scheduler": 7}),
+        ("run", {"schedule": "tcp://127.0.0.1:1"}), ("run", {"model": "--help"}),
+        ("run", {"help": True}), ("run", {"out": "x"}), ("run", {"h": True}),
     ],
 )  # fmt: skip
 def test_a_record_repeats_commands_that_wrote_results(result, capsys, name, options):
     record = json.loads((result / "record.json").read_text())
     record["command"]["name"] = name
     record["command"]["options"] |= options
+    (result / "record.json").write_text(json.dumps(record))
+    assert main(["rerun", "result", "--out", "again", "--quiet"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not Path("again").exists()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"format": ["pgf"]}, {"format": True}, {"beside": 5}, {"style": 5}, {"h": "x"}, {"--": 1}],
+)
+def test_a_record_of_a_report_has_choices_that_the_command_has(result, capsys, options):
+    record = json.loads((result / "record.json").read_text())
+    record["command"] |= {"name": "report", "options": {"source": "scene.toml"} | options}
     (result / "record.json").write_text(json.dumps(record))
     assert main(["rerun", "result", "--out", "again", "--quiet"]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -1,19 +1,22 @@
 """A result folder once more, from its record.json."""
 
 import argparse
+import io
 import os
+import re
 import shlex
 import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 from skinwave.commands.common import add_output, progress_of, summarise
 
 REPEATED = ("run", "compare", "report")
-NUMBERS = {"h?": float, "dt?": float, "tolerance?": float, "frames?": float}
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -70,24 +73,15 @@ def _command_again(
     options: argparse.Namespace, kept: dict[str, Any], scene: Path, out: Path
 ) -> int:
     """The command of the command line, with the options that it had."""
-    from skinwave.cli import parser
-    from skinwave.fitting import fitting
-    from skinwave.record import REPORTING
-
     name, asked = kept["command"]["name"], kept["command"]["options"]
     place = "source" if "source" in asked else "scene"
     given = str(scene) if kept["scene"] is not None else asked.get(place)
     if name not in REPEATED:
         raise ValueError(f"the record's command '{name}' is none of {', '.join(REPEATED)}")
-    again = parser().parse_args([name] if given is None else [name, str(given)])
-    for key in asked.keys() - {place}:
-        default, value = vars(again).get(key), asked[key]
-        is_known = key in vars(again) and key not in REPORTING
-        if not is_known or not _is_option(value) or (value is None and default is not None):
-            raise ValueError(f"the record's option '{key}' is none of {name}; make the result anew")
-    given_options = {key: value for key, value in asked.items() if value is not None}
-    fitting(given_options, NUMBERS, "options of the record")
-    vars(again).update({key: value for key, value in asked.items() if key != place})
+    words = [word for key, value in asked.items() if key != place for word in _words(key, value)]
+    again = _parsed([name, *words, *([] if given is None else ["--", str(given)])])
+    if strange := [key for key in asked if key != "scheduler" and key not in vars(again)]:
+        raise ValueError(f"the record's option '{strange[0][:40]}' is none; make the result anew")
     for key in ("overwrite", "quiet", "json", "debug"):
         setattr(again, key, getattr(options, key))
     try:
@@ -97,11 +91,37 @@ def _command_again(
     return int(again.command(again))
 
 
-def _is_option(value: Any) -> bool:
-    """Whether a value is one of JSON that an option has."""
-    if isinstance(value, list):
-        return all(isinstance(item, str) for item in value)
-    return value is None or isinstance(value, str | bool | int | float)
+def _words(key: str, value: Any) -> Iterator[str]:
+    """An option of a record as it would be typed; nothing where it was not given."""
+    from skinwave.record import REPORTING
+
+    known = re.fullmatch(r"[a-z_]+", key) and key not in REPORTING
+    if value is None or value is False or value == []:
+        return
+    if not known or not isinstance(value, str | int | float | list):
+        raise ValueError(f"the record's option '{key[:40]}' is none; make the result anew")
+    flag = f"--{key.replace('_', '-')}"
+    if value is True:
+        yield flag
+    elif key == "format" and isinstance(value, list):  # is given once each, and has one already
+        yield from (f"{flag}={item}" for item in value if item != "png")
+    else:
+        yield f"{flag}={','.join(map(str, value)) if isinstance(value, list) else value}"
+
+
+def _parsed(words: list[str]) -> argparse.Namespace:
+    """What the command line makes of words, which come from a file: nobody reads its usage."""
+    from skinwave.cli import parser
+
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said), redirect_stdout(said):
+            return parser().parse_args(words)
+    except SystemExit:
+        reason = said.getvalue().strip().splitlines()[-1:] or ["it asks for help"]
+        raise ValueError(
+            f"the record's command cannot be repeated ({reason[0]}); make the result anew"
+        ) from None
 
 
 def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path, out: Path) -> int:
