@@ -1,6 +1,7 @@
 """Nothing of the user's is removed, replaced or truncated, whatever it is called."""
 
 import errno
+import hashlib
 import json
 import os
 import shlex
@@ -173,7 +174,7 @@ def test_of_two_runs_into_one_folder_neither_is_lost(folder):
     (later,) = folder.glob("out.partial-*")
     assert str(later) in str(error.value)
     assert (later / "index.html").read_text() == "later"
-    assert marks.listed(later) == {"index.html": 5}
+    assert marks.listed(later) == {"index.html": hashlib.sha256(b"later").hexdigest()}
 
 
 def test_of_two_that_may_overwrite_neither_new_result_is_lost(folder):
@@ -255,6 +256,61 @@ def test_what_the_user_added_or_changed_in_a_result_is_not_lost(folder, capsys):
         path.unlink() if before is None else path.write_bytes(before)
     (folder / "out/index.html").unlink()  # what is gone is no loss
     assert main(again) == 0
+
+
+def test_an_edit_that_keeps_the_size_is_not_lost(folder, capsys):
+    made(folder / "out", "one")
+    (folder / "out/index.html").write_text("two")
+    assert "holds index.html" in refused(capsys, *RUN, "--out", "out", "--overwrite")
+
+
+@pytest.mark.parametrize("text", ["two", "three"])
+def test_a_list_of_sizes_is_still_read(folder, text):
+    made(folder / "out", "one")
+    kept = record.read(folder / "out") | {"files": {"index.html": 3}}
+    (folder / "out/record.json").write_text(json.dumps(kept))
+    (folder / "out/index.html").write_text(text)
+    assert (marks.foreign(folder / "out") is None) == (len(text) == 3)
+
+
+@pytest.mark.parametrize("place", ["out/mine", "out/report", "out/report/mine", "out/a/report"])
+def test_a_result_within_another_is_not_lost(folder, capsys, drawn, place):
+    assert main([*RUN, "--out", "out"]) == 0
+    if place == "out/report/mine":
+        assert main(["report", "out", "--quiet"]) == 0
+    assert main([*RUN, "--out", place]) == 0
+    assert "which was added or changed" in refused(capsys, *RUN, "--out", "out", "--overwrite")
+    if place == "out/report/mine":
+        assert "holds mine/" in refused(capsys, "report", "out", "--quiet")
+
+
+def test_the_report_of_a_scene_within_a_result_is_not_lost(folder):
+    out = made(folder / "out")
+    made(out / "report")
+    command = {"typed": "", "name": "report", "options": {}}
+    record.write(out / "report", command)
+    marks.seal(out / "report")
+    assert marks.foreign(out) is None
+    record.write(out / "report", command, scene=loads(corpus.SILENT_GROUND))
+    marks.seal(out / "report")
+    assert out / "report" in marks.foreign(out).parents
+
+
+@posix
+@pytest.mark.parametrize("note", [True, False])
+def test_folders_of_any_depth_in_a_result_are_kept(folder, note):
+    """Deeper than Python's recursion; made and removed from within."""
+    made(folder / "out")
+    deep = "d/" * 1100
+    os.makedirs(folder / "out/d")
+    for k in range(100, 1101, 100):
+        os.makedirs(folder / "out" / deep[: 2 * k], exist_ok=True)
+    if note:
+        (folder / "out" / deep / "note").write_text("mine")
+    with pytest.raises(ValueError, match="which was added or changed"):
+        made(folder / "out", overwrite=True)
+    assert (folder / "out" / deep).is_dir()
+    subprocess.run(["rm", "-r", str(folder / "out")], check=True)
 
 
 @posix
