@@ -11,7 +11,7 @@ from pathlib import Path
 
 from skinwave import record
 
-FILES = "files"  # key in record.json: path below its folder -> SHA-256, or size in bytes up to 0.3
+FILES = "files"  # key in record.json: path below its folder -> SHA-256; once, size in bytes
 REPORT = "report"  # the command, and the folder that it makes within a result
 DEEPEST = 100  # levels of folders below a result; none that is written has as many
 OF_SYSTEM = (".DS_Store", "Thumbs.db", "desktop.ini")  # which file browsers leave anywhere
@@ -42,7 +42,7 @@ def digest(path: Path) -> str:
 
 def listed(folder: Path) -> dict[str, str | int] | None:
     """SHA-256 by path of the files that a folder was written with, or the size in bytes that
-    releases before listed; None without a mark.
+    was listed before; None without a mark.
     """
     try:
         found = record.read(folder).get(FILES)

@@ -381,6 +381,15 @@ def test_a_report_replaces_only_a_report(folder, capsys, drawn):
     assert not (folder / "out/report").exists()
 
 
+@posix
+def test_a_report_is_not_written_through_a_link(folder, capsys, drawn):
+    assert main([*RUN, "--out", "out"]) == 0
+    (folder / "outside").mkdir()
+    (folder / "out/report").symlink_to("../outside/new")
+    assert "report is a link" in refused(capsys, "report", "out", "--quiet")
+    assert not [*(folder / "outside").iterdir()]
+
+
 def page(folder, *given):
     (folder / "index.html").write_text("<html></html>")
 
@@ -477,7 +486,81 @@ def test_figures_elsewhere_are_kept(folder, capsys):
     assert main([*drawing, "--out", "elsewhere", "--overwrite"]) == 0
 
 
+DRAWING = ["plot", "none-sweep", "--column", "kernel_peak_pa", "--quiet"]
+
+
+@pytest.fixture
+def table(folder):
+    """The folder of a sweep with its table and a figure; what is drawn and listed is its own."""
+    assert main([*SWEEP, "--csv"]) == 0
+    assert main(DRAWING) == 0
+    assert main([*SWEEP, "--csv"]) == 0
+    assert main(DRAWING) == 0
+    return folder / "none-sweep"
+
+
+def test_a_figure_or_table_of_the_users_in_a_sweep_is_kept(table, capsys):
+    (figure,) = (table / "figures").iterdir()
+    for path, command in ((figure, DRAWING), (table / "rows.csv", [*SWEEP, "--csv"])):
+        text = path.read_bytes()
+        path.write_bytes(text[:-1] + b"!")
+        assert f"{path.name} was added or changed" in refused(capsys, *command)
+        path.write_bytes(text)
+        assert main(command) == 0
+    assert "holds " in refused(capsys, *RUN, "--out", "none-sweep", "--overwrite")
+    figure.write_text("mine")
+    assert main([*DRAWING, "--overwrite"]) == 0
+    assert main(DRAWING) == 0
+
+
+@posix
+def test_no_link_in_a_sweep_is_written_through(table, capsys):
+    (figure,) = (table / "figures").iterdir()
+    asked = [(figure, DRAWING), (table / "figures", DRAWING), (table / "record.json", DRAWING),
+             (table / "rows.csv", [*SWEEP, "--csv"])]  # fmt: skip
+    for path, command in asked:
+        path.rename(table.parent / "elsewhere")
+        path.symlink_to(table.parent / "elsewhere")
+        assert f"{path.name} is a link" in refused(capsys, *command)
+        path.unlink()
+        (table.parent / "elsewhere").rename(path)
+        assert main(command) == 0
+
+
+def test_a_figure_of_a_sweep_without_record_is_drawn_again(table):
+    (table / "record.json").unlink()
+    shutil.rmtree(table / "figures")
+    for _ in range(2):
+        assert main(DRAWING) == 0
+
+
+def test_names_of_columns_are_no_formulas(folder):
+    out = dataset.open_folder(folder / "out")
+    dataset.write_csv(out, [{"key": "a", "=1+1": "=1+1"}])
+    assert (out / "rows.csv").read_text().splitlines() == ["key,'=1+1", "a,'=1+1"]
+
+
 # Interrupts
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
+def test_a_signal_does_not_stop_a_removal_halfway(folder, monkeypatch, error):
+    removed, signals = shutil.rmtree, iter([error])
+
+    def signalled(path, **options):
+        if signal := next(signals, None):
+            raise signal
+        removed(path, **options)
+
+    monkeypatch.setattr("shutil.rmtree", signalled)
+    before = contents(folder)
+
+    def fails():
+        raise RuntimeError
+
+    with pytest.raises(error):
+        made(folder / "new/out", meanwhile=fails)
+    assert contents(folder) == before
 
 
 def test_an_interrupted_report_says_which_command_finishes_it(folder, capsys, monkeypatch):
