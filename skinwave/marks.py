@@ -1,16 +1,19 @@
 """Marks of result folders: a record.json that lists the files written beside it.
 
-What is not listed there, or has another size since, is the user's and is never removed.
+What is not listed there, or has other content since, is the user's and is never removed.
 """
 
+import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from skinwave import record
 
-FILES = "files"  # key in record.json: path below its folder -> size in bytes
+FILES = "files"  # key in record.json: path below its folder -> SHA-256; once, size in bytes
+REPORT = "report"  # the command, and the folder that it makes within a result
+DEEPEST = 100  # levels of folders below a result; none that is written has as many
 OF_SYSTEM = (".DS_Store", "Thumbs.db", "desktop.ini")  # which file browsers leave anywhere
 
 
@@ -23,7 +26,7 @@ def seal(folder: Path) -> None:
         If the folder has no record.
     """
     listed = {
-        path.relative_to(folder).as_posix(): path.stat().st_size
+        path.relative_to(folder).as_posix(): digest(path)
         for path in sorted(folder.rglob("*"))
         if path.is_file() and path != folder / record.FILE
     }
@@ -31,8 +34,16 @@ def seal(folder: Path) -> None:
     (folder / record.FILE).write_text(json.dumps(kept, indent=1), encoding="utf-8")
 
 
-def listed(folder: Path) -> dict[str, int] | None:
-    """Size in bytes by path of the files that a folder was written with; None without a mark."""
+def digest(path: Path) -> str:
+    """SHA-256 of a file's content."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def listed(folder: Path) -> dict[str, str | int] | None:
+    """SHA-256 by path of the files that a folder was written with, or the size in bytes that
+    was listed before; None without a mark.
+    """
     try:
         found = record.read(folder).get(FILES)
     except ValueError:
@@ -42,22 +53,48 @@ def listed(folder: Path) -> dict[str, int] | None:
 
 def foreign(folder: Path) -> Path | None:
     """The first file below a marked folder that was added or changed since; None if all are as
-    they were written. A marked folder within it, such as its report, has a list of its own.
+    they were written. Another result within it is such an addition, but for a report of it, which
+    has a list of its own.
     """
-    return next(_foreign(folder, folder, {}), None)
+    return next(_foreign(folder), None)
 
 
-def _foreign(folder: Path, marked: Path, known: Mapping[str, int]) -> Iterator[Path]:
-    own = listed(folder)
-    if own is not None:
-        marked, known = folder, own
-    for path in sorted(folder.iterdir()):
-        if path.is_dir() and not path.is_symlink():
-            yield from _foreign(path, marked, known)
-        elif path.name not in OF_SYSTEM and not (own is not None and path.name == record.FILE):
-            size = known.get(path.relative_to(marked).as_posix())
-            if path.is_symlink() or size != path.stat().st_size:
+def is_as_listed(path: Path, entry: object) -> bool:
+    """Whether a path is a regular file, no link, with the content that its entry in a list has."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    try:
+        found = path.stat().st_size if isinstance(entry, int) else digest(path)
+    except OSError:  # what cannot be read is not known to be as it was
+        return False
+    return found == entry
+
+
+def _foreign(folder: Path) -> Iterator[Path]:
+    waiting = [(folder, folder, listed(folder) or {})]
+    while waiting:
+        place, marked, known = waiting.pop()
+        for path in sorted(place.iterdir()):
+            name = path.relative_to(marked).as_posix()
+            if path.is_dir() and not path.is_symlink():
+                own = _list_of_report(path) if (place / record.FILE).exists() else None
+                waiting.append((path, marked, known) if own is None else (path, path, own))
+                if name.count("/") >= DEEPEST:
+                    yield path
+            elif (
+                path.name not in OF_SYSTEM
+                and name != record.FILE
+                and not is_as_listed(path, known.get(name))
+            ):
                 yield path
+
+
+def _list_of_report(folder: Path) -> dict[str, str | int] | None:
+    """The list of a report drawn of the result it lies in; one of a scene holds runs, too."""
+    if folder.name != REPORT or (own := listed(folder)) is None:
+        return None
+    found = record.read(folder)
+    return own if found["command"]["name"] == REPORT and found["scene"] is None else None
 
 
 def refuse_unmarked(out: Path, inputs: Iterable[str | Path] = ()) -> None:

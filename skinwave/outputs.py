@@ -287,13 +287,15 @@ def _name_file(aside: Path, out: Path, overwrite: bool) -> None:
 
 
 def _remove(aside: Path | None, above: Iterable[Path]) -> None:
-    """A folder, and those above it that are empty then; an interrupt does not stop it halfway."""
-    if aside:
-        try:
+    """A folder, and those above it that are empty then; no signal stops it halfway."""
+    try:
+        if aside:
             shutil.rmtree(aside, ignore_errors=True)
-        except KeyboardInterrupt:
+    except BaseException:  # SIGTERM is a SystemExit
+        if aside:
             shutil.rmtree(aside, ignore_errors=True)
-            raise
-    with contextlib.suppress(OSError):
-        for folder in above:
-            folder.rmdir()
+        raise
+    finally:
+        with contextlib.suppress(OSError):
+            for folder in above:
+                folder.rmdir()

@@ -1,6 +1,7 @@
 """Nothing of the user's is removed, replaced or truncated, whatever it is called."""
 
 import errno
+import hashlib
 import json
 import os
 import shlex
@@ -173,7 +174,7 @@ def test_of_two_runs_into_one_folder_neither_is_lost(folder):
     (later,) = folder.glob("out.partial-*")
     assert str(later) in str(error.value)
     assert (later / "index.html").read_text() == "later"
-    assert marks.listed(later) == {"index.html": 5}
+    assert marks.listed(later) == {"index.html": hashlib.sha256(b"later").hexdigest()}
 
 
 def test_of_two_that_may_overwrite_neither_new_result_is_lost(folder):
@@ -257,6 +258,61 @@ def test_what_the_user_added_or_changed_in_a_result_is_not_lost(folder, capsys):
     assert main(again) == 0
 
 
+def test_an_edit_that_keeps_the_size_is_not_lost(folder, capsys):
+    made(folder / "out", "one")
+    (folder / "out/index.html").write_text("two")
+    assert "holds index.html" in refused(capsys, *RUN, "--out", "out", "--overwrite")
+
+
+@pytest.mark.parametrize("text", ["two", "three"])
+def test_a_list_of_sizes_is_still_read(folder, text):
+    made(folder / "out", "one")
+    kept = record.read(folder / "out") | {"files": {"index.html": 3}}
+    (folder / "out/record.json").write_text(json.dumps(kept))
+    (folder / "out/index.html").write_text(text)
+    assert (marks.foreign(folder / "out") is None) == (len(text) == 3)
+
+
+@pytest.mark.parametrize("place", ["out/mine", "out/report", "out/report/mine", "out/a/report"])
+def test_a_result_within_another_is_not_lost(folder, capsys, drawn, place):
+    assert main([*RUN, "--out", "out"]) == 0
+    if place == "out/report/mine":
+        assert main(["report", "out", "--quiet"]) == 0
+    assert main([*RUN, "--out", place]) == 0
+    assert "which was added or changed" in refused(capsys, *RUN, "--out", "out", "--overwrite")
+    if place == "out/report/mine":
+        assert "holds mine/" in refused(capsys, "report", "out", "--quiet")
+
+
+def test_the_report_of_a_scene_within_a_result_is_not_lost(folder):
+    out = made(folder / "out")
+    made(out / "report")
+    command = {"typed": "", "name": "report", "options": {}}
+    record.write(out / "report", command)
+    marks.seal(out / "report")
+    assert marks.foreign(out) is None
+    record.write(out / "report", command, scene=loads(corpus.SILENT_GROUND))
+    marks.seal(out / "report")
+    assert out / "report" in marks.foreign(out).parents
+
+
+@posix
+@pytest.mark.parametrize("note", [True, False])
+def test_folders_of_any_depth_in_a_result_are_kept(folder, note):
+    """Deeper than Python's recursion; made and removed from within."""
+    made(folder / "out")
+    deep = "d/" * 1100
+    os.makedirs(folder / "out/d")
+    for k in range(100, 1101, 100):
+        os.makedirs(folder / "out" / deep[: 2 * k], exist_ok=True)
+    if note:
+        (folder / "out" / deep / "note").write_text("mine")
+    with pytest.raises(ValueError, match="which was added or changed"):
+        made(folder / "out", overwrite=True)
+    assert (folder / "out" / deep).is_dir()
+    subprocess.run(["rm", "-r", str(folder / "out")], check=True)
+
+
 @posix
 def test_a_link_in_a_result_is_the_users(folder, capsys):
     assert main([*RUN, "--out", "out"]) == 0
@@ -323,6 +379,15 @@ def test_a_report_replaces_only_a_report(folder, capsys, drawn):
     (folder / "out/report/notes.txt").unlink()
     assert main([*RUN, "--out", "out", "--overwrite"]) == 0  # with the report in it
     assert not (folder / "out/report").exists()
+
+
+@posix
+def test_a_report_is_not_written_through_a_link(folder, capsys, drawn):
+    assert main([*RUN, "--out", "out"]) == 0
+    (folder / "outside").mkdir()
+    (folder / "out/report").symlink_to("../outside/new")
+    assert "report is a link" in refused(capsys, "report", "out", "--quiet")
+    assert not [*(folder / "outside").iterdir()]
 
 
 def page(folder, *given):
@@ -421,7 +486,81 @@ def test_figures_elsewhere_are_kept(folder, capsys):
     assert main([*drawing, "--out", "elsewhere", "--overwrite"]) == 0
 
 
+DRAWING = ["plot", "none-sweep", "--column", "kernel_peak_pa", "--quiet"]
+
+
+@pytest.fixture
+def table(folder):
+    """The folder of a sweep with its table and a figure; what is drawn and listed is its own."""
+    assert main([*SWEEP, "--csv"]) == 0
+    assert main(DRAWING) == 0
+    assert main([*SWEEP, "--csv"]) == 0
+    assert main(DRAWING) == 0
+    return folder / "none-sweep"
+
+
+def test_a_figure_or_table_of_the_users_in_a_sweep_is_kept(table, capsys):
+    (figure,) = (table / "figures").iterdir()
+    for path, command in ((figure, DRAWING), (table / "rows.csv", [*SWEEP, "--csv"])):
+        text = path.read_bytes()
+        path.write_bytes(text[:-1] + b"!")
+        assert f"{path.name} was added or changed" in refused(capsys, *command)
+        path.write_bytes(text)
+        assert main(command) == 0
+    assert "holds " in refused(capsys, *RUN, "--out", "none-sweep", "--overwrite")
+    figure.write_text("mine")
+    assert main([*DRAWING, "--overwrite"]) == 0
+    assert main(DRAWING) == 0
+
+
+@posix
+def test_no_link_in_a_sweep_is_written_through(table, capsys):
+    (figure,) = (table / "figures").iterdir()
+    asked = [(figure, DRAWING), (table / "figures", DRAWING), (table / "record.json", DRAWING),
+             (table / "rows.csv", [*SWEEP, "--csv"])]  # fmt: skip
+    for path, command in asked:
+        path.rename(table.parent / "elsewhere")
+        path.symlink_to(table.parent / "elsewhere")
+        assert f"{path.name} is a link" in refused(capsys, *command)
+        path.unlink()
+        (table.parent / "elsewhere").rename(path)
+        assert main(command) == 0
+
+
+def test_a_figure_of_a_sweep_without_record_is_drawn_again(table):
+    (table / "record.json").unlink()
+    shutil.rmtree(table / "figures")
+    for _ in range(2):
+        assert main(DRAWING) == 0
+
+
+def test_names_of_columns_are_no_formulas(folder):
+    out = dataset.open_folder(folder / "out")
+    dataset.write_csv(out, [{"key": "a", "=1+1": "=1+1"}])
+    assert (out / "rows.csv").read_text().splitlines() == ["key,'=1+1", "a,'=1+1"]
+
+
 # Interrupts
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
+def test_a_signal_does_not_stop_a_removal_halfway(folder, monkeypatch, error):
+    removed, signals = shutil.rmtree, iter([error])
+
+    def signalled(path, **options):
+        if signal := next(signals, None):
+            raise signal
+        removed(path, **options)
+
+    monkeypatch.setattr("shutil.rmtree", signalled)
+    before = contents(folder)
+
+    def fails():
+        raise RuntimeError
+
+    with pytest.raises(error):
+        made(folder / "new/out", meanwhile=fails)
+    assert contents(folder) == before
 
 
 def test_an_interrupted_report_says_which_command_finishes_it(folder, capsys, monkeypatch):

@@ -65,14 +65,18 @@ def run(options: argparse.Namespace) -> int:
         else:
             raise ValueError("a map needs two varied keys; leave out --heat or give --by")
     out = options.out or options.folder / "figures"
-    # The figures inside a sweep's folder are this command's own, and drawn anew.
-    anew = options.overwrite or options.out is None
-    out.mkdir(parents=True, exist_ok=True)
     names = distinct_names(name.replace(" ", "-") for name in figures)
     paths = [out / f"{name}.{options.format}" for name in names]
+    # The figures inside a sweep's folder are this command's own, and drawn anew.
+    own = [path.relative_to(options.folder).as_posix() for path in paths if options.out is None]
+    for name in own if not options.overwrite else ():
+        dataset.refuse_changed(options.folder, name)
+    out.mkdir(parents=True, exist_ok=True)
     for path, figure in zip(paths, figures.values(), strict=True):
-        with output_file(path, overwrite=anew) as file:
+        with output_file(path, overwrite=options.overwrite or bool(own)) as file:
             file.write(drawn(figure, options.format, chosen.dpi))
+    for name in own:
+        dataset.enter(options.folder, name)
     said = "\n".join(f"wrote {path}" for path in paths)
     summarise(options, {"figures": [str(path) for path in paths], "runs": len(rows)}, said)
     return 0

@@ -42,6 +42,8 @@ def run(options: argparse.Namespace) -> int:
     inputs = [source, scene.body.file if scene else ""]
     # The report inside a result folder is this command's own, and made anew.
     anew = options.overwrite or (made and options.out is None)
+    if made and options.out is None and out.is_symlink():
+        raise ValueError(f"{out} is a link; remove it or name the folder to write with --out")
     with (
         output_folder(out, overwrite=anew, inputs=inputs, report=_drawn(options)) as folder,
         progress_of(options) as progress,

@@ -69,6 +69,8 @@ def run(options: argparse.Namespace) -> int:
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
     out = options.out or Path(f"{options.scene.stem}-sweep")
+    if options.csv:
+        dataset.refuse_changed(out, dataset.CSV)  # now, not when all is computed
     with _progress(options, len(wanted)) as progress:
         found = sweep(
             wanted, out, knobs, progress, scheduler=options.scheduler, workers=options.workers,

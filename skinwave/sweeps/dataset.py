@@ -6,6 +6,7 @@ two sweeps into one folder only add to it. A folder with other files among the r
 
 import csv
 import io
+import json
 import os
 import secrets
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,6 +20,7 @@ from skinwave.plain_text import cell
 
 ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
 OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
+UNKNOWN = {"typed": "", "name": "sweep", "options": {}}  # the command of a folder without record
 LARGEST = 500_000_000  # bytes of one file
 MOST_ROWS, MOST_COLUMNS = 1_000_000, 1000  # of one file
 KEY, INDEX, STATUS = "key", "index", "status"  # columns: a row's name, its place, how it ended
@@ -39,7 +41,7 @@ def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
     try:
         (out / ROWS).mkdir(parents=True, exist_ok=True)
         if not _is_recorded(out):
-            record.write(out, command or {"typed": "", "name": "sweep", "options": {}})
+            record.write(out, command or UNKNOWN)
     except OSError as error:
         raise unwritable(out, error, "choose another --out") from None
     return out
@@ -160,10 +162,41 @@ def write_csv(out: Path, rows: Iterable[Row]) -> None:
     columns = list(dict.fromkeys(name for row in flat for name in row))
     text = io.StringIO()
     lines = csv.DictWriter(text, columns)
-    lines.writeheader()
+    lines.writerow({name: cell(name) for name in columns})
     lines.writerows({name: cell(value) for name, value in row.items()} for row in flat)
+    refuse_changed(out, CSV)
     with output_file(out / CSV, overwrite=True) as file:
         file.write(text.getvalue().encode())
+    enter(out, CSV)
+
+
+def refuse_changed(out: Path, name: str) -> None:
+    """Refuse to replace a file in a sweep's folder but as this program wrote it.
+
+    Raises
+    ------
+    ValueError
+        If it, its folder or the record is a link, or the record does not list it as it is.
+    """
+    path = out / name
+    links = [p for p in (out / record.FILE, path.parent, path) if p != out and p.is_symlink()]
+    if links:
+        raise ValueError(f"{links[0]} is a link, which is not written through; remove it")
+    known = marks.listed(out) or {}
+    if os.path.lexists(path) and not marks.is_as_listed(path, known.get(name)):
+        raise ValueError(
+            f"{path} was added or changed since skinwave wrote it and is kept; move it elsewhere"
+        )
+
+
+def enter(out: Path, name: str) -> None:
+    """List a file, as it is now, in the record of a sweep's folder."""
+    if not os.path.lexists(out / record.FILE):  # releases up to 0.2 wrote none
+        record.write(out, UNKNOWN)
+    listed = (marks.listed(out) or {}) | {name: marks.digest(out / name)}
+    kept = record.read(out) | {marks.FILES: listed}
+    with output_file(out / record.FILE, overwrite=True) as file:
+        file.write(json.dumps(kept, indent=1).encode())
 
 
 def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
