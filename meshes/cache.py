@@ -22,6 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from meshes import reading
+
 LIMIT = 5 * 2**30  # bytes of all entries
 OURS = re.compile(r"[0-9a-f]{32}(\.npz|\.\w+\.part)")  # entries, and what is being written
 ABANDONED = 86_400.0  # s after which what was being written no longer is
@@ -71,8 +73,10 @@ def load(name: str) -> dict[str, Any] | None:
     if home is None:
         return None
     try:
-        with open(home / f"{name}.npz", "rb") as file, np.load(file) as entry:
-            arrays = {field: entry[field] for field in entry.files}
+        with reading.opened(home / f"{name}.npz") as file:
+            reading.check_unpacked(file, os.fstat(file.fileno()).st_size)  # none is compressed
+            with np.load(file) as entry:
+                arrays = {field: entry[field] for field in entry.files}
         record = json.loads(str(arrays.pop("meta")))
         if record.pop("digest") != _contents(name, record["meta"], arrays):
             return None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 LARGEST_TEXT = 16_000_000  # bytes of JSON, and of other text
 UNPACKED = 500_000_000  # bytes that any archive of arrays may unpack to,
 GROWTH = 8  # or so many times what it takes on the disk
+MOST_ARRAYS = 1000  # of an archive; reading each takes its time, however small it is
 
 PathLike = str | os.PathLike[str]
 
@@ -73,11 +74,12 @@ def arrays(path: PathLike) -> dict[str, NDArray[Any]]:
     Raises
     ------
     ValueError
-        If it is none, or unpacks to more than `UNPACKED` bytes and `GROWTH` times its size.
+        If it is none, has more than `MOST_ARRAYS` arrays, or unpacks to more than `UNPACKED` bytes
+        and `GROWTH` times its size.
     """
     with opened(path) as file:
         try:
-            _check_unpacked(file, max(UNPACKED, GROWTH * on_disk(path)))
+            check_unpacked(file, max(UNPACKED, GROWTH * on_disk(path)))
             with np.load(file, allow_pickle=False) as archive:
                 return {name: archive[name] for name in archive.files}
         except Exception as error:  # whatever archives and headers make of spoilt bytes
@@ -104,21 +106,32 @@ def parsed(path: PathLike) -> Any:
 _BINARY = getattr(os, "O_BINARY", 0)
 
 
-def _check_unpacked(file: BinaryIO, limit: float) -> None:
-    """Refuse an archive whose members, or the arrays that their headers tell of, are too large."""
-    total = 0
+def check_unpacked(file: BinaryIO, limit: float) -> None:
+    """Refuse an archive whose members are too many, or unpack to more than `limit` bytes, and
+    members that are shorter than the arrays that their headers tell of.
+
+    Raises
+    ------
+    ValueError
+        If it is such a one; other exceptions if it is no archive of arrays.
+    """
     with zipfile.ZipFile(file) as archive:
-        for member in archive.infolist():
+        members = archive.infolist()
+        if len(members) > MOST_ARRAYS:
+            raise ValueError(f"holds {len(members):,} arrays, the limit is {MOST_ARRAYS:,}")
+        total = sum(member.file_size for member in members)
+        if total > limit:  # before any header is read, which may be as long as its member
+            raise ValueError(
+                f"unpacks to {total / 1e6:,.0f} MB, the limit is {limit / 1e6:,.0f} MB"
+            )
+        for member in members:
             with archive.open(member) as start:
                 version = np.lib.format.read_magic(start)
                 read = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
                 shape, _, kind = read(start)
             told = kind.itemsize * int(np.prod(shape, dtype=object))
-            total += max(told, member.file_size)
             if told > member.file_size:
                 raise ValueError(f"'{member.filename}' is shorter than its header tells")
-    if total > limit:
-        raise ValueError(f"unpacks to {total / 1e6:,.0f} MB, the limit is {limit / 1e6:,.0f} MB")
     file.seek(0)
 
 

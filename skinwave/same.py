@@ -105,7 +105,7 @@ def _loaded(path: Path) -> dict[str, NDArray]:
 
 
 def _lines(name: str, first: Path, second: Path, rtol: float) -> Iterator[Difference]:
-    a, b = ([*csv.DictReader(reading.text(p, LARGEST_CSV).splitlines())] for p in (first, second))
+    a, b = _rows(first), _rows(second)
     if [*map(list, a)] != [*map(list, b)]:
         yield Difference(words=f"{name} has {len(a)} rows in one and {len(b)} in the other, or "
                                "other columns")  # fmt: skip
@@ -117,6 +117,16 @@ def _lines(name: str, first: Path, second: Path, rtol: float) -> Iterator[Differ
                 largest[column] = max(largest.get(column, 0.0), abs(value))
     for k, (one, other) in enumerate(zip(a, b, strict=True)):
         yield from _cells(f"{name}, row {k + 1}", one, other, largest, rtol)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    try:
+        rows = [*csv.DictReader(reading.text(path, LARGEST_CSV).splitlines())]
+    except csv.Error as error:
+        raise ValueError(f"{path} is no CSV ({error}); make the result anew") from None
+    if any(None in row or None in row.values() for row in rows):
+        raise ValueError(f"{path} has rows of unequal length; make the result anew")
+    return rows
 
 
 def _cells(

@@ -3,8 +3,11 @@
 import json
 import multiprocessing
 import os
+import subprocess
+import sys
 import time
 
+import hostile
 import numpy as np
 import pytest
 
@@ -68,6 +71,36 @@ def test_a_truncated_or_foreign_entry_is_a_miss(home):
     stored(NAMES[0])  # which cannot replace a folder, and is no error
     assert path.is_dir()
     assert len(list(home.iterdir())) == 1
+
+
+def test_an_entry_that_unpacks_to_more_than_its_size_is_a_miss_and_not_read(home, monkeypatch):
+    stored(NAMES[0], 100_000)
+    assert cache.load(NAMES[0]) is not None
+    with np.load(home / f"{NAMES[0]}.npz") as file:
+        kept = {name: file[name] for name in file.files}
+    np.savez_compressed(home / f"{NAMES[0]}.npz", **kept)
+    loaded = []
+    monkeypatch.setattr(np, "load", loaded.append)
+    assert cache.load(NAMES[0]) is None
+    assert loaded == []
+
+
+def test_an_entry_with_a_header_that_tells_of_more_is_a_miss_and_not_read(home, monkeypatch):
+    home.mkdir()
+    hostile.bomb(home / f"{NAMES[0]}.npz", 1)
+    loaded = []
+    monkeypatch.setattr(np, "load", loaded.append)
+    assert cache.load(NAMES[0]) is None
+    assert loaded == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such files")
+def test_a_pipe_in_the_place_of_an_entry_is_a_miss(home):
+    """Opened for reading, it would be waited for: in a process that can be ended."""
+    home.mkdir()
+    os.mkfifo(home / f"{NAMES[0]}.npz")
+    said = f"from meshes import cache; assert cache.load({NAMES[0]!r}) is None"
+    subprocess.run([sys.executable, "-c", said], check=True, timeout=20)
 
 
 def left(home):

@@ -50,6 +50,15 @@ def test_arrays_come_back_and_do_not_unpack_to_more_than_a_limit(tmp_path, monke
     reading.arrays(tmp_path / "b.npz")  # takes as much on the disk
 
 
+def test_an_archive_has_a_limited_number_of_arrays(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "MOST_ARRAYS", 3)
+    np.savez(tmp_path / "a.npz", *np.eye(3))
+    assert len(reading.arrays(tmp_path / "a.npz")) == 3
+    np.savez(tmp_path / "a.npz", *np.eye(4))
+    with pytest.raises(ValueError, match="holds 4 arrays, the limit is 3"):
+        reading.arrays(tmp_path / "a.npz")
+
+
 def test_an_array_that_is_shorter_than_its_header_tells_is_refused(tmp_path):
     hostile.bomb(tmp_path / "a.npz", 1)
     with pytest.raises(ValueError, match="'t.npy' is shorter than its header tells"):

@@ -195,6 +195,16 @@ def test_bad_input_exits_with_two(twice, capsys):
     assert capsys.readouterr().err.count("skinwave: ") == 9
 
 
+@pytest.mark.parametrize("row", ["a" * 200_000, "1,2,3,4,5,6,7,8,9,10,11,12,13,14", "1"])
+def test_lines_that_are_no_table_are_one_sentence(twice, capsys, row):
+    with open(twice[0] / "lines.csv", "a") as file:
+        file.write(row + "\n")
+    assert same(*twice) == 2
+    said = capsys.readouterr().err
+    assert "lines.csv" in said
+    assert said.count("\n") == 1
+
+
 def test_waveforms_under_their_old_name_are_read(twice):
     first, second = twice
     (first / "responses.npz").rename(first / "response.npz")
