@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -249,6 +250,48 @@ def test_rows_of_an_older_release_have_no_index(tmp_path):
     assert [row["key"] for row in dataset.read(tmp_path)] == ["row1", "row2"]
     assert dataset.names(tmp_path) == {"row1": None, "row2": None}
     assert dataset.numbered(["row3", "row1"], dataset.names(tmp_path)) == {"row3": 2}
+
+
+def long_texts(folder, rows=20_000, length=4000):
+    """Rows with one text in all of them: a file of a few kilobytes."""
+    dataset.open_folder(folder)
+    table = pa.table({
+        "key": [f"row{k}" for k in range(rows)], "status": ["done"] * rows,
+        "error": pa.array(["x" * length] * rows),
+    })  # fmt: skip
+    pq.write_table(table, folder / "rows/part-a.parquet")
+
+
+def test_rows_that_unpack_to_more_than_a_limit_are_refused(tmp_path, monkeypatch):
+    long_texts(tmp_path)
+    monkeypatch.setattr(dataset, "UNPACKED", 10_000_000)
+    with pytest.raises(ValueError, match="unpacks to more than 10 MB"):
+        dataset.read(tmp_path)
+    assert len(dataset.names(tmp_path)) == 20_000, "of other columns nothing is decoded"
+
+
+def test_the_limit_is_for_all_parts_together(tmp_path, monkeypatch):
+    long_texts(tmp_path, rows=1000)
+    assert len(dataset.read(tmp_path)) == 1000
+    part = tmp_path / "rows/part-a.parquet"
+    for name in "bc":
+        (tmp_path / f"rows/part-{name}.parquet").write_bytes(part.read_bytes())
+    monkeypatch.setattr(dataset, "UNPACKED", 10_000_000)
+    with pytest.raises(ValueError, match="unpacks to more than 10 MB"):
+        dataset.read(tmp_path)
+
+
+def test_lists_that_are_long_are_refused_before_they_are_decoded(tmp_path, monkeypatch):
+    """Zeros take next to nothing in the file, and one batch of rows would be all of them."""
+    dataset.open_folder(tmp_path)
+    lists = pa.array([np.zeros(3_000_000)])
+    table = pa.table({"key": ["row"], "status": ["done"], "tacton.a": lists})
+    pq.write_table(table, tmp_path / "rows/part-a.parquet")
+    assert len(dataset.read(tmp_path)[0]["tacton.a"]) == 3_000_000
+    monkeypatch.setattr(dataset, "UNPACKED", 10_000_000)
+    monkeypatch.setattr(pq.ParquetFile, "iter_batches", None)
+    with pytest.raises(ValueError, match="unpacks to more than 10 MB"):
+        dataset.read(tmp_path)
 
 
 def hypercube(samples):

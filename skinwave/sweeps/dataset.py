@@ -22,6 +22,9 @@ ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep
 OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
 UNKNOWN = {"typed": "", "name": "sweep", "options": {}}  # the command of a folder without record
 LARGEST = 500_000_000  # bytes of one file
+UNPACKED = 250_000_000  # bytes of the columns that are read, of all files
+BATCH = 1000  # rows that are decoded at once
+LEAST = 4  # bytes of a value, decoded
 MOST_ROWS, MOST_COLUMNS = 1_000_000, 1000  # of one file
 KEY, INDEX, STATUS = "key", "index", "status"  # columns: a row's name, its place, how it ended
 
@@ -210,7 +213,7 @@ def _table(out: Path, columns: list[str] | None) -> Any:
 
     parts = sorted((out / ROWS).glob("part-*.parquet"))
     try:
-        tables = [_part(reading.content(part, LARGEST), columns) for part in parts]
+        tables = _parts(parts, columns)
         found = pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
     except (OSError, KeyError, pa.ArrowException) as error:
         said = " ".join(str(error).split())[:200]
@@ -220,8 +223,17 @@ def _table(out: Path, columns: list[str] | None) -> Any:
     return found
 
 
-def _part(content: bytes, columns: list[str] | None) -> Any:
-    """The table in one file."""
+def _parts(parts: Iterable[Path], columns: list[str] | None) -> list[Any]:
+    """The tables in files, of `UNPACKED` bytes in all."""
+    tables, left = [], UNPACKED
+    for part in parts:
+        tables.append(_part(reading.content(part, LARGEST), columns, left))
+        left -= tables[-1].nbytes
+    return tables
+
+
+def _part(content: bytes, columns: list[str] | None, limit: int) -> Any:
+    """The table in one file, of at most `limit` bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -233,7 +245,35 @@ def _part(content: bytes, columns: list[str] | None) -> Any:
     known = file.schema_arrow.names
     if len(set(known)) < len(known):
         raise OSError("columns have the same name")
-    return file.read([c for c in columns if c in known] if columns else None)
+    return _decoded(file, [name for name in known if not columns or name in columns], limit)
+
+
+def _decoded(file: Any, columns: list[str], limit: int) -> Any:
+    """The columns of a Parquet file, which may take far more than the file says: a text that is
+    there once, in a dictionary, may be in each row.
+    """
+    import pyarrow as pa
+
+    schema = pa.schema([file.schema_arrow.field(name) for name in columns])
+    if wrong := [field.name for field in schema if not _is_cell(field.type)]:
+        raise OSError(f"'{wrong[0][:40]}' is of a type that no sweep has")
+    said = f"unpacks to more than {UNPACKED / 1e6:,.0f} MB"
+    if LEAST * _count(file.metadata, columns) > limit:
+        raise OSError(said)
+    batches, size = [], 0
+    for batch in file.iter_batches(BATCH, columns=columns):
+        size += batch.nbytes
+        if size > limit:
+            raise OSError(said)
+        batches.append(batch)
+    return pa.Table.from_batches(batches, schema)
+
+
+def _count(told: Any, columns: Sequence[str]) -> int:
+    """Values in columns, those in lists each by itself: one row may have millions."""
+    groups = [told.row_group(k) for k in range(told.num_row_groups)]
+    found = [group.column(k) for group in groups for k in range(group.num_columns)]
+    return sum(c.num_values for c in found if c.path_in_schema.partition(".list")[0] in columns)
 
 
 def _check_columns(out: Path, table: Any) -> None:
