@@ -20,15 +20,21 @@ SCENES, PATTERNS = hostile.scenes(), hostile.patterns()
 SPECIAL, MESHES, REQUESTS = hostile.special_files(), hostile.meshes(), hostile.requests()
 
 
+def kilobytes(field):
+    status = Path("/proc/self/status").read_text()
+    return int(re.search(rf"{field}:\s*(\d+) kB", status).group(1))
+
+
 def used_since(begun=None):
-    """Bytes that this process had at most since the last call without an argument, or a child."""
+    """Bytes that this process took at most since the last call without an argument, beside what it
+    had from other tests, or a child.
+    """
     if begun is None:
         Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
-        return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    status = Path("/proc/self/status").read_text()
-    own = int(re.search(r"VmHWM:\s*(\d+) kB", status).group(1))
+        return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, kilobytes("VmRSS")
+    before, had = begun
     children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    return 1024 * max(own, children if children > begun else 0)
+    return 1024 * max(kilobytes("VmHWM") - had, children if children > before else 0)
 
 
 def contents(folder):
