@@ -21,7 +21,7 @@ for name in ("msgpack", "trame", "trame_vuetify"):
 from aiohttp.test_utils import TestClient, TestServer
 from page_client import Refused, browser, opened
 
-from skinwave.web import asked, controls, downloads, front, moves, processes, turns
+from skinwave.web import access, asked, controls, downloads, front, moves, processes, turns
 from skinwave.web.access import is_local, policy
 from skinwave.web.controls import STARTS
 from skinwave.web.page import page_text
@@ -114,6 +114,17 @@ def test_a_charset_that_nobody_knows_is_malformed(monkeypatch):
             return (await client.post("/paraview/", data=b"{}", headers=headers)).status
 
     assert asyncio.run(posted()) == 400
+
+
+def test_a_body_that_would_have_to_be_unpacked_is_refused(monkeypatch):
+    async def posted():
+        async with fronted(monkeypatch) as (_, client):
+            await client.get("/?token=right")
+            sent = {"data": b"not packed", "headers": {"Content-Encoding": "gzip"}}
+            answer = await client.post("/paraview/", **sent)
+            return answer.status, await answer.text()
+
+    assert asyncio.run(posted()) == (400, access.ENCODED)
 
 
 def test_of_a_request_values_of_controls_are_kept():
@@ -414,6 +425,27 @@ def test_what_is_hostile_on_a_connection_leaves_the_page_as_it_is(server):
     assert after["am"] == 91
     assert last["trame__template_main"] == first["trame__template_main"]
     assert not any(each in json.dumps(after["errors"]) for each in ("nan", "xxx"))
+
+
+@slow
+@pytest.mark.parametrize("encoding", ["gzip", "br", "deflate", "none-such"])
+def test_a_malformed_body_is_refused_and_logged_without_a_traceback(encoding):
+    process, address = served()
+
+    async def posted(path):
+        async with browser() as session:
+            await session.get(address)
+            sent = {"data": b"not packed", "headers": {"Content-Encoding": encoding}}
+            async with session.post(address.partition("?")[0] + path, **sent) as answer:
+                return answer.status
+
+    try:
+        statuses = [asyncio.run(posted(path)) for path in ("paraview/", "none-such")]
+    finally:
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=20)[1]
+    assert statuses == [400, 400]
+    assert "Traceback" not in said, said
 
 
 @slow

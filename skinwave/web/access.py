@@ -5,6 +5,7 @@ a request that another site makes by its `Origin`, another user of the machine b
 the address has and a cookie keeps. What a page may load and run is in its content security policy.
 """
 
+import logging
 import re
 import secrets
 from typing import Any
@@ -14,6 +15,7 @@ from aiohttp import web
 OWN = re.compile(r"(127\.0\.0\.1|localhost)(:\d{1,5})?")  # what Host may be
 TOKEN = "token"  # in an address
 LONGEST_LINE = 300  # characters of what is printed of what a page sends
+ENCODED = "send the body of this request without a Content-Encoding"
 REFUSED = "open this page at its own address, http://127.0.0.1"
 NO_TOKEN = (
     "The token of this page is missing or of another run: open the address that `skinwave web` "
@@ -31,6 +33,14 @@ async def local_only(request: web.Request, handler: Any) -> Any:
     """Refuse what other web sites ask a browser to send here."""
     if not is_local(request.headers.get("Host", ""), request.headers.get("Origin", "")):
         raise web.HTTPForbidden(text=REFUSED)
+    return await handler(request)
+
+
+@web.middleware
+async def unencoded(request: web.Request, handler: Any) -> Any:
+    """Refuse bodies that would have to be unpacked: no page sends any."""
+    if "Content-Encoding" in request.headers:
+        raise web.HTTPBadRequest(text=ENCODED)
     return await handler(request)
 
 
@@ -77,6 +87,22 @@ def policy(host: str) -> str:
 def printable(said: Any) -> str:
     """What someone else said as one line of a terminal."""
     return "".join(c if c.isprintable() else " " for c in str(said)[:LONGEST_LINE]).rstrip()
+
+
+def in_lines(what: str, kinds: tuple[type[BaseException], ...] = (BaseException,)) -> None:
+    """Have aiohttp log what goes wrong with messages as one line of each, that begins with `what`,
+    for errors of these kinds and for what has none.
+    """
+
+    def in_a_line(record: logging.LogRecord) -> bool:
+        error = record.exc_info[1] if record.exc_info else None
+        if error is None or isinstance(error, kinds):
+            record.msg = f"skinwave: {what}: %s"
+            record.args = (printable(error or record.getMessage()),)
+            record.exc_info = None
+        return True
+
+    logging.getLogger("aiohttp.server").addFilter(in_a_line)
 
 
 def _cookie(request: web.Request) -> str:

@@ -19,8 +19,9 @@ from typing import Any
 
 import aiohttp
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
 
-from skinwave.web.access import TOKEN, local_only, secured, with_token
+from skinwave.web.access import TOKEN, in_lines, local_only, secured, unencoded, with_token
 from skinwave.web.controls import KEYS
 from skinwave.web.page import page_text
 from skinwave.web.processes import FAILURES, PATIENCE, PageProcess, begun, gone, kill, started
@@ -30,6 +31,7 @@ LATER = 5.0  # s after which the next process is made ready: the page that opens
 LARGEST = 2**26  # bytes of a message
 LARGEST_REQUEST = 2**16  # bytes of what a page asks for as it opens
 LAST = 0.3  # s that requests and pages have when the server ends
+MALFORMED = (HttpProcessingError, web.RequestPayloadError)  # requests that are no HTTP
 UNREAD = (
     "What the page asks for cannot be read: it must be a JSON object of at most "
     f"{LARGEST_REQUEST} bytes that gives numbers or texts; reload the page without its ?..."
@@ -53,7 +55,8 @@ class Front:
     def app(self, static: dict[str, str], page: str) -> web.Application:
         """The application; `static` folders by route, `page` the folder of the page itself."""
         app = web.Application(
-            middlewares=[local_only, with_token(self.token)], client_max_size=LARGEST_REQUEST
+            middlewares=[unencoded, local_only, with_token(self.token)],
+            client_max_size=LARGEST_REQUEST,
         )
         app.router.add_get("/turn", self.turn)
         app.router.add_post("/paraview/", self.open)
@@ -247,8 +250,10 @@ def run(port: int, scene: str = "", ready: Callable[[str], None] = print) -> Non
     async def forever() -> None:
         front, ended = Front(scene), asyncio.Event()
         runner = web.AppRunner(
-            front.app(*served()), shutdown_timeout=LAST, handler_cancellation=True
-        )
+            front.app(*served()), shutdown_timeout=LAST, handler_cancellation=True,
+            auto_decompress=False,
+        )  # fmt: skip
+        in_lines("a request is left out", MALFORMED)
         _on_signals(ended.set)
         await runner.setup()
         try:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
-from skinwave.web.access import local_only, printable
+from skinwave.web.access import in_lines, local_only, printable
 
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
@@ -62,15 +62,7 @@ def _on_one_thread() -> None:
 def _quiet() -> None:
     """What other libraries log of messages that cannot be read: one line of each."""
     logging.getLogger("wslink").setLevel(logging.CRITICAL + 1)  # `guard` says what is a fault here
-
-    def in_a_line(record: logging.LogRecord) -> bool:
-        error = record.exc_info[1] if record.exc_info else None
-        record.msg = "skinwave: a message to the process of a page is left out: %s"
-        record.args = (printable(error or record.getMessage()),)
-        record.exc_info = None
-        return True
-
-    logging.getLogger("aiohttp.server").addFilter(in_a_line)
+    in_lines("a message to the process of a page is left out")
 
 
 def main() -> None:
