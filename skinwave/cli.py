@@ -4,16 +4,14 @@ Only argparse is imported before a command is known, so that help answers at onc
 """
 
 import argparse
-import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import NoReturn
 
 import skinwave
 from skinwave.commands import COMMANDS
 from skinwave.plain_text import printable, say
-from skinwave.processes import ended_by_signals, safe_path
+from skinwave.processes import SAFE_PATH, ended_by_signals, environment
 from skinwave.safe_path import leave_out_working_settings
 from skinwave.streams import CLOSED, explained, flushed, reader_gone
 
@@ -46,7 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.typed = typed
     leave_out_working_settings()
     try:
-        with safe_path(), ended_by_signals(), _cache_as_asked(options):
+        no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
+        with environment({**SAFE_PATH, **no_cache}), ended_by_signals():
             return int(options.command(options))
     except KeyboardInterrupt as interrupt:
         kept = str(interrupt) or "nothing was finished"
@@ -61,22 +60,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         said = " ".join(text.split()) or "not enough memory; take larger elements"
         say(f"skinwave: {said}", sys.stderr)
         return 2
-
-
-@contextmanager
-def _cache_as_asked(options: argparse.Namespace) -> Iterator[None]:
-    """No cache for a command with --no-cache, nor for the processes that it starts."""
-    before = os.environ.get(CACHE)
-    if not getattr(options, "no_cache", False):
-        yield
-        return
-    os.environ[CACHE] = ""
-    try:
-        yield
-    finally:
-        os.environ.pop(CACHE)
-        if before is not None:
-            os.environ[CACHE] = before
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:

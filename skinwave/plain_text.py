@@ -24,7 +24,7 @@ def say(text: str, file: TextIO | None = None) -> None:
 
 def cell(value: object) -> object:
     """A value of a CSV row; text that a spreadsheet would compute gets an apostrophe before it."""
-    is_formula = isinstance(value, str) and value.startswith(FORMULA) and not _is_number(value)
+    is_formula = isinstance(value, str) and value.startswith(FORMULA) and not is_number(value)
     return f"'{value}" if is_formula else value
 
 
@@ -33,7 +33,8 @@ def _escape(letter: str) -> str:
     return f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}"
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a text is what Python reads as a number."""
     try:
         float(text)
     except ValueError:

@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -18,26 +18,25 @@ if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
 T = TypeVar("T")
-SAFE_PATH = "PYTHONSAFEPATH"
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # imports nothing from the working folder
 ENDING = ("SIGTERM", "SIGHUP")
 AGAIN = 5.0  # s
 PATIENCE = 2.0  # s that a process has to remove what it made, before it is killed
 
 
 @contextmanager
-def safe_path() -> Iterator[None]:
-    """A Python that is started meanwhile imports nothing from the working folder.
-
-    `multiprocessing` starts its processes by `python -c`, which would look there first.
-    """
-    before = os.environ.get(SAFE_PATH)
-    os.environ[SAFE_PATH] = "1"
+def environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Environment variables that have these values meanwhile."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
     try:
         yield
     finally:
-        os.environ.pop(SAFE_PATH)
-        if before is not None:
-            os.environ[SAFE_PATH] = before
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 @contextmanager
@@ -109,7 +108,7 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
     from multiprocessing import active_children, get_context
 
     others = set(active_children())
-    with safe_path():
+    with environment(SAFE_PATH):  # the `python -c` of multiprocessing looks in it first
         executor = ProcessPoolExecutor(count, get_context("spawn"), initializer=begin)
         submit: Callable[..., Future[Any]] = executor.submit
         executor.submit = partial(submit, guarded)  # type: ignore[method-assign]

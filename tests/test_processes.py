@@ -14,7 +14,7 @@ import pytest
 from test_ended_anywhere import hand
 
 import skinwave
-from skinwave.processes import SAFE_PATH, ended_by_signals, safe_path
+from skinwave.processes import ended_by_signals, environment
 
 ROOT = Path(skinwave.__file__).parents[1]
 THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich", "PIL", "dask",
@@ -157,12 +157,12 @@ def test_another_programs_working_folder_stays(tmp_path):
 
 def test_the_environment_is_as_before(monkeypatch):
     for before in (None, "", "1"):
-        monkeypatch.delenv(SAFE_PATH, raising=False)
+        monkeypatch.delenv("SOME_NAME", raising=False)
         if before is not None:
-            monkeypatch.setenv(SAFE_PATH, before)
-        with safe_path():
-            assert os.environ[SAFE_PATH] == "1"
-        assert os.environ.get(SAFE_PATH) == before
+            monkeypatch.setenv("SOME_NAME", before)
+        with environment({"SOME_NAME": "here"}):
+            assert os.environ["SOME_NAME"] == "here"
+        assert os.environ.get("SOME_NAME") == before
 
 
 def ended(work):

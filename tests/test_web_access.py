@@ -369,9 +369,9 @@ def test_a_scene_that_a_page_opens_reads_no_file(session, tmp_path, unit):
 
 
 def test_a_line_of_the_terminal_has_no_control_characters():
-    from skinwave.web.access import printable
+    from skinwave.web.access import one_line
 
-    said = printable("a\x1b]0;title\x07\r\nb\u202e" + "c" * 1000)
+    said = one_line("a\x1b]0;title\x07\r\nb\u202e" + "c" * 1000)
     assert said.isprintable()
     assert len(said) <= 300
 

@@ -84,9 +84,8 @@ def prepare(
     with clock("read from cache"):
         entry = cache.load(name)
     size, report = h or default_size(body), progress or silent
-    found = _from_cache(entry, probes, clock) if entry else None
-    if found:  # other sizes may make the same mesh
-        return replace(found, effort=replace(found.effort, h=size))
+    if entry and (found := _from_cache(entry, size, probes, clock)):
+        return found
     with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
         return _prepared_anew(body, build, size, probes, clock, report, solver, tolerance, name)
 
@@ -104,7 +103,7 @@ def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance
     )  # fmt: skip
 
 
-def _from_cache(entry: dict[str, Any], probes: Floats, clock: Clock) -> Prepared | None:
+def _from_cache(entry: dict[str, Any], h: float, probes: Floats, clock: Clock) -> Prepared | None:
     """The reduced body of an entry; None if its arrays do not fit each other."""
     if not {*POLES, *ARRAYS} <= set(entry):
         return None
@@ -120,7 +119,8 @@ def _from_cache(entry: dict[str, Any], probes: Floats, clock: Clock) -> Prepared
     if any(entry[field].shape != shape for field, shape in expected.items()):
         return None
     try:
-        effort = Effort(**entry["meta"])
+        # `h` is that of today: other sizes may make the same mesh.
+        effort = Effort(**{**entry["meta"], "h": h})
     except TypeError:  # that of another version
         return None
     return Prepared(

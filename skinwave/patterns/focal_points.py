@@ -17,6 +17,7 @@ from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
 from simple_model.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
+from skinwave.plain_text import is_number
 from skinwave.scene import Scene
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
@@ -34,7 +35,7 @@ def read(content: bytes, options: Options) -> Pattern:
         If it is none: the line, what is wrong with it and the cure, in one sentence.
     """
     rows = _rows(content)
-    tidy = not _is_number(rows[0][1][0])
+    tidy = not is_number(rows[0][1][0])
     table = _tidy(rows) if tidy else _bare(rows, options.rate)
     notes: list[str] = []
     points, counts = np.unique(table["point"], return_counts=True)
@@ -201,19 +202,11 @@ def _numbers(line: int, cells: list[str], count: int) -> list[float]:
     try:
         values = [float(cell) for cell in cells]
     except ValueError:
-        wrong = next(cell for cell in cells if not _is_number(cell))
+        wrong = next(cell for cell in cells if not is_number(cell))
         raise ValueError(f"line {line} has '{wrong[:40]}' where a number belongs") from None
     if not all(map(isfinite, values)):
         raise ValueError(f"line {line} has a number that is not finite; leave the line out")
     return values
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def _before_fall(times: Floats) -> float:

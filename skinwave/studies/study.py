@@ -73,9 +73,7 @@ def run_study(
     check_knobs(solver, h=h)
     for solid in {s.body for group in scenes.values() for s in group.values()}:
         if solid.kind != "none":
-            check_mesh(
-                solid, h or default_size(solid)
-            )  # refuses what cannot be meshed before any run
+            check_mesh(solid, h or default_size(solid))  # before any run
     started = time.perf_counter()
     with helper() as aside, one_thread():
         bodies = _begun_bodies(scenes, aside, progress, h, solver)

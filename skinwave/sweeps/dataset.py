@@ -282,10 +282,9 @@ def _check_columns(out: Path, table: Any) -> None:
 
     kinds = {KEY: pa.types.is_string, INDEX: pa.types.is_integer}
     known = set(table.column_names)
-    wrong = [field.name for field in table.schema
-             if not kinds.get(field.name, _is_cell)(field.type)]  # fmt: skip
+    wrong = [name for name, fits in kinds.items() if name in known and not fits(table[name].type)]
     if KEY not in known or wrong or table[KEY].null_count:
-        what = (wrong or [KEY])[0][:40]
+        what = (wrong or [KEY])[0]
         raise ValueError(
             f"{out} holds a table without '{what}' as a sweep has it; choose the folder of a sweep"
         )

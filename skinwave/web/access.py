@@ -12,6 +12,8 @@ from typing import Any
 
 from aiohttp import web
 
+from skinwave.plain_text import printable
+
 OWN = re.compile(r"(127\.0\.0\.1|localhost)(:\d{1,5})?")  # what Host may be
 TOKEN = "token"  # in an address
 LONGEST_LINE = 300  # characters of what is printed of what a page sends
@@ -84,9 +86,9 @@ def policy(host: str) -> str:
     ))  # fmt: skip
 
 
-def printable(said: Any) -> str:
+def one_line(said: Any) -> str:
     """What someone else said as one line of a terminal."""
-    return "".join(c if c.isprintable() else " " for c in str(said)[:LONGEST_LINE]).rstrip()
+    return printable(str(said)[:LONGEST_LINE].rstrip(), keep="")[:LONGEST_LINE]
 
 
 def in_lines(what: str, kinds: tuple[type[BaseException], ...] = (BaseException,)) -> None:
@@ -98,7 +100,7 @@ def in_lines(what: str, kinds: tuple[type[BaseException], ...] = (BaseException,
         error = record.exc_info[1] if record.exc_info else None
         if error is None or isinstance(error, kinds):
             record.msg = f"skinwave: {what}: %s"
-            record.args = (printable(error or record.getMessage()),)
+            record.args = (one_line(error or record.getMessage()),)
             record.exc_info = None
         return True
 

@@ -11,14 +11,13 @@ import tempfile
 from dataclasses import dataclass
 from typing import Any
 
-from skinwave.web.access import printable
+from skinwave.processes import SAFE_PATH
+from skinwave.web.access import one_line
 
 PATIENCE = 60.0  # s that a session may take to start
 # For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
 # limit to what was freed once, and a process that answers for hours fills with gaps.
 RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
-# No module of the folder that the program was started in, neither here nor in what a page starts.
-SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 COMMAND = (sys.executable, "-m", "skinwave.web.serve")
 FAILURES = (OSError, TimeoutError, ValueError)  # of a process that does not start
 
@@ -125,4 +124,4 @@ async def _relayed(process: Any) -> None:
         if not line:
             return
         if process.returncode is None:
-            print(printable(line.decode("utf-8", "replace")), file=sys.stderr, flush=True)
+            print(one_line(line.decode("utf-8", "replace")), file=sys.stderr, flush=True)

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
-from skinwave.web.access import in_lines, local_only, printable
+from skinwave.processes import environment
+from skinwave.web.access import in_lines, local_only, one_line
 
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
@@ -51,9 +52,9 @@ def _on_one_thread() -> None:
     """Have numpy compute on one thread here: what a move takes is too small to share out, and
     threads that wait for each other delay it. The process that answers with a body has more.
     """
-    from skinwave.web.worker import limited
+    from skinwave.web.worker import limits
 
-    with limited(1):
+    with environment(limits(1)):
         import numpy as np
 
         np.ones((2, 2)) @ np.ones((2, 2))
@@ -80,7 +81,7 @@ def main() -> None:
     _quiet()
     server = get_server("page", client_type="vue3")
     server.controller.on_error = lambda said: print(
-        f"skinwave: a script of the page has failed: {printable(said)}", file=sys.stderr
+        f"skinwave: a script of the page has failed: {one_line(said)}", file=sys.stderr
     )
     server.controller.on_server_bind.add(lambda bound: bound.app.middlewares.append(local_only))
     loop = asyncio.new_event_loop()

@@ -5,13 +5,14 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from skinwave.effort import THREADS
+from skinwave.processes import environment
 from skinwave.steps import Step, follower
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 Told = Callable[[str, int, Any], None]  # what, number of the question, content
 LEAST_STEP = 0.02  # of progress that is told
 
@@ -49,16 +50,9 @@ def idle_cores() -> int:
     return max(1, cores - int(os.getloadavg()[0])) if hasattr(os, "getloadavg") else cores
 
 
-@contextlib.contextmanager
-def limited(threads: int) -> Iterator[None]:
-    """A process that is started meanwhile computes on so many threads, unless the user said."""
-    limits = [name for name in THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(limits, str(threads)))
-    try:
-        yield
-    finally:
-        for name in limits:
-            del os.environ[name]
+def limits(threads: int) -> dict[str, str]:
+    """Environment variables of so many threads; those that the user has set stay."""
+    return {name: str(threads) for name in THREADS if name not in os.environ}
 
 
 def _said(error: Exception) -> str:
@@ -150,7 +144,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()
         self._process = context.Process(target=answer_forever, args=(other,), daemon=True)
-        with limited(idle_cores()):
+        with environment(limits(idle_cores())):
             self._process.start()
         other.close()
         threading.Thread(target=self._listen, args=(self._pipe,), daemon=True).start()
