@@ -8,6 +8,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core
 import pytest
 from corpus import SMALL
 from hypothesis import settings
+from in_browser import chromium, ended, served
 
 import meshes
 from skinwave.verify import elements
@@ -38,3 +39,18 @@ def scene(tmp_path, monkeypatch):
     path = tmp_path / "short.toml"
     path.write_text(SMALL)
     return path
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser, as Playwright has it."""
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def address():
+    """The address of the interactive tool, served by a process of its own."""
+    process, found = served("--port", "0")
+    yield found
+    ended(process)

@@ -1,4 +1,4 @@
-"""Malformed scenes, meshes and command lines: from one seed, and so the same ones every time.
+"""Small scenes; malformed scenes, meshes and command lines, from one seed: always the same ones.
 
 `python tests/corpus.py FOLDER` writes the scenes out, to look at or to try elsewhere.
 """
@@ -29,6 +29,21 @@ sides = "clamped"
 points_mm = [[0, 0], [5, 0]]
 """
 SILENT_GROUND = GOOD.replace("[body]", "[body]\nkind = 'none'")  # planned without computing
+# A scene that is answered in a second.
+SMALL = """
+name = "short"
+[tacton]
+am_frequency_hz = 200
+duration_s = 0.05
+shape = "circle"
+size_mm = 10
+speed_m_per_s = 6
+[body]
+width_mm = 60
+height_mm = 60
+[probes]
+points_mm = [[0, 0], [10, 0]]
+"""
 
 NUMBERS = {
     "tacton": ("amplitude_percent", "am_frequency_hz", "second_am_frequency_hz",
@@ -371,24 +386,13 @@ def broken_meshes() -> dict[str, Callable[[], object]]:
     return found
 
 
+def contents(folder: Path) -> dict[Path, bytes | None]:
+    """Every file below a folder, with what is in it; folders with None."""
+    return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True)
     for k, content in enumerate([*scenes().values(), *damaged_scenes()]):
         (folder / f"{k:03}.toml").write_bytes(content)
-
-# A scene that is answered in a second.
-SMALL = """
-name = "short"
-[tacton]
-am_frequency_hz = 200
-duration_s = 0.05
-shape = "circle"
-size_mm = 10
-speed_m_per_s = 6
-[body]
-width_mm = 60
-height_mm = 60
-[probes]
-points_mm = [[0, 0], [10, 0]]
-"""

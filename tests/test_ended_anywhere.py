@@ -86,17 +86,13 @@ def hand(path):
     pyvista.PolyData(found.points, corners.ravel()).save(path)
 
 
-def contents(folder):
-    return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
-
-
 def drawn(template, name, number, after):
     """End a command in a copy of a folder; raises AssertionError if it leaves what it must not."""
     with tempfile.TemporaryDirectory() as place:
         folder, temporary = Path(place, "here"), Path(place, "temporary")
         shutil.copytree(template, folder)
         temporary.mkdir()
-        before, token = contents(folder), uuid.uuid4().hex
+        before, token = corpus.contents(folder), uuid.uuid4().hex
         env = os.environ | {"TMPDIR": str(temporary), "SKINWAVE_CACHE": str(Path(place, "cache"))}
         signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a background job
         with subprocess.Popen(words(name), cwd=folder, env=env | {"TOKEN": token}, **QUIET) as one:
@@ -104,7 +100,7 @@ def drawn(template, name, number, after):
             one.send_signal(number)
             _, said = one.communicate(timeout=120)
         assert one.returncode in (0, *CODES[number]), (one.returncode, said)
-        now = contents(folder)
+        now = corpus.contents(folder)
         assert {path: now.get(path) for path in before} == before
         new = {path for path in folder.iterdir() if path not in before}
         result = folder / COMMANDS[name][1 + COMMANDS[name].index("--out")] \

@@ -38,11 +38,6 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def contents(folder):
-    """Every file below a folder, with what is in it."""
-    return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
-
-
 def opens(folder):
     """Whether there is anything in a folder; all of it must be whole."""
     files = [path for path in folder.rglob("*") if path.is_file()]
@@ -113,11 +108,11 @@ def test_a_killed_run_leaves_nothing_that_stops_the_next(folder, capsys):
     for left in ("out.partial", "out.partial-01234567", "out.partial/small"):
         (folder / left).mkdir(parents=True)
         (folder / left / "responses.npz").write_bytes(b"half")
-    before = contents(folder)
+    before = corpus.contents(folder)
     assert main([*arguments, "--out", "out"]) == 0
     assert opens(folder / "out")
     shutil.rmtree(folder / "out")
-    assert contents(folder) == before  # also that of another run, or of the user's
+    assert corpus.contents(folder) == before  # also that of another run, or of the user's
 
 
 def test_what_a_killed_process_leaves_in_the_cache_is_rebuilt(tmp_path, monkeypatch):
@@ -136,12 +131,12 @@ def test_what_a_killed_process_leaves_in_the_cache_is_rebuilt(tmp_path, monkeypa
 
 
 def refused(capsys, folder, arguments):
-    before = contents(folder)
+    before = corpus.contents(folder)
     assert main(arguments) == 2
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
     assert said[0].startswith("skinwave: ")
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
     return said[0]
 
 
@@ -194,7 +189,7 @@ def limited(size):
 
 @pytest.mark.parametrize("size", [0, 2_000, 20_000])
 def test_a_file_that_cannot_grow_is_said_and_nothing_is_left(folder, size):
-    before = contents(folder)
+    before = corpus.contents(folder)
     ended = subprocess.run(
         [*COMPARE, "--quiet"], capture_output=True, text=True, preexec_fn=limited(size),
         env=os.environ | {"SKINWAVE_CACHE": ""},
@@ -202,7 +197,7 @@ def test_a_file_that_cannot_grow_is_said_and_nothing_is_left(folder, size):
     assert ended.returncode == 2
     assert "cannot be written (File too large)" in ended.stderr
     assert ended.stderr.count("\n") == 1
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
 
 
 @pytest.fixture

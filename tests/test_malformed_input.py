@@ -31,14 +31,9 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def contents(folder):
-    """Every file below a folder, with what is in it."""
-    return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
-
-
 def said(capsys, folder, arguments, codes=(2,)):
     """What a refused command printed, in its one line; "" if it was not refused."""
-    before, started = contents(folder), time.perf_counter()
+    before, started = corpus.contents(folder), time.perf_counter()
     code = main(arguments)
     printed = capsys.readouterr().err
     assert time.perf_counter() - started < LONGEST
@@ -47,7 +42,7 @@ def said(capsys, folder, arguments, codes=(2,)):
         assert printed.count("\n") == 1, printed
         assert printed.startswith("skinwave: "), printed
         assert len(printed) > len("skinwave: \n")
-        assert contents(folder) == before
+        assert corpus.contents(folder) == before
     return printed
 
 
@@ -77,12 +72,12 @@ def test_no_command_is_refused_in_one_line(folder, capsys, arguments):
 
 @pytest.mark.parametrize("arguments", corpus.wrong_usage(), ids=" ".join)
 def test_wrong_usage_ends_with_two(folder, capsys, arguments):
-    before = contents(folder)
+    before = corpus.contents(folder)
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2
     assert "usage: skinwave" in capsys.readouterr().err
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
 
 
 @pytest.mark.parametrize("name", corpus.ABSURD)
@@ -124,14 +119,14 @@ REAL = [
 @pytest.mark.parametrize("arguments", REAL, ids=" ".join)
 def test_a_process_of_its_own_says_the_same(folder, arguments):
     (folder / "wrong.toml").write_bytes(SCENES["brackets without end"])
-    before = contents(folder)
+    before = corpus.contents(folder)
     command = [sys.executable, "-m", "skinwave", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ)
     assert ended.returncode == 2
     assert ended.stdout == ""
     assert ended.stderr.startswith("skinwave: ")
     assert ended.stderr.count("\n") == 1
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
 
 
 NAMES = ["..", "../../beside", "figures", "$\\\\frac{$", "zero \\u0000 byte", "n" * 300]
@@ -142,9 +137,9 @@ MORE = ["", "/tmp/absolute", "overview", "lines.csv", "掌", "two\\nlines"]
 def test_a_scene_of_any_name_is_compared_within_its_folder(folder, name):
     text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")
     (folder / "named.toml").write_text(text, encoding="utf-8")
-    before = contents(folder)
+    before = corpus.contents(folder)
     assert main(["compare", "named.toml", "--h", "6", "--out", "out", "--quiet"]) == 0
-    assert {p: c for p, c in contents(folder).items() if "out" not in p.parts} == before
+    assert {p: c for p, c in corpus.contents(folder).items() if "out" not in p.parts} == before
     assert len(list((folder / "out").glob("*/*/responses.npz"))) == 3
     assert len(list((folder / "out/figures").glob("*.png"))) == 2
     command = ["run", "out", "--model", "point-kernel", "--out", "single", "--quiet"]
@@ -156,10 +151,10 @@ def test_a_scene_of_any_name_is_compared_within_its_folder(folder, name):
 def test_a_scene_of_any_name_is_answered_within_its_folder(folder, name):
     text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")
     (folder / "named.toml").write_text(text, encoding="utf-8")
-    before = contents(folder)
+    before = corpus.contents(folder)
     ask = ["run", "named.toml", "--model", "point-kernel", "--out", "out", "--quiet"]
     assert main(ask) == 0
-    assert {p: c for p, c in contents(folder).items() if "out" not in p.parts} == before
+    assert {p: c for p, c in corpus.contents(folder).items() if "out" not in p.parts} == before
     assert (folder / "out/responses.npz").exists()
 
 

@@ -35,11 +35,6 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def contents(folder):
-    """Every file below a folder, with what is in it."""
-    return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
-
-
 def made(out, text="one", meanwhile=lambda: None, **options):
     """A folder as a command writes it, and what happens until it is finished."""
     with output_folder(out, **options) as place:
@@ -62,11 +57,11 @@ def a_run(name="small"):
 
 def refused(capsys, *arguments):
     """The one sentence by which a command is refused; all that is there stays as it was."""
-    before = contents(Path.cwd())
+    before = corpus.contents(Path.cwd())
     assert main([*map(str, arguments)]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1, said
-    assert contents(Path.cwd()) == before
+    assert corpus.contents(Path.cwd()) == before
     return said
 
 
@@ -82,13 +77,13 @@ def test_folders_and_files_of_the_user_beside_an_output_stay(folder, capsys):
         (folder / name / "note").write_text("mine")
     for name in ("o.csv.partial", "o.partial.csv", ".o.partial.csv", "none.partial.gif"):
         (folder / name).write_text("mine")
-    before = contents(folder)
+    before = corpus.contents(folder)
     assert main([*RUN, "--out", "out"]) == 0
     assert main([*RUN, "--out", "out", "--overwrite"]) == 0
     assert main(["convert", "none.toml", "o.csv", "--rate", "1000", "--quiet"]) == 0
     shutil.rmtree("out")
     (folder / "o.csv").unlink()
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
 
 
 @posix
@@ -556,14 +551,14 @@ def test_a_signal_does_not_stop_a_removal_halfway(folder, monkeypatch, error):
         removed(path, **options)
 
     monkeypatch.setattr("shutil.rmtree", signalled)
-    before = contents(folder)
+    before = corpus.contents(folder)
 
     def fails():
         raise RuntimeError
 
     with pytest.raises(error):
         made(folder / "new/out", meanwhile=fails)
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
 
 
 def test_an_interrupted_report_says_which_command_finishes_it(folder, capsys, monkeypatch):
@@ -603,10 +598,10 @@ def test_an_interrupt_without_a_finished_run_leaves_nothing(folder, capsys, monk
         raise KeyboardInterrupt
 
     monkeypatch.setattr("skinwave.reports.album.make", interrupted)
-    before = contents(folder)
+    before = corpus.contents(folder)
     assert main(["report", "none.toml", "--out", "new/out", "--quiet"]) == 1
     assert "nothing was finished" in capsys.readouterr().err
-    assert contents(folder) == before
+    assert corpus.contents(folder) == before
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, OSError])
@@ -657,9 +652,9 @@ def test_names_of_results_do_not_lead_out_of_a_report(folder):
 
     for k, name in enumerate(("../../up", "Twin", "twin", "v1.2")):
         files.write_run(folder / f"out/{k}", a_run(name))
-    before = contents(folder)
+    before = corpus.contents(folder)
     _write_data(folder / "data", open_album(folder / "out"))
-    new = {*contents(folder)} - {*before} - {folder / "data"}
+    new = {*corpus.contents(folder)} - {*before} - {folder / "data"}
     assert {path.parent for path in new} == {folder / "data"}
     assert len({p.name.casefold() for p in new if p.name.endswith("_probes.csv")}) == 4
 
@@ -745,7 +740,7 @@ def test_a_disk_that_cannot_be_written_is_said_with_folder_and_cure(disk, capsys
         (disk / "filler").write_bytes(bytes(8000))
     else:
         subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
-    before = contents(disk)
+    before = corpus.contents(disk)
     assert main(arguments) == 2
     (said,) = capsys.readouterr().err.splitlines()
     system = "No space left on device" if state == "full" else "Read-only file system"
@@ -753,7 +748,7 @@ def test_a_disk_that_cannot_be_written_is_said_with_folder_and_cure(disk, capsys
     assert " disk/" in said or str(disk) in said
     assert ("make room there" in said) == (state == "full")
     assert "choose another" in said
-    after = contents(disk)
+    after = corpus.contents(disk)
     assert {p: c for p, c in after.items() if "sweep" not in p.parts} == before
     assert all(c is None or c for c in after.values())  # no file is begun
     assert not [p for p in after if "partial" in p.name]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from in_browser import needs_browser
 
 from simple_model import Effort, Response
 from skinwave import document
@@ -22,11 +23,6 @@ from skinwave.verify import page as verify_page
 from skinwave.verify.case import Case, Check, Entry, Result
 
 FIRST_ASSUMPTION = next(iter(ASSUMPTIONS))
-CHROMIUM = "/usr/bin/chromium"
-ARGUMENTS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-]  # fmt: skip
 # Begins as HTML of a cell did, and leaves an attribute, a title, an element of text and a frame.
 HOSTILE = (
     "<b>'\"></title></pre></script></iframe><script>top.ran=1</script>"
@@ -121,17 +117,6 @@ def compared(folder):
 WRITERS = (relaxed, traded, verified, ran, reported, compared)
 
 
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api")
-    if not Path(CHROMIUM).exists():
-        pytest.skip("no browser here")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
-
-
 def opened(browser, path, obeyed=False):
     """A page and what its console said; without its policy if the page is to be `obeyed`."""
     context = browser.new_context(bypass_csp=obeyed)
@@ -145,6 +130,7 @@ def opened(browser, path, obeyed=False):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
+@needs_browser
 def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
     write(tmp_path)
     pages = sorted(tmp_path.rglob("index.html"))
@@ -160,6 +146,7 @@ def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
 
 
 @pytest.mark.slow
+@needs_browser
 def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
     """The second line of defence, by itself."""
     page = document.page("t", Html(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
@@ -172,6 +159,7 @@ def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
 
 
 @pytest.mark.slow
+@needs_browser
 def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
     inner = (
         "<body><script>document.body.append('drawn');\nlet a = '<é>';</script><script>"

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from in_browser import needs_browser
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
@@ -35,7 +36,6 @@ from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
-CHROMIUM = "/usr/bin/chromium"
 draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
 
 
@@ -399,29 +399,21 @@ def test_the_page_says_everything_and_stands_alone(page):
     assert "@page { size: A4" in text
 
 
-@pytest.mark.skipif("not os.path.exists(CHROMIUM)", reason="Debian's chromium is not installed")
-def test_the_page_opens_in_a_browser_without_a_network(page):
-    playwright = pytest.importorskip("playwright.sync_api")
-    arguments = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-                 "--disable-background-networking", "--disable-component-update",
-                 "--disable-sync"]  # fmt: skip
+@needs_browser
+def test_the_page_opens_in_a_browser_without_a_network(page, browser):
     said, asked = [], []
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        tab = browser.new_page(viewport={"width": 1200, "height": 900})
-        tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
-        tab.on("pageerror", lambda error: said.append(str(error)))
-        tab.route(
-            re.compile("^(https?|wss?)://"), lambda r: (asked.append(r.request.url), r.abort())
-        )
-        tab.goto(f"file://{page / 'index.html'}")
-        tab.wait_for_timeout(2500)
-        broken = tab.evaluate("[...document.images].filter(i => !i.naturalWidth).length")
-        drawn = [frame.evaluate("document.querySelectorAll('canvas').length")
-                 for frame in tab.frames[1:]]  # fmt: skip
-        ARTEFACTS.mkdir(parents=True, exist_ok=True)
-        tab.screenshot(path=ARTEFACTS / "report.png", full_page=True)
-        browser.close()
+    tab = browser.new_page(viewport={"width": 1200, "height": 900})
+    tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.route(re.compile("^(https?|wss?)://"), lambda r: (asked.append(r.request.url), r.abort()))
+    tab.goto(f"file://{page / 'index.html'}")
+    tab.wait_for_timeout(2500)
+    broken = tab.evaluate("[...document.images].filter(i => !i.naturalWidth).length")
+    drawn = [frame.evaluate("document.querySelectorAll('canvas').length")
+             for frame in tab.frames[1:]]  # fmt: skip
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    tab.screenshot(path=ARTEFACTS / "report.png", full_page=True)
+    tab.close()
     assert broken == 0
     assert [text for text in said if "favicon" not in text and "ERR_FAILED" not in text] == []
     assert all("favicon" in url for url in asked), asked

@@ -1,15 +1,13 @@
 """The interactive tool in a browser: what a user does, and what is then to be seen."""
 
 import json
-import os
 import re
 import statistics
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from in_browser import ended, needs_browser, served
 
 from simple_model import spectrum
 from skinwave.scene_file import loads
@@ -19,49 +17,11 @@ from skinwave.web.controls import NUMBERS, STARTS
 from skinwave.web.history import TOGETHER
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
-CHROMIUM = "/usr/bin/chromium"
-ARGUMENTS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-]  # fmt: skip
 READY = "() => window.trame?.utils?.plots?.shown?.spectrum_plot?.figure"
 PATIENCE = 60_000  # ms; other work on the machine may take most of it
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no browser here"),
-]
+pytestmark = [pytest.mark.slow, needs_browser]
 for name in ("playwright", "trame", "trame_vuetify"):
     pytest.importorskip(name)
-
-
-def served(*arguments):
-    """A server in a process of its own, and its address."""
-    command = [sys.executable, "-m", "skinwave", "web", *arguments]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
-    return process, re.search(r"http://\S+", process.stderr.readline()).group()
-
-
-def ended(process):
-    process.terminate()
-    said = process.communicate(timeout=20)[1]
-    assert "Traceback" not in said, said
-
-
-@pytest.fixture(scope="module")
-def address():
-    process, address = served("--port", "0")
-    yield address
-    ended(process)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 class Logs:

@@ -5,16 +5,13 @@ import subprocess
 import sys
 
 import pytest
+from in_browser import ended
 from test_web_page import (
-    ARGUMENTS,
-    CHROMIUM,
     PATIENCE,
     READY,
-    ended,
     opened,
     pytestmark,  # noqa: F401
     query_has,
-    served,
     state,
 )
 
@@ -33,23 +30,6 @@ from skinwave.cli import main
 main(["web", "--port", "0"])
 """
 RAN = "() => [window.ran, document.querySelectorAll('[onerror], [onload], img[src=x]').length]"
-
-
-@pytest.fixture(scope="module")
-def address():
-    process, address = served("--port", "0")
-    yield address
-    ended(process)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
