@@ -1,11 +1,15 @@
 """What a browser shows of pages that wait or are refused, and that no text becomes a script."""
 
 import re
+import stat
 import subprocess
 import sys
+import time
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from in_browser import ended
+from in_browser import ended, served
 from test_web_page import (
     PATIENCE,
     READY,
@@ -180,3 +184,26 @@ def test_a_script_in_an_address_never_runs(browser, address, text):
     never_ran(page)
     assert all(url.startswith(own.replace("http", "ws")) for url in asked), asked
     context.close()
+
+
+def test_the_token_is_not_on_the_command_line_of_the_browser(browser, tmp_path, monkeypatch):
+    told = tmp_path / "told"
+    opener = tmp_path / "opener"
+    opener.write_text(f'#!/bin/sh\necho "$@" > {told}.new\nmv {told}.new {told}\n')
+    opener.chmod(0o700)
+    monkeypatch.setenv("BROWSER", str(opener))
+    process, address = served("--port", "0", "--open")
+    for _ in range(100):
+        if told.exists():
+            break
+        time.sleep(0.1)
+    given = told.read_text().strip()
+    assert parse_qs(urlsplit(address).query)["token"][0] not in given
+    assert stat.S_IMODE(Path(urlsplit(given).path).parent.stat().st_mode) == 0o700
+    page = browser.new_context().new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(given)
+    page.wait_for_function(READY)
+    page.context.close()
+    ended(process)
+    assert not Path(urlsplit(given).path).parent.exists()

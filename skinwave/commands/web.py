@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 
 
@@ -29,19 +30,31 @@ def run(options: argparse.Namespace) -> int:
     if scene is not None:
         scenes.values_of(scene)  # refuses what no control says
 
-    def ready(address: str) -> None:
-        print(f"skinwave: {address} (Ctrl-C ends it)", file=sys.stderr, flush=True)
-        if options.open:
-            import webbrowser
+    with tempfile.TemporaryDirectory(prefix="skinwave-") as private:
 
-            webbrowser.open(address)
+        def ready(address: str) -> None:
+            print(f"skinwave: {address} (Ctrl-C ends it)", file=sys.stderr, flush=True)
+            if options.open:
+                open_unseen(address, Path(private))
 
-    try:
-        front.run(options.port, dumps(scene) if scene is not None else "", ready)
-    except KeyboardInterrupt:
-        return 0
-    except OSError as error:
-        raise ValueError(
-            f"port {options.port} cannot be used ({error.strerror}); name another with --port"
-        ) from None
+        try:
+            front.run(options.port, dumps(scene) if scene is not None else "", ready)
+        except KeyboardInterrupt:
+            return 0
+        except OSError as error:
+            raise ValueError(
+                f"port {options.port} cannot be used ({error.strerror}); name another with --port"
+            ) from None
     return 0
+
+
+def open_unseen(address: str, folder: Path) -> None:
+    """Open an address by a file in a private folder that leads there.
+
+    Other users of the machine may read a browser's command line, which would have the token.
+    """
+    import webbrowser
+
+    leading = folder / "open.html"
+    leading.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">')
+    webbrowser.open(leading.as_uri())
