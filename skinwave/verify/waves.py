@@ -19,7 +19,7 @@ LYSMER = "Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969)"
 
 def steady_focus(frequency: float, poisson: float) -> Case:
     """A Gaussian focus of steady frequency on a viscoelastic half-space."""
-    mesh, w = quarter_space(0.10, 1.35, 0.02), 2 * np.pi * frequency
+    mesh, w = quarter_space(0.10, 1.5, 0.02), 2 * np.pi * frequency
     ops = fem.assemble(mesh, fem.Material(**FOREARM, poisson=poisson), fixed=QUARTER)
     found = on_axis(mesh, RADII) @ fem.harmonic(ops, focus_force(mesh), frequency)[0]
     mu = FOREARM["shear_modulus"] + 1j * w * FOREARM["viscosity"]
