@@ -1,0 +1,176 @@
+"""Did a change of the code change a number? `python -m bench.frozen write DIR`, then, after the
+change, `python -m bench.frozen compare DIR`.
+
+Everything goes through the command line, on scenes that are kept in DIR, so that what is inside may
+be rebuilt in between: `compare` runs the same commands again. Text may differ (it is counted), and
+what took how long; numbers must agree to 1e-9 of the largest of their column, or of their bar in a
+verification. Palms are filled with other tetrahedra in each run: their numbers are compared to 5 %.
+"""
+
+import argparse
+import csv
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parent.parent
+AGREE, MESHED_ANEW = 1e-9, 0.05
+OF_MESHER = ("palm", "flat")  # in the name of a number: of a body that the mesher has filled
+NOT_COMPARED = ("seconds", "memory", "versions", "peak", "typed", "arguments")
+SCENES, PLANNED = ("skin-slab", "paper-sheet"), 20
+Numbers = Mapping[str, np.ndarray]
+
+
+def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Command and compared files of each part, by its name; OUT and SCENES are folders."""
+    found = {"paper-15": (("compare",), ("lines.csv", "claims.csv", "responses.npz"))}
+    for name in sorted(p.stem for p in (ROOT / "examples").glob("*.toml")):
+        found[f"run {name}"] = (("run", f"SCENES/{name}.toml"), ("lines.csv", "responses.npz"))
+    for name in SCENES:
+        found[f"relax {name}"] = (("relax", f"SCENES/{name}.toml"), ("relax.csv", "responses.npz"))
+    for k in range(PLANNED):
+        found[f"plan {k:02}"] = (("plan", f"SCENES/planned-{k:02}.toml", "--json"), ("said.json",))
+    return found | {"verify": (("verify",), ("verify.json",))}
+
+
+def write_scenes(folder: Path) -> None:
+    """The examples, and the random scenes of `bench.planned`, as files."""
+    from bench.planned import scene
+    from skinwave.scene_file import dumps
+
+    folder.mkdir(parents=True)
+    for path in (ROOT / "examples").glob("*.toml"):
+        (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    for k in range(PLANNED):
+        text = dumps(scene(k)[0])
+        (folder / f"planned-{k:02}.toml").write_text(text, encoding="utf-8")
+
+
+def run(name: str, scenes: Path, folder: Path, cache: str) -> Path:
+    """Run a part's command; the folder with its files."""
+    command, out = parts()[name][0], folder / name.replace(" ", "-")
+    words = [word.replace("SCENES", str(scenes)) for word in command]
+    if command[0] != "plan":
+        words += ["--out", str(out), "--quiet"]
+    env = os.environ | {"SKINWAVE_CACHE": cache, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, "-m", "skinwave", *words], capture_output=True,
+                          text=True, cwd=ROOT, env=env, check=False)  # fmt: skip
+    if done.returncode:
+        raise SystemExit(f"{name}: ended with {done.returncode}: {done.stderr.strip()}")
+    out.mkdir(exist_ok=True)
+    if command[0] == "plan":
+        (out / "said.json").write_text(done.stdout, encoding="utf-8")
+    return out
+
+
+def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The numbers of a file, by column, and its text, both in their order."""
+    if path.suffix == ".npz":
+        with np.load(path) as arrays:
+            return {name: arrays[name] for name in arrays.files}, []
+    if path.suffix == ".csv":
+        return _split(_cells(path))
+    return _split(_leaves(json.loads(path.read_text(encoding="utf-8")), ""))
+
+
+def _cells(path: Path) -> Iterator[tuple[str, object]]:
+    with open(path, encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            palm = "palm " if any("palm" in str(cell) for cell in row.values()) else ""
+            for column, cell in row.items():
+                try:
+                    yield palm + column, float(cell)
+                except ValueError:
+                    yield column, cell
+
+
+def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
+    """Everything in a JSON value; the checks of a verification over their bars."""
+    if isinstance(value, dict) and "bar" in value:
+        unit = max(abs(value["reference"] or 0.0), 1e6 * value["bar"])
+        yield f"{name} check", float(value["value"] or 0.0) / (unit or 1.0)
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(inner, f"{name} {key}".strip())
+    elif isinstance(value, list):
+        for k, inner in enumerate(value):
+            yield from _leaves(inner, f"{name} {k}")
+    else:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        yield name, float(value) if is_number else value  # type: ignore[arg-type]
+
+
+def _split(found: Iterator[tuple[str, object]]) -> tuple[dict[str, np.ndarray], list[str]]:
+    numeric: dict[str, list[float]] = {}
+    text = []
+    for name, value in found:
+        if any(word in name for word in NOT_COMPARED):
+            continue
+        if isinstance(value, float):
+            numeric.setdefault(name, []).append(value)
+        else:
+            text.append(str(value))
+    return {name: np.array(values) for name, values in numeric.items()}, text
+
+
+def differences(before: Path, after: Path) -> Iterator[str]:
+    """What differs between two files by more than it may; names may have changed, order not."""
+    (old, old_text), (new, new_text) = numbers(before), numbers(after)
+    changed = sum(a != b for a, b in zip(old_text, new_text, strict=False))
+    if changed:
+        print(f"  {after.name}: {changed} of {len(old_text)} texts differ")
+    if len(old) != len(new) or len(old_text) != len(new_text):
+        yield f"{len(old)} columns and {len(old_text)} texts, now {len(new)} and {len(new_text)}"
+        return
+    for (name, a), (_, b) in zip(old.items(), new.items(), strict=True):
+        bar = MESHED_ANEW if any(word in name for word in OF_MESHER) else AGREE
+        if a.shape != b.shape:
+            yield f"{name}: {a.shape}, now {b.shape}"
+        elif a.dtype.kind not in "fc":
+            continue
+        elif not np.allclose(a, b, rtol=0, atol=bar * _size(a), equal_nan=True):
+            worst = np.nanmax(np.abs(a - b)) / _size(a)
+            yield f"{name}: differs by {worst:.2g} of its largest (may by {bar:g})"
+
+
+def _size(values: np.ndarray) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max(initial=1e-300))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m bench.frozen", description=__doc__)
+    parser.add_argument("what", choices=("write", "compare"))
+    parser.add_argument("folder", type=Path, metavar="DIR")
+    parser.add_argument("--only", default="", metavar="TEXT", help="parts whose name begins so")
+    asked = parser.parse_args()
+    folder = asked.folder.resolve()
+    scenes = folder / "scenes"
+    if asked.what == "write" and not scenes.exists():
+        write_scenes(scenes)
+    failed = 0
+    with tempfile.TemporaryDirectory() as place:
+        for name, (_, files) in parts().items():
+            if not name.startswith(asked.only):
+                continue
+            print(name, flush=True)
+            cache = str(Path(place, "cache"))
+            out = run(name, scenes, folder if asked.what == "write" else Path(place), cache)
+            if asked.what == "compare":
+                for file in files:
+                    for said in differences(folder / out.name / file, out / file):
+                        failed += 1
+                        print(f"  {file}: {said}", flush=True)
+    if asked.what == "compare":
+        print(f"{failed} differences" if failed else "all numbers agree")
+        sys.exit(bool(failed))
+
+
+if __name__ == "__main__":
+    main()
