@@ -1,0 +1,48 @@
+"""Debian's browser without a display, and the interactive tool that it opens."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+needs_browser = pytest.mark.skipif(
+    not Path(CHROMIUM).exists(), reason="Debian's chromium is not installed"
+)
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A browser, as Playwright has it."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+def served(*arguments: str) -> tuple[Any, str]:
+    """A server in a process of its own, and its address."""
+    command = [sys.executable, "-m", "skinwave", "web", *arguments]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    assert process.stderr is not None
+    found = re.search(r"http://\S+", process.stderr.readline())
+    assert found
+    return process, found.group()
+
+
+def ended(process: Any) -> None:
+    """End a server, which must say nothing of a fault."""
+    process.terminate()
+    said = process.communicate(timeout=20)[1]
+    assert "Traceback" not in said, said
