@@ -126,7 +126,6 @@ def test_a_comparison_and_its_runs_are_had_again(scene):
 @pytest.mark.slow
 def test_a_report_is_had_again(scene, monkeypatch):
     monkeypatch.setattr("skinwave.reports.album.shown_scenes", lambda scene, _: {"slab": scene})
-    scene.write_text(scene.read_text().replace("= 60", "= 40"))
     assert main(["report", str(scene), "--h", "12", "--quiet"]) == 0
     scene.unlink()
     assert main(["rerun", "short-report", "--quiet"]) == 0
