@@ -251,7 +251,7 @@ def test_layers_as_one_keep_their_mass_and_mean_stiffness():
 @pytest.mark.slow
 def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    scene = replace(SKIN, body=replace(SKIN.body, depth=0.004))  # too thin for layers
+    scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
     monkeypatch.setattr(
         "skinwave.studies.relax.ladder",
         lambda scene: tuple(n for n in ladder(scene) if n not in ("flat", "one material")),

@@ -37,9 +37,9 @@ def circling(size, speed, am=0.0, **load):
     )
 
 
-def misfit(found, expected, alternating):
+def misfit(found, expected, alternating, late=LATE):
     """Root mean square (p,) of what differs late, relative to that of the alternating part."""
-    return np.sqrt(((found - expected)[LATE] ** 2).mean(axis=0)) / alternating
+    return np.sqrt(((found - expected)[late] ** 2).mean(axis=0)) / alternating
 
 
 def alternating(load):
@@ -52,10 +52,12 @@ def alternating(load):
 @pytest.mark.parametrize("speed", [30.0, 60.0, 100.0])
 @pytest.mark.parametrize("am", [0.0, 140.0])
 def test_flat_body_settles_into_the_steady_state_on_fast_circles(size, speed, am):
-    load = circling(size, speed, am)
-    found = flat_body(PALM, load, PROBES, TIMES).displacement
-    expected = steady_state(PALM, load, PROBES, TIMES).displacement
-    assert misfit(found, expected, alternating(load)).max() < 0.01
+    load, times = circling(size, speed, am), TIMES[:3000]
+    found, expected = (
+        model(PALM, load, PROBES, times).displacement for model in (flat_body, steady_state)
+    )
+    late = slice(2500, 2850)
+    assert misfit(found, expected, alternating(load), late).max() < 0.01
 
 
 @pytest.mark.parametrize("model", [flat_body, steady_state])

@@ -169,9 +169,9 @@ def test_waves_spread_further_than_the_kernel(seen):
 @pytest.mark.slow
 def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
     """By the slope of the x-t diagram outside the path, beside Rayleigh's speed and exact waves."""
-    body = Body(width=0.12, height=0.12, material=replace(PRESETS["palm"], viscosity=2.0))
+    body = Body(width=0.1, height=0.1, material=replace(PRESETS["palm"], viscosity=2.0))
     scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
-    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.1, h=0.0035), (0.02, 4))
+    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.1, h=0.004), (0.02, 4))
     outside = (view.ray.distance > 0.005) & (view.ray.distance < 0.03)
     distance, times = view.ray.distance[outside], view.ray.times
     found = speeds.apparent_speed(distance, times, view.ray.motion[:, outside], 250.0)

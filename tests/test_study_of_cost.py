@@ -478,7 +478,7 @@ def test_no_cache_is_no_error(monkeypatch, tmp_path):
 def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypatch):
     monkeypatch.setattr("skinwave.studies.tradeoff.FINEST", (1.2, 1.0))
     scene = loads(SHORT)
-    scene = replace(scene, body=replace(scene.body, width=0.06, height=0.06, sides="free"))
+    scene = replace(scene, body=replace(scene.body, width=0.04, height=0.04, sides="free"))
     chosen = [
         Candidate(model="point-kernel"),
         Candidate(model="fem", h=0.012),
