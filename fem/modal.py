@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, signal
+from scipy import linalg
 
 from fem.reduced import ReducedModel
 from fem.relaxation import factors
@@ -113,6 +113,8 @@ def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt
     gain : (t,) float, Pa, pressure at the focus
     dt : float, s
     """
+    from scipy.signal import lfilter  # brings scipy.stats, half a second that few models need
+
     low = np.minimum(position.astype(np.int64), max(len(footprints) - 2, 0))
     part = position - low
     high = np.minimum(low + 1, len(footprints) - 1)
@@ -124,7 +126,7 @@ def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt
         drive = at_low * modal[low] + at_high * modal[high]
         decay, end, start = _step_weights(value * dt)
         # The initial condition of the filter makes z(0) = 0 whatever the load begins with.
-        z, _ = signal.lfilter([dt * end, dt * start], [1, -decay], drive, zi=[-dt * end * drive[0]])
+        z, _ = lfilter([dt * end, dt * start], [1, -decay], drive, zi=[-dt * end * drive[0]])
         displacement += 2 * (output.real[:, None] * z.real - output.imag[:, None] * z.imag)
     return displacement.T
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import get_window
 
 from simple_model.line_names import MOST, WEAKEST, LineNames, line_names
 from simple_model.pressure import MovingPressure
@@ -21,6 +20,7 @@ from simple_model.response import (
     unmixed,
 )
 from simple_model.trajectory import Floats
+from simple_model.windows import cosines
 
 Mask = NDArray[np.bool_]
 
@@ -186,7 +186,7 @@ def _loudest(amplitudes: Floats) -> Floats:
 
 def _windowed(x: Floats) -> Floats:
     """Amplitudes (f, p) of the spectrum of signals (t, p)."""
-    weights = get_window(WINDOW, len(x))[:, None]
+    weights = cosines(WINDOW, len(x))[:, None]
     return np.asarray(2 * np.abs(np.fft.rfft(x * weights, axis=0)) / weights.sum())
 
 
@@ -200,7 +200,7 @@ def _offset(three: Floats) -> float:
 def _decays(x: Floats, turns: float) -> bool:
     """Whether signals (t, p) are weaker in their second half, at so many turns a sample."""
     half = len(x) // 2
-    wave = get_window("hann", half) * np.exp(-2j * np.pi * turns * np.arange(half))
+    wave = cosines("hann", half) * np.exp(-2j * np.pi * turns * np.arange(half))
     first, second = (np.linalg.norm(wave @ part) for part in (x[:half], x[-half:]))
     return bool(second < DECAYED * first)
 

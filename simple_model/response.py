@@ -5,13 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import get_window
 
 from simple_model.trajectory import Floats
+from simple_model.windows import kaiser, named
 
 # Side lobes of the Kaiser window below -140 dB: lines as weak as that stay apart from strong ones.
-LINE_WINDOW = ("kaiser", 19.0)
-LINE_BETA, LINE_BINS = LINE_WINDOW[1], 2.5  # it keeps lines apart that are so many bins apart
+LINE_BETA, LINE_BINS = 19.0, 2.5  # it keeps lines apart that are so many bins apart
 SETTLE = 0.25  # of a response, before which no line is fitted
 ALIKE = 1e-3  # of what can be told apart: lines as close as that are one, and its amplitude is
 MINOR = 0.05  # of a line: what others that it is not resolved from may have together
@@ -131,7 +130,7 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
     `scipy.signal.get_window` knows).
     """
     n = len(response.times)
-    weights = get_window(window, n)
+    weights = named(window, n)
     amplitude = np.abs(np.fft.rfft(response.displacement * weights[:, None], axis=0))
     amplitude *= 2 / weights.sum()
     amplitude[0] /= 2
@@ -215,7 +214,7 @@ def hidden(
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
     x = np.pi * (frequencies[:, None] - frequencies[rest > 0]) / least
-    _, beta = _window(_closest(distinct, 1 / least))
+    beta = _beta(_closest(distinct, 1 / least))
     seen = np.sqrt(_kaiser_transform(x, beta) ** 2 @ rest[rest > 0] ** 2)  # of any phases
     return np.asarray(seen > MINOR * np.maximum(strengths, FAINT * strengths.max(initial=0.0)))
 
@@ -242,8 +241,8 @@ def fit_lines(
     distinct, which = _distinct(frequencies, 1 / span)
     angle = 2 * np.pi * t * distinct[1:]
     basis = np.hstack([np.ones_like(t), np.cos(angle), np.sin(angle)])
-    window = _window(_closest(distinct, span))
-    weighted = (basis[kept] * get_window(window, int(kept.sum()), fftbins=False)[:, None]).T
+    window = kaiser(int(kept.sum()), _beta(_closest(distinct, span)))
+    weighted = (basis[kept] * window[:, None]).T
     normal = weighted @ basis[kept], weighted @ x[kept]
     fitted = np.linalg.lstsq(*normal, rcond=1e-13)[0]
     cosine, sine = np.split(fitted[1:], 2)
@@ -256,10 +255,10 @@ def _closest(frequencies: Floats, span: float) -> float:
     return float(np.diff(frequencies).min(initial=np.inf) * span)
 
 
-def _window(bins: float) -> tuple[str, float]:
-    """The window for lines that are so many bins apart, whose main lobe is in proportion."""
+def _beta(bins: float) -> float:
+    """Of the window for lines that are so many bins apart, whose main lobe is in proportion."""
     lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
-    return LINE_WINDOW[0], float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
+    return float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
 
 
 def step(times: Floats) -> float:

@@ -10,7 +10,6 @@ from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin, upfirdn
 
 from simple_model.focus import spot_width
 from simple_model.pressure import MovingPressure
@@ -84,6 +83,8 @@ def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> F
     """
     if parts == 1:
         return load(times)
+    from scipy.signal import firwin, upfirdn  # half a second that few commands need
+
     dt = step(times)
     taps = firwin(2 * REACH * parts + 1, 1 / parts, window=STOP_BAND)
     around = np.arange(-REACH * parts, (len(times) - 1 + REACH) * parts + 1)

@@ -177,7 +177,8 @@ def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal)
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 def test_ctrl_c_leaves_what_is_finished(tmp_path, monkeypatch):
     monkeypatch.setenv("SKINWAVE_CACHE", "")  # or nothing is to be prepared
-    command = [sys.executable, "-m", "skinwave", "compare", "--out", str(tmp_path / "cut")]
+    command = [sys.executable, "-m", "skinwave", "compare", "--h", "8"]
+    command += ["--out", str(tmp_path / "cut")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stderr is not None
         for line in process.stderr:  # phases are named, a line each

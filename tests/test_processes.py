@@ -109,7 +109,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
                   "swept", "--workers", "1"],
         "plot": ["swept"],
         "convert": ["small.toml", "out.csv"],
-        "mesh": ["body.stl", "--h", "6", "--out", "body.vtu"],
+        "mesh": ["body.stl", "--h", "20", "--out", "body.vtu"],
         "doctor": [],
         "cache": [],
         "report": small,
@@ -256,16 +256,16 @@ def works_at(process, what):
     raise AssertionError(f"{what} never ran; {process.poll()}")
 
 
-MESHING = "import meshes; meshes.palm_mesh(meshes.Palm(), 1.5e-3)"
+MESHING = "import meshes; meshes.palm_mesh(meshes.Palm(), 3e-3)"
 ASIDE = (
     "from skinwave.effort import {0}\nfrom skinwave.processes import ended_by_signals\n"
     "import meshes\nif __name__ == '__main__':\n    with ended_by_signals():\n        {1}"
 )
 CALLS = {
-    "here": ASIDE.format("apart", "meshes.palm_mesh(meshes.Palm(), 1.5e-3)"),
-    "apart": ASIDE.format("apart", "apart(meshes.palm_mesh, meshes.Palm(), 1.5e-3)"),
+    "here": ASIDE.format("apart", "meshes.palm_mesh(meshes.Palm(), 3e-3)"),
+    "apart": ASIDE.format("apart", "apart(meshes.palm_mesh, meshes.Palm(), 3e-3)"),
     "helper": ASIDE.format("helper", "with helper() as aside:\n            "
-                           "aside.submit(meshes.palm_mesh, meshes.Palm(), 1.5e-3).result()"),
+                           "aside.submit(meshes.palm_mesh, meshes.Palm(), 3e-3).result()"),
 }  # fmt: skip
 
 

@@ -1,9 +1,14 @@
 """The record that every model returns: its own arrays, checked."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
+from scipy import signal
 
-from simple_model import Response
+from simple_model import Response, windows
+from simple_model.response import LINE_BETA
 
 TIMES = np.arange(5) / 10_000
 
@@ -47,3 +52,21 @@ def test_a_response_that_cannot_be_is_refused_in_a_sentence(changed, sentence):
 
 def test_probes_may_have_a_height():
     assert made(probes=np.zeros((2, 3))).probes.shape == (2, 3)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 64, 1001])
+def test_windows_are_scipys(n):
+    for name in windows.COSINES:
+        np.testing.assert_array_equal(windows.cosines(name, n), signal.get_window(name, n))
+    for beta in (0.0, 3.3, LINE_BETA):
+        symmetric = signal.get_window(("kaiser", beta), n, fftbins=False)
+        np.testing.assert_array_equal(windows.kaiser(n, beta), symmetric)
+    np.testing.assert_array_equal(windows.named("flattop", n), signal.get_window("flattop", n))
+
+
+def test_what_few_commands_need_is_not_imported_by_all():
+    """Each of a study's processes and each page would wait for it."""
+    code = "import fem, simple_model, sys; print(*sys.modules)"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {"fem", "simple_model", "scipy.interpolate"} <= set(said.stdout.split())
+    assert not {"scipy.signal", "scipy.stats", "matplotlib"} & set(said.stdout.split())

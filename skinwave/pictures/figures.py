@@ -14,7 +14,7 @@ from meshes.tetmesh import Floats
 from simple_model import spectrum
 from skinwave.comparison import moving_rms
 from skinwave.numbers import significant
-from skinwave.pictures.styles import STYLES, Style
+from skinwave.pictures.styles import LABELS, STYLES, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, told apart by every kind of colour vision; one model, one colour.
@@ -25,12 +25,6 @@ COLOURS = {
     "skin-slab": "#0072B2",
 }
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-LABELS = {
-    "point-kernel": "kernel, same load",
-    "point-kernel-published": "kernel, as published",
-    "paper-sheet": "paper sheet",
-    "skin-slab": "skin slab",
-}
 MARKERS = {"point-kernel": "o", "point-kernel-published": "x", "paper-sheet": "s"}
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}

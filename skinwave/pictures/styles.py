@@ -1,10 +1,16 @@
-"""How pictures are dressed for a report, a talk or a printed page."""
+"""How pictures are dressed for a report, a talk or a printed page; what legends call columns."""
 
 from dataclasses import dataclass
 from typing import Any
 
 from simple_model.choices import choose
 
+LABELS = {
+    "point-kernel": "kernel, same load",
+    "point-kernel-published": "kernel, as published",
+    "paper-sheet": "paper sheet",
+    "skin-slab": "skin slab",
+}
 ONE_COLUMN = 6.5  # inch of letters of 10 points: wider figures take two columns in print
 
 

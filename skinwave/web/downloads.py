@@ -13,7 +13,6 @@ from typing import Any
 from simple_model.choices import choose
 from simple_model.response import step
 from skinwave.exports import sampled, write_table
-from skinwave.pictures.figures import colour, drawn, label
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
@@ -147,6 +146,8 @@ def _column(scene: Scene, answer: Answer) -> str:
 def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
     """Maps, waveform and spectrum; `kind` is one of `FORMATS`."""
     from matplotlib.figure import Figure
+
+    from skinwave.pictures.figures import colour, drawn, label
 
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
     for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):

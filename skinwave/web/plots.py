@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, threshold
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, pressure_threshold
-from skinwave.pictures.figures import LABELS
+from skinwave.pictures.styles import LABELS
 from skinwave.web.drawings import written
 from skinwave.web.model import Answer, commanded_curve, thinned
 

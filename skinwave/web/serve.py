@@ -16,7 +16,6 @@ from typing import Any
 from urllib.parse import urlencode
 
 from skinwave.processes import environment
-from skinwave.web.access import in_lines, local_only, one_line
 
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
@@ -62,6 +61,8 @@ def _on_one_thread() -> None:
 
 def _quiet() -> None:
     """What other libraries log of messages that cannot be read: one line of each."""
+    from skinwave.web.access import in_lines
+
     logging.getLogger("wslink").setLevel(logging.CRITICAL + 1)  # `guard` says what is a fault here
     in_lines("a message to the process of a page is left out")
 
@@ -75,6 +76,7 @@ def main() -> None:
     from trame_server.protocol import CoreServer
 
     import skinwave.web.layout  # noqa: F401, what takes its time, before a page asks
+    from skinwave.web.access import local_only, one_line
     from skinwave.web.asked import guard
 
     guard(CoreServer)
