@@ -726,7 +726,7 @@ def test_the_process_computes_on_the_cores_that_are_idle(monkeypatch, load, thre
     monkeypatch.setattr(worker.os, "cpu_count", lambda: 4)
     monkeypatch.setattr(worker.os, "getloadavg", lambda: (load, 0.0, 0.0))
     seen, context = {}, Mock(Pipe=lambda: (Mock(recv=Mock(side_effect=EOFError)), Mock()))
-    context.Process().start = lambda: seen.update({n: os.environ[n] for n in worker.THREADS})
+    context.Process().start = lambda: seen.update({n: worker.os.environ[n] for n in worker.THREADS})
     monkeypatch.setattr(worker.multiprocessing, "get_context", lambda _: context)
     Worker(print)._start()
     assert seen.pop("MKL_NUM_THREADS") == "3", "what the user said stays"
