@@ -79,9 +79,16 @@ def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceMap:
 
 
 def body_map(
-    scene: Scene, x: Floats, y: Floats, progress: Progress | None = None, *, solver: str = "auto"
+    scene: Scene,
+    x: Floats,
+    y: Floats,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
 ) -> SurfaceMap:
-    """The body's motion, in m; x (nx,) and y (ny,) in metre.
+    """The body's motion, in m; x (nx,) and y (ny,) in metre. Finite elements are coarser
+    than by default, and at least `h` large.
 
     Raises
     ------
@@ -89,9 +96,9 @@ def body_map(
         If there is no body, or none that can be meshed.
     """
     if not has_wavenumber_integral(scene):
-        h = COARSER[scene.body.kind == "sheet"] * default_size(scene.body)
-        moved = waves(scene, REDUCED, progress, h=h, solver=solver)
-        return replace(element_map(moved, x, y), note=f"elements of {1e3 * h:.2g} mm")
+        size = max(h or 0.0, COARSER[scene.body.kind == "sheet"] * default_size(scene.body))
+        moved = waves(scene, REDUCED, progress, h=size, solver=solver)
+        return replace(element_map(moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
     compliance = exact_waves(scene.body, "flat-body-harmonic")
 
     def answer(places: Floats) -> Lines:

@@ -102,20 +102,20 @@ def first_of(names: Iterable[str]) -> str:
     return next((name for name in (*FIRST, *names) if name in names), "")
 
 
-def element_maps(scene: Scene, solver: str) -> Drawn:
+def element_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
     """A body's map by elements, cached, and the kernel's."""
     x, y = grid(scene)
     below = kernel_map(scene.pressure, x, y)
     physics = scene.body, scene.pressure
     name, names = (
-        cache.key("surface", *physics, x, y, solver, versions()),
+        cache.key("surface", *physics, x, y, h, solver, versions()),
         ("x", "y", "rms", "level"),
     )
     if (entry := cache.load(name)) is not None:
         return SurfaceMap(
             **{n: entry[n] for n in names}, unit="m", note=entry["meta"]["note"]
         ), below
-    surface = body_map(scene, x, y, solver=solver)
+    surface = body_map(scene, x, y, h=h, solver=solver)
     cache.store(name, {"note": surface.note}, **{n: getattr(surface, n) for n in names})
     return surface, below
 

@@ -77,7 +77,7 @@ def run_study(
     started = time.perf_counter()
     with helper() as aside, one_thread():
         bodies = _begun_bodies(scenes, aside, progress, h, solver)
-        maps = _begun_maps(scenes, aside, progress, solver)
+        maps = _begun_maps(scenes, aside, progress, h, solver)
         groups, prepared, figures = _answered(scenes, folder, aside, bodies, progress, h, solver)
         figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
@@ -154,11 +154,15 @@ def _prepared(
 
 
 def _begun_maps(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, solver: str
+    scenes: Mapping[str, Mapping[str, Scene]],
+    aside: Executor,
+    progress: Progress,
+    h: float | None,
+    solver: str,
 ) -> Maps:
     """The maps of the Tacton that is shown first; those of elements are begun at once, aside."""
     begun = {
-        scene.body: aside.submit(element_maps, scene, solver)
+        scene.body: aside.submit(element_maps, scene, h, solver)
         for scene in scenes[first_of(scenes)].values()
         if scene.body.kind != "none" and not has_wavenumber_integral(scene)
     }
