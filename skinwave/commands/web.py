@@ -56,5 +56,5 @@ def open_unseen(address: str, folder: Path) -> None:
     import webbrowser
 
     leading = folder / "open.html"
-    leading.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">')
+    leading.write_text(f'<meta http-equiv="refresh" content="0; url={address}">')
     webbrowser.open(leading.as_uri())

@@ -63,7 +63,7 @@ async def started(folder: str) -> PageProcess:
     except BaseException:
         if process is not None:
             kill(process)
-            await process.wait()
+            await _ended(process)
         if relay is not None:
             relay.cancel()
         shutil.rmtree(own, ignore_errors=True)
@@ -106,10 +106,18 @@ def kill(process: Any) -> None:
 
 async def gone(page: PageProcess) -> None:
     """Wait for the end of a process, and remove its temporary files."""
-    await page.process.wait()
+    await _ended(page.process)
     if page.relay is not None:
         page.relay.cancel()
     shutil.rmtree(page.folder, ignore_errors=True)
+
+
+async def _ended(process: Any) -> None:
+    """Wait for the end of a process, and close its pipes: asyncio would do so when it deletes
+    them, which may be after the loop has closed, and fail.
+    """
+    await process.wait()
+    process._transport.close()
 
 
 async def _relayed(process: Any) -> None:
