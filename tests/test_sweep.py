@@ -284,10 +284,10 @@ def test_the_limit_is_for_all_parts_together(tmp_path, monkeypatch):
 def test_lists_that_are_long_are_refused_before_they_are_decoded(tmp_path, monkeypatch):
     """Zeros take next to nothing in the file, and one batch of rows would be all of them."""
     dataset.open_folder(tmp_path)
-    lists = pa.array([np.zeros(3_000_000)])
+    lists = pa.array([np.zeros(2_000_000)])
     table = pa.table({"key": ["row"], "status": ["done"], "tacton.a": lists})
     pq.write_table(table, tmp_path / "rows/part-a.parquet")
-    assert len(dataset.read(tmp_path)[0]["tacton.a"]) == 3_000_000
+    assert len(dataset.read(tmp_path)[0]["tacton.a"]) == 2_000_000
     monkeypatch.setattr(dataset, "UNPACKED", 10_000_000)
     monkeypatch.setattr(pq.ParquetFile, "iter_batches", None)
     with pytest.raises(ValueError, match="unpacks to more than 10 MB"):

@@ -24,7 +24,7 @@ UNKNOWN = {"typed": "", "name": "sweep", "options": {}}  # the command of a fold
 LARGEST = 500_000_000  # bytes of one file
 UNPACKED = 250_000_000  # bytes of the columns that are read, of all files
 BATCH = 1000  # rows that are decoded at once
-LEAST = 4  # bytes of a value, decoded
+WIDTHS = {"DOUBLE": 8, "INT64": 8, "BOOLEAN": 1 / 8}  # bytes of a value, decoded; others 4
 MOST_ROWS, MOST_COLUMNS = 1_000_000, 1000  # of one file
 KEY, INDEX, STATUS = "key", "index", "status"  # columns: a row's name, its place, how it ended
 
@@ -258,7 +258,7 @@ def _decoded(file: Any, columns: list[str], limit: int) -> Any:
     if wrong := [field.name for field in schema if not _is_cell(field.type)]:
         raise OSError(f"'{wrong[0][:40]}' is of a type that no sweep has")
     said = f"unpacks to more than {UNPACKED / 1e6:,.0f} MB"
-    if LEAST * _count(file.metadata, columns) > limit:
+    if _least(file.metadata, columns) > limit:
         raise OSError(said)
     batches, size = [], 0
     for batch in file.iter_batches(BATCH, columns=columns):
@@ -269,11 +269,15 @@ def _decoded(file: Any, columns: list[str], limit: int) -> Any:
     return pa.Table.from_batches(batches, schema)
 
 
-def _count(told: Any, columns: Sequence[str]) -> int:
-    """Values in columns, those in lists each by itself: one row may have millions."""
+def _least(told: Any, columns: Sequence[str]) -> float:
+    """Bytes that columns take at least, each value of a list counted: one row may have millions."""
     groups = [told.row_group(k) for k in range(told.num_row_groups)]
     found = [group.column(k) for group in groups for k in range(group.num_columns)]
-    return sum(c.num_values for c in found if c.path_in_schema.partition(".list")[0] in columns)
+    return sum(
+        WIDTHS.get(c.physical_type, 4) * c.num_values
+        for c in found
+        if c.path_in_schema.partition(".list")[0] in columns
+    )
 
 
 def _check_columns(out: Path, table: Any) -> None:
