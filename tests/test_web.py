@@ -357,7 +357,7 @@ def test_lines_too_near_to_each_other_are_left_out_and_counted():
     assert answer.lines == ()
     count = len(model.untold_lines(scene, answer.response))
     assert count == 5
-    assert untold(count, 0.5) == ("5 lines cannot be told apart in 0.5 s; make the Tacton longer.")
+    assert untold(count, 0.5) == ("5 lines cannot be resolved in 0.5 s; make the Tacton longer.")
     assert untold(0, 0.5) == ""
 
 
@@ -884,7 +884,7 @@ def test_a_held_frequency_and_a_preset(session):
     assert session.state.drawing_frequency == pytest.approx(190.986, abs=1e-3)
     with session.state:
         session.state.shape, session.state.size = "square", 60
-    assert "cannot be held" in session.state.errors["hold"]
+    assert "cannot be fixed" in session.state.errors["hold"]
     with session.state:
         session.state.hold = False
     with session.state:

@@ -43,8 +43,9 @@ LEFT_OUT = (
     "simultaneous and time-multiplexed foci push alike here, devices differ.",
     "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
     "polygon, nowhere further from it than 0.01 mm.",
-    "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
-    "above the threshold for a focal spot; kernel: 4.4 Pa, just felt with AM at 200 Hz. "
+    "Detection thresholds differ by 5 dB between people. Their contour in the map of waves is where "
+    "the line with the highest sensation level is at the threshold for a focal spot; in that of the "
+    "kernel it is 4.4 Pa, the threshold with AM at 200 Hz. "
     "Maps of a rhythm are those of its pulses while they are on.",
     "Weights of the superposition multiply the two "
     "AM sinusoids; a frequency of 0 is a factor of 1.",
@@ -52,7 +53,7 @@ LEFT_OUT = (
 
 
 def control_panel(session: Session) -> None:
-    """All that can be turned."""
+    """All controls."""
     with html.Div(classes="sw-controls", id="controls"):
         v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
                    hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
@@ -142,7 +143,7 @@ def body() -> None:
 
 
 def differences() -> None:
-    """What is pinned and what is shown: where the two sets of values differ."""
+    """Differences between the values that are pinned and those that are shown."""
     columns = "<td v-for='row in differs' :key='row.name'>{{ row.%s }}</td>"
     HtmlElement("table", v_if="pinned", classes="sw-differs", id="differs", children=[
         "<tr><th scope='col'>{{ differs.length ? '' : 'A and B are the same' }}</th>"
@@ -154,18 +155,18 @@ def differences() -> None:
 
 
 def summary() -> None:
-    """What propagation and the drive law do, in a sentence each."""
+    """Effects of propagation and of the drive law, in a sentence each."""
     with html.Div(v_if="summary.length", classes="sw-summary", id="summary",
                   raw_attrs=['aria-label="What propagation changes"']):  # fmt: skip
         html.Span("{{ said + ' ' }}", v_for="said in summary", key="said")
 
 
 def warnings() -> None:
-    """What is less than was asked for, and how wrong the answer may be: as text, for sentences may
-    quote what came from a file.
+    """Warnings and the expected error of the response: as text, for sentences may quote what came
+    from a file.
     """
     with html.Div(v_if="warnings.length || expected", classes="sw-warnings", id="warnings",
-                  raw_attrs=['role="status"', 'aria-label="Warnings of this answer"']):  # fmt: skip
+                  raw_attrs=['role="status"', 'aria-label="Warnings of this response"']):  # fmt: skip
         html.P("Warning: {{ said }}", v_for="said in warnings", key="said")
         html.P("{{ expected }}", v_if="expected", id="expected")
 
@@ -185,7 +186,7 @@ def line_table() -> None:
         html.Tr(
             "<th scope='col'>line</th><th scope='col'>Hz</th><th scope='col'>Pa</th>"
             "<th scope='col'>µm</th>"
-            "<th scope='col' title='above the threshold of detection'>felt, dB</th>"
+            "<th scope='col' title='sensation level: dB above the detection threshold'>dB SL</th>"
         )
         html.Tr(
             "<td><template v-for='(part, k) in row.name.split(/<.?sub>/)' :key='k'>"
@@ -199,12 +200,12 @@ def line_table() -> None:
 
 
 def notices() -> None:
-    """What cannot be."""
+    """Error messages of the controls' values."""
     v3.VAlert("{{ problem }}", v_if="problem", type="error", density="compact", id="problem")
 
 
 def computing(session: Session) -> None:
-    """What is being computed, over where it is to be seen."""
+    """Progress of a computation, over the place of its result."""
     with html.Div(v_if="busy", id="busy", classes="sw-busy"):
         html.Div("{{ body }}: {{ busy }}{{ left ? ', ' + left : '' }}", id="busy-said")
         v3.VProgressLinear(model_value=("done",), indeterminate=("!done",), height=6)
@@ -212,7 +213,7 @@ def computing(session: Session) -> None:
 
 
 def about() -> None:
-    """What the models are, and what they leave out."""
+    """Assumptions of the models, and what they leave out."""
     with v3.VNavigationDrawer(
         v_model=("about", False), location="right", temporary=True, width=380,
         raw_attrs=['aria-label="About this model"'],

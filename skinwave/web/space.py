@@ -64,7 +64,7 @@ def _own_paths(session: Session) -> None:
     number(session, "drawn")
     options = "".join(f'<option value="{name}">{name}</option>' for name in SHAPES)
     cells = "".join(
-        # What is being typed stays when the answer to the cell before arrives.
+        # What is being typed stays when the update after the field before arrives.
         f'<td><input inputmode="decimal" :id="`own-{part}-${{k}}`" '
         f':value="draft[`{part}-${{k}}`] ?? row[{part}]" '
         f'@input="draft = {{ [`{part}-${{k}}`]: $event.target.value }}" '
