@@ -388,7 +388,7 @@ def eval_list(script, name):
 
 
 def test_a_pull_has_no_sound():
-    with pytest.raises(ValueError, match="pulls half of the time"):
+    with pytest.raises(ValueError, match="has negative pressure half of the time"):
         exported(flat(Tacton(am_frequency=80), drive="linear"), ".csv")
 
 

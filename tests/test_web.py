@@ -884,7 +884,7 @@ def test_a_held_frequency_and_a_preset(session):
     assert session.state.drawing_frequency == pytest.approx(190.986, abs=1e-3)
     with session.state:
         session.state.shape, session.state.size = "square", 60
-    assert "cannot be fixed" in session.state.errors["hold"]
+    assert "cannot be kept constant" in session.state.errors["hold"]
     with session.state:
         session.state.hold = False
     with session.state:

@@ -656,7 +656,7 @@ def test_themes_about_and_a_tablet(page):
     page.locator("#theme").click()
     page.wait_for_function("d => window.trame.state.get('dark') !== d", arg=before)
     page.locator("#about").click()
-    page.get_by_text("What is felt", exact=False).first.wait_for(state="attached")
+    page.get_by_text("Detection thresholds differ", exact=False).first.wait_for(state="attached")
     page.wait_for_timeout(400)
     photographed(page, "about")
     page.locator("#close-about").click()

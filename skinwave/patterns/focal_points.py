@@ -132,7 +132,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of what is not empty and no comment."""
+    """Line numbers and fields of the lines that are neither empty nor comments."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

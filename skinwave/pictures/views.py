@@ -1,4 +1,4 @@
-"""What pictures show of one model's answer: its surface through a period, and where it moves most.
+"""View of one model's response in pictures: its surface through a period, and where it moves most.
 
 Motion is about its mean: a steady push bends a sheet far more than its vibration does.
 """
@@ -50,7 +50,7 @@ class Trace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """One model's answer to a scene, as pictures need it.
+    """One model's response in a scene, as pictures need it.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class View:
 
     @property
     def column(self) -> str:
-        """What tables and figures know it by, as `Run.column`."""
+        """Name in tables and figures, as `Run.column`."""
         return self.model if self.body == "none" else self.body
 
     @property

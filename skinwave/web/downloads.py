@@ -53,8 +53,8 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
 
 
 async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:
-    """What a function makes, in a process of its own: the page stays live, and all that drawing
-    takes of memory is gone with it.
+    """Result of a function in a process of its own: the page stays live, and all the memory that
+    drawing takes is freed with it.
 
     Raises
     ------

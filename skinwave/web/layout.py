@@ -149,7 +149,8 @@ def _maps(session: Session) -> None:
             html.Div(
                 "<span><b aria-hidden='true' style='color:#56B4E9'>━</b> path, foci</span> "
                 "<span><b aria-hidden='true'>┄</b> border of the influence</span> "
-                "<span><b aria-hidden='true' style='color:#CC4FA0'>━</b> detection threshold</span> "
+                "<span><b aria-hidden='true' style='color:#CC4FA0'>━</b> detection threshold"
+                "</span> "
                 "<span><b aria-hidden='true' style='color:#D55E00'>✕</b> selected</span>",
                 classes="sw-caption sw-legend",
             )

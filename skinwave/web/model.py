@@ -42,7 +42,7 @@ MOST_SHOWN = 1500  # points of a curve
 MOST_ENVELOPE = 600  # of the commanded Tacton without its carrier
 HIGHEST = 1000.0  # Hz of spectra
 FAINTEST = 1e-3  # of the strongest line: weaker ones are not named
-UNTRUSTED = 0.5  # of a response is left out: lines that the rest does not resolve are not named
+UNTRUSTED = 0.5  # share of a response left to settle: lines unresolved in the rest are not named
 RESOLVED = 10  # samples of a period of the carrier
 SMOOTH = 16  # and of the fastest modulation, whose peaks are then within 2 %
 

@@ -47,7 +47,7 @@ def controlled(session: Session) -> None:
 
 def turn(session: Session, given: Values, whole: bool = False) -> None:
     """Set controls; what is refused is marked at its field, which keeps what was typed, for it may
-    be half of a number. A `whole` Tacton brings its own drawing frequency, fixed from then.
+    be half of a number. A `whole` Tacton brings its own drawing frequency, constant from then.
     """
     state = session.state
     accepted, errors, typed = _checked(session, given)
@@ -64,7 +64,7 @@ def turn(session: Session, given: Values, whole: bool = False) -> None:
             values |= scenes.held(values, moved[-1], state.held_frequency)
             errors.pop("hold", None)
         except ValueError as error:
-            errors["hold"] = f"the drawing frequency cannot be fixed: {error}"
+            errors["hold"] = f"the drawing frequency cannot be kept constant: {error}"
     state.update({"errors": errors, "typed": typed})
     put(session, values)
     session.history.push(values)

@@ -1,5 +1,4 @@
-"""Process that computes a body's response, so that a page never waits: newest request first, cancel.
-"""
+"""Process that computes responses of bodies while a page stays live: newest request first."""
 
 import contextlib
 import multiprocessing
