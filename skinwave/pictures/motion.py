@@ -58,7 +58,7 @@ def waves(
     h: float | None = None,
     solver: str = "auto",
 ) -> Waves:
-    """Whole body's motion at any times, from which `skinwave.field` is made; raises what it does."""
+    """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
     check_knobs(solver, h=h)
     clock, report = Clock(), progress or silent
     build = meshed(scene.body, h, clock, report)

@@ -60,9 +60,9 @@ class View:
     times : (f,) float, s, through the part of the steady state that is played, `period`: that of
         the whole pattern, see `speeds.shown_part`
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
-    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the level in
-        dB of its strongest line above the threshold of detection, of the point kernel above that
-        of a pressure; minus infinity where nothing vibrates, and on a sheet, which is no skin
+    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the highest
+        sensation level of its lines in dB, of the point kernel above the threshold of a pressure;
+        minus infinity where nothing vibrates, and on a sheet, which is no skin
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
     ray : outwards along x from the path's outermost point; track : along the path, None if the
         focus rests; both in the steady state, about the mean

@@ -205,9 +205,9 @@ RMS = (
     "RMS motion about its mean over the whole steady state, relative to each model's largest. All "
     "models receive the same load, so that a body's map differs from the kernel's by propagation "
     "alone. Spread is the distance of the outermost -6 and -20 dB from the centre of the path. "
-    "Detection contour: where the line of a body's motion with the highest sensation level is at "
-    "the threshold for a focal spot; where the point kernel's peak pressure is 4.4 Pa, the "
-    "threshold with AM at 200 Hz."
+    "Detection contour: where the line with the highest sensation level is at threshold: of a "
+    "body, the displacement threshold for a focal spot; of the point kernel, 2.2 Pa at 200 Hz (a "
+    "peak of 4.4 Pa with AM), at other frequencies in proportion to the displacement threshold."
 )
 DIFFERENCE = (
     "What propagation changes: the level of a body's RMS motion minus that of the point kernel's "

@@ -152,8 +152,8 @@ def places(side: int = SIDE) -> Floats:
 
 
 def kernel_map(pressure: MovingPressure) -> Map:
-    """Where the pressure changes, of a rhythm while a pulse is on; and where the strongest line of
-    it, of a rhythm with its pauses, is at the threshold of skin.
+    """RMS pressure about its mean, of a rhythm while a pulse is on; and the contour where the line
+    with the highest sensation level, of a rhythm with its pauses, is at the threshold of skin.
     """
     tacton = replace(pressure.tacton, rhythm=None)
     path = tacton.trajectory
@@ -219,7 +219,7 @@ def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
 
 
 def influenced(tacton: Tacton, height: float) -> tuple[Floats, ...]:
-    """The borderline of the influenced area: as far from a path as the main lobe reaches."""
+    """Contour of the influenced area: as far from a path as the main lobe reaches."""
     return _influenced(at_any_speed(tacton.trajectory), tacton.n_paths, height)
 
 

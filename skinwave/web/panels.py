@@ -43,9 +43,10 @@ LEFT_OUT = (
     "simultaneous and time-multiplexed foci push alike here, devices differ.",
     "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
     "polygon, nowhere further from it than 0.01 mm.",
-    "Detection thresholds differ by 5 dB between people. Their contour in the map of waves is "
-    "where the line with the highest sensation level is at the threshold for a focal spot; in "
-    "that of the kernel it is 4.4 Pa, the threshold with AM at 200 Hz. "
+    "Detection thresholds differ by 5 dB between people. The contour in a map is where the line "
+    "with the highest sensation level is at threshold: of waves, the displacement threshold for a "
+    "focal spot; of the kernel, 2.2 Pa at 200 Hz (a peak of 4.4 Pa with AM), at other frequencies "
+    "in proportion to the displacement threshold. "
     "Maps of a rhythm are those of its pulses while they are on.",
     "Weights of the superposition multiply the two "
     "AM sinusoids; a frequency of 0 is a factor of 1.",
@@ -166,7 +167,7 @@ def warnings() -> None:
     from a file.
     """
     with html.Div(v_if="warnings.length || expected", classes="sw-warnings", id="warnings",
-                  raw_attrs=['role="status"', 'aria-label="Warnings of the response"']):  # fmt: skip
+                  raw_attrs=['role="status"', 'aria-label="Warnings and errors"']):  # fmt: skip
         html.P("Warning: {{ said }}", v_for="said in warnings", key="said")
         html.P("{{ expected }}", v_if="expected", id="expected")
 

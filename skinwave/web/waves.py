@@ -223,8 +223,8 @@ def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
 
 def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> Map:
     """The map of lines (f,) in Hz whose complex amplitudes (f, SIDE^2) in metre are known, of a
-    rhythm while a pulse is on; and where the strongest line, of a rhythm with its pauses as in the
-    table of lines, is at the threshold, which a sheet has not.
+    rhythm while a pulse is on; and the contour where the line with the highest sensation level, of
+    a rhythm with its pauses as in the table of lines, is at the threshold, which a sheet has not.
     """
     amplitudes = np.abs(motion)
     felt = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
