@@ -219,7 +219,7 @@ def test_a_banner_shows_the_worst_of_sentences_that_differ_by_numbers():
 
 
 def test_deprecations_are_errors_where_they_are_ours():
-    """What other packages will no longer do for each other is theirs to mend."""
+    """Deprecations between other packages are theirs to mend."""
     for module in ("fem", "meshes.files", "simple_model.drive", "skinwave.web.serve"):
         for kind in (DeprecationWarning, PendingDeprecationWarning):
             with pytest.raises(kind):

@@ -1,4 +1,4 @@
-"""Pattern files come in, go out and come back; what is malformed is refused in one line."""
+"""Pattern files: import, export and round trip; what is malformed is refused in one line."""
 
 import json
 from dataclasses import replace

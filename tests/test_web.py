@@ -809,7 +809,7 @@ def test_waves_are_stale_until_they_are_answered(session):
     answer = waves.Waves()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number - 1, answer)
-    assert session.state.waves_stale, "an older answer is not shown"
+    assert session.state.waves_stale, "an older response is not shown"
     with session.state:
         step = Step(phase="reduce", number=4, of=5, done=0.5, left=21.0)
         told(session, "progress", session.number, step)
@@ -837,16 +837,17 @@ def test_waves_are_stale_until_they_are_answered(session):
 def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
     answer = waves.Waves()(session.scene, nothing)
     effort = replace(
-        answer.response.effort, warnings=("wrong by about 18 %", "wrong by about 18 %")
+        answer.response.effort,
+        warnings=("relative error of about 18 %", "relative error of about 18 %"),
     )
     answer = replace(answer, response=replace(answer.response, effort=effort))
     assert session.state.warnings == []
     with session.state:
         told(session, "answer", session.number, answer)
-    assert session.state.warnings == ["wrong by about 18 %"]
+    assert session.state.warnings == ["relative error of about 18 %"]
     with session.state:
         session.state.am = 150
-    assert session.state.warnings == [], "they are of another answer"
+    assert session.state.warnings == [], "they are of another response"
 
 
 def test_the_first_sentences_say_what_each_difference_changes(session):
@@ -1144,7 +1145,7 @@ def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypat
         answer = await one.open(asked)
         assert isinstance(answer, web.Response)
         assert answer.status == (200 if says else 503)
-        # The one that was prepared, and the one that is started instead of it.
+        # The spare process, and the one that is started instead of it.
         assert (len(one._unclaimed), len(ends)) == ((1, 0) if says else (0, 2))
         assert (one.turns.opening, one.turns.there) == (0, 1 if says else 0)
         await asyncio.sleep(0.3)

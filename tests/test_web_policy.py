@@ -1,4 +1,4 @@
-"""What a browser shows of pages that wait or are refused, and that no text becomes a script."""
+"""Pages that wait or are refused, as a browser shows them, and no text becomes a script."""
 
 import re
 import stat
