@@ -135,7 +135,7 @@ def test_a_scene_that_no_control_says_is_refused_by_the_command(tmp_path, capsys
     path = tmp_path / "own.toml"
     path.write_text('[tacton]\nshape = "polyline"\npoints_mm = [[0, 0], [5, 5]]\n')
     assert main(["web", str(path)]) == 2
-    assert "a path of its own points cannot be turned here" in capsys.readouterr().err
+    assert "a path of its own points cannot be set here" in capsys.readouterr().err
 
 
 # Controls
@@ -1220,7 +1220,7 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
 @pytest.mark.parametrize(
     ("focus", "said"),
     [
-        ("peak_pressure_pa = 80", "a peak_pressure_pa of 80 cannot be turned here"),
+        ("peak_pressure_pa = 80", "a peak_pressure_pa of 80 cannot be set here"),
         ('drive = "pressure_squared"\ndepth_of_modulation = 0.5', "a depth_of_modulation of 0.5"),
         ('profile = "array"', "profile = array of the focus"),
     ],

@@ -55,8 +55,7 @@ def read(content: bytes, options: Options) -> Pattern:
         raise ValueError("intensity must lie in 0..1, the sound pressure over that at full drive")
     if len(points) > 1:
         notes.append(
-            f"{len(points)} points at a time: each pushes with 1/{len(points)} of the pressure of "
-            "one alone"
+            f"{len(points)} points at a time: each has 1/{len(points)} of the pressure of one alone"
         )
     if not tidy:
         notes.append(f"samples at {options.rate:g} Hz")

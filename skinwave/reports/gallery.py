@@ -231,9 +231,9 @@ WAVES = (
 )
 LOADS = (
     "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "
-    "others have the scene's: what the two kernels differ by, drive law and focal spot change."
+    "others have the scene's: the two kernels differ by drive law and focal spot."
 )
-PROPAGATED = "What a body differs by from the kernel under the same load, propagation changes."
+PROPAGATED = "A body differs from the kernel under the same load by propagation alone."
 FELT = (
     "Lines of the motion at the probe that moves most, and the detection threshold (for a focal "
     "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."

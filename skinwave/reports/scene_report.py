@@ -247,7 +247,7 @@ def _comparison(album: Album) -> list[str]:
     long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
     verdicts = evaluate(long)
     if verdicts:
-        parts.append(document.paragraph("What Lim, Seifi and Park state, evaluated on these runs:"))
+        parts.append(document.paragraph("Claims of Lim, Seifi and Park, evaluated on these runs:"))
         parts.append(tables.claims_table(verdicts))
     return parts or [document.paragraph("There is one model only.")]
 
@@ -264,9 +264,9 @@ def _trust(album: Album) -> list[str]:
         effort = run.response.effort
         if effort.dofs:
             found.append(
-                f"{label(run.body)}: the work of the load and what has become of it differ by "
-                f"{effort.energy_imbalance:.0e} of either (refused beyond 1e-2); reduction leaves "
-                f"an estimated {significant(100 * effort.estimate, 2)} %."
+                f"{label(run.body)}: relative error of the energy balance "
+                f"{effort.energy_imbalance:.0e} (refused beyond 1e-2); estimated relative error of "
+                f"the reduced-order model {significant(100 * effort.estimate, 2)} %."
             )
     trust: Mapping[str, Any] = album.trust or {}
     if {"misfit", "model"} <= trust.keys():

@@ -25,12 +25,12 @@ PROFILES = {
 }
 REACH_MM = NUMBERS["x"].high
 LEFT_OUT = (
-    "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): a skin point feels the pressure of the "
-    "focus where it is, weighted by distance. Nothing propagates, no body deflects. <i>Kernel, "
-    "same load</i> has the drive law and focus profile that are chosen, as every body has; "
-    "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. What "
-    "drive and profile change is the one against the other; what propagation changes is the waves "
-    "against the kernel under the same load.",
+    "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): the stimulus at a point of the skin is "
+    "the pressure of the focus, weighted by distance. Nothing propagates, no body deflects. "
+    "<i>Kernel, same load</i> has the drive law and focus profile that are chosen, as every body; "
+    "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. These two "
+    "differ by drive law and profile; waves and the kernel under the same load differ by "
+    "propagation.",
     "<b>Skin slab</b>: wavenumber integral of an infinite flat layer of soft tissue of 15 mm on "
     "bone; no sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
@@ -40,9 +40,9 @@ LEFT_OUT = (
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
     "pressure, 50 Pa at full drive, is uncertain by a factor of 2. Air is left out.",
     "Side lobes of the focus, and what several simultaneous foci do to each other, are left out: "
-    "simultaneous and time-multiplexed foci push alike here, devices differ.",
-    "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
-    "polygon, nowhere further from it than 0.01 mm.",
+    "simultaneous and time-multiplexed foci are the same load here, devices differ.",
+    "Foci on paths of their own have equal pressure and are drawn equally often; a circle is then "
+    "a polygon, nowhere further from it than 0.01 mm.",
     "Detection thresholds differ by 5 dB between people. The contour in a map is where the line "
     "with the highest sensation level is at threshold: of waves, the displacement threshold for a "
     "focal spot; of the kernel, 2.2 Pa at 200 Hz (a peak of 4.4 Pa with AM), at other frequencies "

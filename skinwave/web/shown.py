@@ -80,15 +80,15 @@ def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
         return [drive]
     share = 100 * share_outside(kernel.map.rms, waves.map.rms)
     texts = [
-        f"Waves carry {share:.0f} % of the motion in this area to where the point kernel, under "
-        "the same load, predicts less than a tenth of its largest.",
+        f"Waves carry {share:.0f} % of the mean-square motion in this area to where the point "
+        "kernel, under the same load, predicts less than a tenth of its largest.",
         drive,
     ]
     levels = {line: line.sensation for line in waves.lines if line.sensation is not None}
     if levels:
         line = max(levels, key=lambda each: levels[each])
         texts.append(
-            f"Strongest at the selected point: {line.name}, {line.frequency:.0f} Hz, "
+            f"Highest sensation level at the selected point: {line.name}, {line.frequency:.0f} Hz, "
             f"{levels[line]:+.0f} dB re threshold."
         )
     return texts

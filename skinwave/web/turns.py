@@ -13,7 +13,7 @@ AT_ONCE = 2  # pages that are opened at a time: more of them wait for each other
 FORGOTTEN = 5.0  # s after which a page that does not ask any more has left the line
 LONGEST_LINE = 1000
 FULL = (
-    f"{MOST} pages are open, as many as skinwave keeps at a time; this one opens as soon as "
+    f"{MOST} pages are open, as many as skinwave allows at a time; this one opens as soon as "
     "another is closed"
 )
 BUSY = f"Other pages are being opened, {AT_ONCE} at a time; this one opens when it is its turn"
