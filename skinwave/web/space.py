@@ -54,7 +54,7 @@ def _one_path(session: Session) -> None:
     html.Div("drawing frequency: <b id='drawing'>{{ drawing_frequency.toFixed(2) }} Hz</b>",
              classes="sw-note")  # fmt: skip
     v3.VCheckbox(v_model=("hold", False), density="compact", hide_details=True, id="hold",
-                 label="keep it constant while size or speed changes")  # fmt: skip
+                 label="constant drawing frequency")  # fmt: skip
     error("hold")
     with html.Div(v_if="foci > 1"):
         text(session, "phases", "Phases in % of the path, such as 0, 25, 60; empty is even")
