@@ -20,7 +20,7 @@ settings.load_profile("repeatable")
 
 @pytest.fixture(scope="session", autouse=True)
 def fresh_cache(tmp_path_factory):
-    """Tests prepare bodies themselves, whatever this machine prepared before; workers share."""
+    """Cold cache of the tests, whatever this machine has cached before; workers share it."""
     base = tmp_path_factory.getbasetemp()
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
     os.environ["SKINWAVE_CACHE"] = str(base / "cache")

@@ -29,7 +29,7 @@ sides = "clamped"
 points_mm = [[0, 0], [5, 0]]
 """
 SILENT_GROUND = GOOD.replace("[body]", "[body]\nkind = 'none'")  # planned without computing
-# A scene that is answered in a second.
+# A scene that takes a second to compute.
 SMALL = """
 name = "short"
 [tacton]
@@ -113,7 +113,7 @@ WHOLE_FILES = {
     "material has a key of its own": "[body.material]\nyoung_pa = 1e4\n" + MATERIAL,
     "incompressible": "[body.material]\n" + MATERIAL.replace("0.45", "0.5"),
     "beyond Poisson": "[body.material]\n" + MATERIAL.replace("0.45", "-1.0"),
-    "flies away": "[body]\nbase = 'free'\nsides = 'free'",
+    "unconstrained": "[body]\nbase = 'free'\nsides = 'free'",
     "endless sheet": "[body]\nkind = 'sheet'\ndepth_mm = inf",
     "path off the body": "[tacton]\nshape = 'square'\nsize_mm = 60\n[body]\nwidth_mm = 59",
     "drawn too fast": "[tacton]\nshape = 'circle'\nsize_mm = 1e-300\nspeed_m_per_s = 1e300",
@@ -275,7 +275,7 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
 
 
 def broken_meshes() -> dict[str, Callable[[], object]]:
-    """Calls that no mesh, operator or answer comes of."""
+    """Calls that result in no mesh, operator or response."""
 
     def tet(**fields: object) -> Callable[[], object]:
         return lambda: TetMesh(**({"points": CORNERS, "tets": [[0, 1, 2, 3]]} | fields))  # type: ignore[arg-type]

@@ -79,7 +79,7 @@ RUN = ("run", "FILE", "--model", "point-kernel", "--quiet")
 
 
 def scenes() -> dict[str, Write]:
-    """Scenes, some of which are still answered."""
+    """Scenes, some of which are still computed."""
     rng, good = random.Random(SEED), tomli_w.dumps(QUICK)
     texts = {
         "dotted keys on one line": ".".join(["a"] * 20_000) + " = 1",
@@ -246,7 +246,7 @@ def patterns() -> dict[str, Write]:
 
 
 def special_files() -> dict[str, Write]:
-    """What is no file at all, in the place of each kind of file."""
+    """Special files, which are no regular files, in the place of each kind of file."""
     commands = {
         "scene": ("x.toml", *RUN), "swept": ("x.toml", "sweep", "FILE", "--vary",
                                             "tacton.size_mm=1,2"),
@@ -469,7 +469,7 @@ def tables() -> dict[str, Write]:
 
 
 def requests() -> dict[str, Write]:
-    """What a command is asked for, on a good scene."""
+    """Arguments of commands, on a good scene."""
     asked = [
         ["sweep", "FILE", "--vary", vary]
         for vary in (

@@ -18,7 +18,7 @@ ANSWERED = 60.0  # s
 
 
 class Refused(Exception):
-    """What the server says of why a page is not opened."""
+    """Reason of the server for not opening a page."""
 
 
 @dataclass(kw_only=True)
@@ -30,7 +30,7 @@ class Client:
     parts: UnChunker = field(default_factory=UnChunker)
 
     async def call(self, method: str, *given: Any) -> dict[str, Any]:
-        """What the page's process answers: a "result" or an "error".
+        """Reply of the page's process: a "result" or an "error".
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Client:
 
 
 def browser() -> aiohttp.ClientSession:
-    """What keeps cookies, of addresses by number, too."""
+    """Client session that keeps cookies, of addresses by number, too."""
     return aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True))
 
 

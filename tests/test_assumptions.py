@@ -272,8 +272,8 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     # with a mean in the load its lines at multiples of f_d come from nothing
     assert effects["linear drive"]["decibel"]["f_d"] > 40
     assert effects["continuous path"]["waveform"] < 0.1 < effects["no propagation"]["waveform"]
-    # One stands beside the ladder, sides that absorb are endless anyway, and the array's field has
-    # no profile of its own.
+    # One is a side step, absorbing sides stand for an infinite body anyway, and the array's field
+    # has no profile of its own.
     told = {name for name, e in effects.items() if e["alone"] is not None}
     assert told == set(effects) - {"viscous loss", "endless", "sinc^2 profile"}
     assert all(rung["seconds"] > 0 for rung in record["rungs"])

@@ -83,7 +83,7 @@ def test_layers_that_do_not_fit_are_refused():
 
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 40.0])
 def test_a_tilted_body_feels_the_cosine_of_what_a_flat_one_does(degrees):
-    """cos^2 of the incidence on a spot that is longer by 1/cos."""
+    """cos^2 of the incidence on a focal spot that is longer by 1/cos."""
     made = build(replace(SKIN.body, placement=Placement(tilt_y=np.radians(degrees))), 0.006)
     P, points = surface_load(made)
     # above or below the plane the focus is weaker; that is not asked here
@@ -170,7 +170,7 @@ def test_the_layer_around_a_body_damps_nothing_in_it():
 
 @pytest.mark.slow
 def test_a_body_of_half_the_size_answers_alike():
-    """What its sides send back is all that is different."""
+    """Only the waves that its sides reflect differ."""
     scene = replace(SKIN, probes=((0.0, 0.0), (0.01, 0.0), (0.015, 0.0)))
     whole, half = (
         compute(replace(scene, body=Body(width=side, height=side)), "fem", h=0.004)
@@ -387,7 +387,7 @@ def test_a_palm_without_relief_is_a_slab_with_round_edges():
 
 @pytest.mark.slow
 def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
-    """Sides free, ends with dashpots, and cells that do not cut the sharp rim off."""
+    """Sides free, ends with dashpots, and elements that do not cut the sharp rim off."""
     size = {"width": 0.07, "height": 0.07, "depth": 0.01, "material": "forearm"}
     flat = Relief(
         cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
@@ -475,7 +475,7 @@ def test_tactons_are_compared_on_the_body_of_a_file(block_file, tmp_path, monkey
 
 @pytest.mark.slow
 def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, monkeypatch):
-    """Of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
+    """Hand of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.1)))
     (tmp_path / "scene.toml").write_text(dumps(scene))

@@ -176,7 +176,7 @@ def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal)
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 def test_ctrl_c_leaves_what_is_finished(tmp_path, monkeypatch):
-    monkeypatch.setenv("SKINWAVE_CACHE", "")  # or nothing is to be prepared
+    monkeypatch.setenv("SKINWAVE_CACHE", "")  # or no body is left to reduce
     command = [sys.executable, "-m", "skinwave", "compare", "--h", "8"]
     command += ["--out", str(tmp_path / "cut")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
@@ -211,7 +211,7 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
 
 
 def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
-    """A run that was left to plan itself, with a ladder of meshes that ends too early."""
+    """A run that was left to plan itself, with a sequence of meshes that ends too early."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
     (tmp_path / "scene.toml").write_text(

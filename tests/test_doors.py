@@ -208,18 +208,18 @@ def test_one_function_gives_the_sentences_of_any_response():
 
 def test_a_banner_shows_the_worst_of_sentences_that_differ_by_numbers():
     efforts = [
-        (f"run {k}", Effort(warnings=(f"wrong by {x} %, more than 5 %", *more)))
+        (f"run {k}", Effort(warnings=(f"relative error of {x} %, more than 5 %", *more)))
         for k, (x, more) in enumerate([(8, ()), (12.5, ("<not> held",)), (9, ())])
     ]
     banner = document.warnings_banner(efforts)
-    assert "Take care: wrong by 12.5 %, more than 5 % (run 1, and 2 more)." in banner
+    assert "Take care: relative error of 12.5 %, more than 5 % (run 1, and 2 more)." in banner
     assert "Take care: &lt;not&gt; held (run 1)." in banner
     assert banner.count("<p>") == 2
     assert document.warnings_banner([("a", Effort())]) == ""
 
 
 def test_deprecations_are_errors_where_they_are_ours():
-    """What other packages will no longer do for each other is theirs to mend."""
+    """Deprecations between other packages are theirs to mend."""
     for module in ("fem", "meshes.files", "simple_model.drive", "skinwave.web.serve"):
         for kind in (DeprecationWarning, PendingDeprecationWarning):
             with pytest.raises(kind):

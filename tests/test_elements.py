@@ -1,4 +1,4 @@
-"""What a finite element must do exactly."""
+"""Properties that a finite element must have exactly."""
 
 from itertools import product
 from math import factorial

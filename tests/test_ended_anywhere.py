@@ -68,7 +68,7 @@ def words(name):
 
 
 def prepared(folder):
-    """What is the user's own: a scene, a surface, notes, and the folder of a run."""
+    """Files of the user: a scene, a surface, notes, and the folder of a run."""
     (folder / "good.toml").write_text(corpus.GOOD)
     (folder / "notes.partial").mkdir()
     (folder / "notes.partial/note.txt").write_text("mine")
@@ -183,7 +183,7 @@ def running(token, patience):
 
 
 def end_now(token):
-    """What a killed command leaves ends by itself, or here; it must not disturb the next."""
+    """End processes that a killed command left, unless they end by themselves, before the next."""
     for number in running(token, 5.0):
         with contextlib.suppress(ProcessLookupError):
             os.kill(number, signal.SIGKILL)

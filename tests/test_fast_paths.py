@@ -26,7 +26,7 @@ from skinwave.simulation import compute
 PALM = slab(density=1000, shear_modulus=25e3, viscosity=5.0, poisson=0.4999, depth=0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
 TIMES = np.arange(4000) / 1e4
-LATE = slice(2500, 3800)  # the free vibration has died, the end is not felt
+LATE = slice(2500, 3800)  # the transient has died out, and the end has no effect yet
 SKIN = Body(width=0.06, height=0.06)
 
 

@@ -1,4 +1,4 @@
-"""Exact waves of endless bodies: what they say of a moving focus, and limits of each other."""
+"""Wavenumber integrals of infinite layers: response to a moving focus, and limits of each other."""
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def test_a_transient_settles_into_the_steady_state(body):
 
 
 def test_waves_arrive_when_they_can():
-    """A push that starts at once is felt at 40 mm only after the Rayleigh wave's travel time."""
+    """A step load moves a point at 40 mm only after the Rayleigh wave's travel time."""
     body = half_space(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=0.5)
     times = np.arange(600) / 2e4
     load = MovingPressure(tacton=Tacton(duration=0.03))
@@ -127,7 +127,7 @@ def test_load_lines_add_up_to_the_load():
     ],
 )
 def test_every_wave_of_a_layer_is_on_its_side_of_the_path(poisson, depth, viscosity, frequency):
-    """Beside the integral along the real axis itself."""
+    """Compared with the integral along the real axis itself."""
     layer = slab(
         density=1000, shear_modulus=25e3, poisson=poisson, depth=depth, viscosity=viscosity
     )

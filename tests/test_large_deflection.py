@@ -1,4 +1,4 @@
-"""What large displacement does beyond the cases of the verification suite, and what it refuses."""
+"""Large displacement beyond the cases of the verification suite, and what it refuses."""
 
 from dataclasses import replace
 from itertools import islice
@@ -205,7 +205,7 @@ def test_the_plan_of_a_nonlinear_sheet_says_what_is_wrong_with_large_elements():
 
 @pytest.mark.parametrize("model", ["fem-nonlinear", "fem-nonlinear-transient"])
 def test_a_lifted_sheet_feels_what_the_focus_has_left_there(model):
-    """Under next to no pressure, where the answer is in proportion."""
+    """Under next to no pressure, where the response is linear."""
     still = Tacton(am_frequency=140, duration=0.02)
     scene = replace(SCENE, pressure=MovingPressure(tacton=still, peak_pressure=1e-3))
     lifted = replace(scene, body=replace(scene.body, placement=Placement(lift=0.02)))

@@ -324,7 +324,7 @@ def test_steady_lines_of_a_linear_body_are_those_of_its_load(seed):
     assert left[4:].max() < 1e-3 * max(a.max() for a in table.amplitudes.values())
 
 
-# What is felt
+# Sensation level
 
 
 def test_levels_are_of_what_vibrates_and_of_skin_only():

@@ -58,7 +58,7 @@ def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
 
 
 def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):
-    """Which components exist is the same in the kernel under the same load and in linear bodies."""
+    """The same components exist in the kernel under the same load and in linear bodies."""
     for claim in ("S1", "S2", "S3", "S5", "M1", "M2", "M3"):
         verdicts = {
             column: claims[column, claim]["holds"]

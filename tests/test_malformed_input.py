@@ -1,4 +1,4 @@
-"""What is malformed is refused in one line that says what is wrong, and leaves nothing behind."""
+"""Malformed input is refused in one line that says what is wrong, and leaves nothing behind."""
 
 import os
 import subprocess
@@ -32,7 +32,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def said(capsys, folder, arguments, codes=(2,)):
-    """What a refused command printed, in its one line; "" if it was not refused."""
+    """Error message of a refused command, in its one line; "" if it was not refused."""
     before, started = corpus.contents(folder), time.perf_counter()
     code = main(arguments)
     printed = capsys.readouterr().err

@@ -29,7 +29,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="links, permissions a
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a scene that is answered at once."""
+    """A folder with a scene that takes no time to compute."""
     (tmp_path / "none.toml").write_text(corpus.SILENT_GROUND)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -606,7 +606,7 @@ def test_an_interrupt_without_a_finished_run_leaves_nothing(folder, capsys, monk
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, OSError])
 def test_half_a_run_is_none(folder, monkeypatch, error):
-    """What is left of one that is written while another is there can be opened."""
+    """Files left of a run that is written while another is there can be opened."""
 
     def fails(path, effort):
         raise error

@@ -91,7 +91,7 @@ def ran(folder):
 
 
 def reported(folder):
-    """Of a folder of results that someone else has made."""
+    """Report of a folder of results that someone else has made."""
     ran(folder)
     result = folder / "out"
     row = {"what": HOSTILE, "value": HOSTILE, "reason": HOSTILE}

@@ -1,4 +1,4 @@
-"""Pattern files come in, go out and come back; what is malformed is refused in one line."""
+"""Pattern files: import, export and round trip; what is malformed is refused in one line."""
 
 import json
 from dataclasses import replace
@@ -388,7 +388,7 @@ def eval_list(script, name):
 
 
 def test_a_pull_has_no_sound():
-    with pytest.raises(ValueError, match="pulls half of the time"):
+    with pytest.raises(ValueError, match="has negative pressure half of the time"):
         exported(flat(Tacton(am_frequency=80), drive="linear"), ".csv")
 
 

@@ -52,7 +52,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def folder(scene, tmp_path_factory):
-    """What the report of a scene is built from, on coarse meshes."""
+    """Folder that the report of a scene is built from, on coarse meshes."""
     out = tmp_path_factory.mktemp("album")
     asked = {"h": 0.012, "frames": 12, "beside": ["paper-sheet"], "command": "as tested"}
     album.make(out, scene, lambda phase, done: None, **asked)
@@ -168,7 +168,7 @@ def test_waves_spread_further_than_the_kernel(seen):
 
 @pytest.mark.slow
 def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
-    """By the slope of the x-t diagram outside the path, beside Rayleigh's speed and exact waves."""
+    """Slope of the x-t diagram outside the path, Rayleigh speed, and wavenumber integral."""
     body = Body(width=0.1, height=0.1, material=replace(PRESETS["palm"], viscosity=2.0))
     scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
     view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.1, h=0.004), (0.02, 4))

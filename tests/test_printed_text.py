@@ -1,4 +1,4 @@
-"""What comes from a user's file or name is shown by terminals and spreadsheets, and not obeyed."""
+"""Text from a user's file or name is shown by terminals and spreadsheets, and not obeyed."""
 
 import csv
 import io

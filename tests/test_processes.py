@@ -1,4 +1,4 @@
-"""What a hostile working folder does to every command, and what ends with what."""
+"""Hostile working folders have no effect on commands; and processes end with those they serve."""
 
 import os
 import shutil
@@ -28,7 +28,7 @@ LOOKED_UP = pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="looks pr
 
 
 def loaded_before_us():
-    """What `python -m` itself looks for before any of this program is run."""
+    """Modules that `python -m` itself looks for before any of this program is run."""
     code = "import runpy, sys; print(*{name.split('.')[0] for name in sys.modules})"
     return set(subprocess.check_output([sys.executable, "-P", "-c", code], text=True).split())
 
@@ -57,7 +57,7 @@ def hostile(request, tmp_path):
 
 
 def run_there(hostile, *arguments, code=0, threads="1", timeout=None):
-    """What a command says there; after so many s it is told to end."""
+    """Output of a command there; after so many s it is told to end."""
     command, place, ran = hostile
     env = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), threads)
     env |= {"TMPDIR": str(place.parent)}
@@ -234,7 +234,7 @@ def alive(number):
 
 
 def gone(numbers, patience=10.0):
-    """Which of these processes are left after a while."""
+    """Wait for the end of these processes; those that are left after a while."""
     last = time.monotonic() + patience
     while (left := [n for n in numbers if alive(n)]) and time.monotonic() < last:
         time.sleep(0.05)

@@ -1,4 +1,4 @@
-"""What propagation changes, and nothing else: kernel and bodies under the same load."""
+"""Effect of propagation, and of nothing else: kernel and bodies under the same load."""
 
 from dataclasses import replace
 from math import inf, pi
@@ -225,7 +225,7 @@ def test_a_constant_pressure_at_rest_moves_nothing(drive):
 
 
 def test_the_strongest_component_is_one_of_amplitude_in_kernel_and_body():
-    """What is felt most follows from the threshold, which is not propagation's."""
+    """The highest sensation level follows from the threshold, which is not propagation's."""
     scene = Scene(pressure=MovingPressure(tacton=circle(80, 0, 0)), body=Body())
     _, kernel, run = beside_kernels(_run(scene, "flat-body-harmonic"))
     found = propagation(run, kernel)

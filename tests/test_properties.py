@@ -1,4 +1,4 @@
-"""What holds for every load, body and mesh, on examples that Hypothesis draws."""
+"""Properties of every load, body and mesh, on examples that Hypothesis draws."""
 
 import warnings
 from dataclasses import replace

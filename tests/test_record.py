@@ -1,4 +1,4 @@
-"""Results that say how they came about, can be had again, and are held against each other."""
+"""Results with a record of their command, repeated by it, and compared with each other."""
 
 import json
 import os

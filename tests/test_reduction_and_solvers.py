@@ -1,4 +1,4 @@
-"""Every solver gives the same answer, and the reduced model gives the large one's."""
+"""Every solver has the same solution, and the reduced-order model that of the full one."""
 
 import sys
 from dataclasses import replace
@@ -117,7 +117,7 @@ def body(kind, h=0.1 / 24):
 
 
 def reduced_for_circling(kind, h=0.1 / 24):
-    """A body, what pushes and reads it, and its reduced model."""
+    """A body, its load and probe operators, and its reduced-order model."""
     mesh, ops = body(kind, h)
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
     S = fem.probe_operator(mesh, PROBES)

@@ -1,4 +1,4 @@
-"""Scene files: what they default to, what they refuse, and that they come back as written."""
+"""Scene files: defaults, refusals, and the round trip from text to scene and back."""
 
 import re
 from math import inf

@@ -177,7 +177,7 @@ def test_the_estimate_knows_the_law(block):
     exact = fem.harmonic(ops, force, hertz) @ S.T
     error = np.linalg.norm(found - exact, axis=1) / np.linalg.norm(exact, axis=1)
     assert error.max() < 3 * model.estimate <= 0.015
-    # Without the law the same space answers another body.
+    # Without the Maxwell branch the same space is that of another body.
     elastic = fem.transfer(
         replace(model, branches=()), (model.basis.T @ force)[:, None], hertz
     )[:, :, 0]  # fmt: skip

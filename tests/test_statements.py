@@ -1,4 +1,4 @@
-"""What pages state of a run follows from its scene."""
+"""Claims of pages about a run follow from its scene."""
 
 from dataclasses import replace
 
@@ -99,7 +99,7 @@ def test_lines_that_cannot_be_told_apart_are_not_reported():
 
 def test_lines_beside_those_that_cannot_be_told_are_not_judged_either():
     """The path of 141 Hz is too near to 140 Hz, and 282 Hz to 280; pairs lie near 0 Hz. At 700 Hz
-    no line is, but at 703 and 704 Hz two are that cannot be told apart, and so not taken away.
+    no line is, but at 703 and 704 Hz two are that are unresolved, and so not subtracted.
     """
     near = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 141)
     one = at_the_focus(0.5, am_frequency=140, trajectory=near)

@@ -102,7 +102,7 @@ def test_a_sheets_plan_says_what_it_leaves_out():
 
 
 def test_a_long_steady_pattern_needs_no_start():
-    """What the start leaves is followed until it has nearly died out, and estimated from above."""
+    """The transient is followed until it has nearly died out, and estimated from above."""
     scene = loads(SHORT.replace("duration_s = 0.05", "duration_s = 0.5"))
     for shape in ("point", "circle"):
         path = Trajectory(shape=shape, size=0.02, speed=9.0)
@@ -139,7 +139,7 @@ def test_sides_that_send_nothing_back_need_no_elements():
     [("silicone", 100, 0.03, 0.005, 0.15), ("overdamped", 80, 0.02, 0.004, 0.25)],
 )
 def test_what_free_sides_send_back_is_judged_in_time(material, width, duration, h, low):
-    """A load that only begins has no line that comes back, and viscous stress no front."""
+    """A load that only begins has no reflected line, and viscous stress no front."""
     modulus, poisson, viscosity = {"silicone": (25e3, 0.4999, 3), "overdamped": (1e3, 0.499, 50)}[
         material
     ]
@@ -363,7 +363,7 @@ def test_a_sheet_near_a_resonance_is_more_sensitive():
 
 @pytest.mark.parametrize("body", ["kind = 'palm'", "kind = 'mesh'\nfile = 'hand.vtu'"])
 def test_how_sensitive_a_hand_is_can_be_told(body, monkeypatch):
-    """What stands for the hand is a small slab, which is prepared in a second."""
+    """A small slab stands for the hand, as its reduction takes a second."""
     small = Body(width=0.03, height=0.03)
     monkeypatch.setattr(
         "skinwave.planning.sensitivity.prepare",
@@ -377,7 +377,7 @@ def test_how_sensitive_a_hand_is_can_be_told(body, monkeypatch):
 
 @pytest.mark.slow
 def test_the_planned_sheet_is_within_the_tolerance():
-    """Off resonance, against a mesh of twice the cells a side in each direction."""
+    """Off resonance, against a mesh of twice the elements a side in each direction."""
     scene = scenes("am80", dict(tactons())["am80"])["paper-sheet"]
     with pytest.warns(SkinwaveWarning, match="deflects"):
         found = simulate(scene, "auto", 0.05)

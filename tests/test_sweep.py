@@ -191,8 +191,8 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(scene, capsys, monkeypatc
     monkeypatch.setattr(engine, "CONNECTED", 0.5)
     nowhere = ["--scheduler", "tcp://127.0.0.1:9"]
     said = refused(capsys, "sweep", scene, "--vary", "tacton.size_mm=1,2", *nowhere)
-    assert "no scheduler answers at tcp://127.0.0.1:9" in said
-    assert "no scheduler answers" in refused(capsys, "run", scene, "--quiet", *nowhere)
+    assert "no scheduler responds at tcp://127.0.0.1:9" in said
+    assert "no scheduler responds" in refused(capsys, "run", scene, "--quiet", *nowhere)
     assert sorted(path.name for path in scene.parent.iterdir()) == ["short.toml"]
 
 

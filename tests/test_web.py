@@ -135,7 +135,7 @@ def test_a_scene_that_no_control_says_is_refused_by_the_command(tmp_path, capsys
     path = tmp_path / "own.toml"
     path.write_text('[tacton]\nshape = "polyline"\npoints_mm = [[0, 0], [5, 5]]\n')
     assert main(["web", str(path)]) == 2
-    assert "a path of its own points cannot be turned here" in capsys.readouterr().err
+    assert "a path of its own points cannot be set here" in capsys.readouterr().err
 
 
 # Controls
@@ -357,7 +357,7 @@ def test_lines_too_near_to_each_other_are_left_out_and_counted():
     assert answer.lines == ()
     count = len(model.untold_lines(scene, answer.response))
     assert count == 5
-    assert untold(count, 0.5) == ("5 lines cannot be told apart in 0.5 s; make the Tacton longer.")
+    assert untold(count, 0.5) == ("5 lines cannot be resolved in 0.5 s; make the Tacton longer.")
     assert untold(0, 0.5) == ""
 
 
@@ -809,7 +809,7 @@ def test_waves_are_stale_until_they_are_answered(session):
     answer = waves.Waves()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number - 1, answer)
-    assert session.state.waves_stale, "an older answer is not shown"
+    assert session.state.waves_stale, "an older response is not shown"
     with session.state:
         step = Step(phase="reduce", number=4, of=5, done=0.5, left=21.0)
         told(session, "progress", session.number, step)
@@ -837,16 +837,17 @@ def test_waves_are_stale_until_they_are_answered(session):
 def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
     answer = waves.Waves()(session.scene, nothing)
     effort = replace(
-        answer.response.effort, warnings=("wrong by about 18 %", "wrong by about 18 %")
+        answer.response.effort,
+        warnings=("relative error of about 18 %", "relative error of about 18 %"),
     )
     answer = replace(answer, response=replace(answer.response, effort=effort))
     assert session.state.warnings == []
     with session.state:
         told(session, "answer", session.number, answer)
-    assert session.state.warnings == ["wrong by about 18 %"]
+    assert session.state.warnings == ["relative error of about 18 %"]
     with session.state:
         session.state.am = 150
-    assert session.state.warnings == [], "they are of another answer"
+    assert session.state.warnings == [], "they are of another response"
 
 
 def test_the_first_sentences_say_what_each_difference_changes(session):
@@ -884,7 +885,7 @@ def test_a_held_frequency_and_a_preset(session):
     assert session.state.drawing_frequency == pytest.approx(190.986, abs=1e-3)
     with session.state:
         session.state.shape, session.state.size = "square", 60
-    assert "cannot be held" in session.state.errors["hold"]
+    assert "cannot be kept constant" in session.state.errors["hold"]
     with session.state:
         session.state.hold = False
     with session.state:
@@ -1144,7 +1145,7 @@ def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypat
         answer = await one.open(asked)
         assert isinstance(answer, web.Response)
         assert answer.status == (200 if says else 503)
-        # The one that was prepared, and the one that is started instead of it.
+        # The spare process, and the one that is started instead of it.
         assert (len(one._unclaimed), len(ends)) == ((1, 0) if says else (0, 2))
         assert (one.turns.opening, one.turns.there) == (0, 1 if says else 0)
         await asyncio.sleep(0.3)
@@ -1219,7 +1220,7 @@ def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):
 @pytest.mark.parametrize(
     ("focus", "said"),
     [
-        ("peak_pressure_pa = 80", "a peak_pressure_pa of 80 cannot be turned here"),
+        ("peak_pressure_pa = 80", "a peak_pressure_pa of 80 cannot be set here"),
         ('drive = "pressure_squared"\ndepth_of_modulation = 0.5', "a depth_of_modulation of 0.5"),
         ('profile = "array"', "profile = array of the focus"),
     ],

@@ -256,7 +256,7 @@ def test_a_page_of_trame_that_begins_otherwise_is_refused(tmp_path, scripts):
 
 
 class Server:
-    """What a session takes of trame's server."""
+    """Parts of trame's server that a session uses."""
 
     def __init__(self):
         from trame.app import get_server
@@ -531,7 +531,7 @@ def test_a_page_whose_process_is_killed_is_closed_and_its_place_is_free(server):
                         async with opened(session, server[1], "one", body="none") as page:
                             await page.state()
                             mine = [p for p in family(server[0].pid)[1:] if _is_page(p)]
-                            for each in mine:  # the one that is prepared, too
+                            for each in mine:  # the spare one, too
                                 os.kill(each, signal.SIGKILL)
                             with pytest.raises(ConnectionError):
                                 await _until_lost(page)

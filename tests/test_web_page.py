@@ -67,7 +67,7 @@ def state_becomes(page, key, value):
 
 
 def query_has(page, part):
-    """What the session answered with: the address of the page."""
+    """Wait until the session has set this part of the page's address."""
     page.wait_for_function("part => decodeURIComponent(location.search).includes(part)", arg=part)
 
 
@@ -304,7 +304,7 @@ def test_foci_follow_paths_of_their_own(page, tmp_path):
         page.locator(f"#own-{column}-1").fill(value)
         page.locator(f"#own-{column}-1").press("Tab")
     query_has(page, "square/15/22.5/-10")
-    page.locator("#own-2-1").fill("21")  # an answer to something else meanwhile
+    page.locator("#own-2-1").fill("21")  # an update of something else meanwhile
     for drawn in (80, 90):
         page.evaluate("drawn => window.trame.state.set('drawn', drawn)", drawn)
         query_has(page, f"drawn={drawn}")
@@ -656,7 +656,7 @@ def test_themes_about_and_a_tablet(page):
     page.locator("#theme").click()
     page.wait_for_function("d => window.trame.state.get('dark') !== d", arg=before)
     page.locator("#about").click()
-    page.get_by_text("What is felt", exact=False).first.wait_for(state="attached")
+    page.get_by_text("Detection thresholds differ", exact=False).first.wait_for(state="attached")
     page.wait_for_timeout(400)
     photographed(page, "about")
     page.locator("#close-about").click()

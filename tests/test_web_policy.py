@@ -1,4 +1,4 @@
-"""What a browser shows of pages that wait or are refused, and that no text becomes a script."""
+"""Pages that wait or are refused, as a browser shows them, and no text becomes a script."""
 
 import re
 import stat
@@ -67,7 +67,7 @@ def test_pages_beyond_the_most_say_so_and_open_when_another_is_closed(browser):
     for page in pages[:2]:
         page.wait_for_function(READY)
     for page in pages[2:]:
-        page.get_by_text("as many as skinwave keeps at a time").wait_for()
+        page.get_by_text("as many as skinwave allows at a time").wait_for()
         assert page.locator("#sw-waiting").is_visible()
     pages[0].close()
     page = pages[2]

@@ -43,7 +43,7 @@ def read(content: bytes, options: Options) -> Pattern:
     duration = animation.duration
     if duration == 0:
         duration = ENDLESS
-        notes.append(f"nothing ends the pattern: {ENDLESS:g} s of it")
+        notes.append(f"the pattern has no end: {ENDLESS:g} s of it")
     if duration > LONGEST:
         raise ValueError(f"the pattern lasts {duration:g} s, longer than {LONGEST:g} s; cut it")
     places = np.array(animation.places.values or ((0.0, 0.0, 200.0),))
@@ -114,7 +114,7 @@ def _drawn(brush: Brush, place: Sequence[float], notes: list[str]) -> Tacton:
 
 
 def _played(animation: Animation, duration: float, notes: list[str]) -> Tacton:
-    """What the engine would send to a device, sample by sample."""
+    """Samples that the engine would send to a device."""
     t = np.arange(max(2, round(duration * ENGINE_RATE))) / ENGINE_RATE
     brush, drawing = _brush_at(animation.brushes, t)
     place = _at(animation.places, np.array(animation.places.values or [(0.0, 0.0, 0.0)]), t)
@@ -143,7 +143,7 @@ def _at(track: Track, values: Floats, t: Floats) -> Floats:
 
 
 def _between(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
-    """Which keyframe was the last, and how far the way to the next is gone."""
+    """Index of the last keyframe, and the fraction of the way to the next."""
     times = np.array(track.times)
     before = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 1)
     after = np.minimum(before + 1, len(times) - 1)
@@ -178,7 +178,7 @@ def _brush_at(track: Track, t: Floats) -> tuple[Floats, Floats]:
 
 
 def _offset(name: str, f_d: Floats, numbers: Floats, t: Floats) -> Floats:
-    """What a brush draws (t, 2) in millimetre."""
+    """Offsets (t, 2) in millimetre that a brush draws."""
     u = 2 * pi * np.mod(f_d * t, 1.0)
     if name == "circle":
         return numbers[0][:, None] * np.stack([np.cos(u), np.sin(u)], axis=-1)

@@ -28,7 +28,7 @@ SUMS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Brush:
-    """What is drawn about the place of the path: its `name`, `numbers` in millimetre and as they
+    """Figure drawn about the place of the path: its `name`, `numbers` in millimetre and as they
     stand, frequencies in Hz.
     """
 
@@ -40,7 +40,7 @@ class Brush:
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """One thing that keyframes set: `times` in s, `values`, and whether each is kept until the
+    """One quantity that keyframes set: `times` in s, `values`, and whether each stays until the
     next (`steps`) or goes there linearly.
     """
 
@@ -219,7 +219,7 @@ def _refuse_jumps(frame: Mapping[str, Any], time: float) -> None:
 
 
 def _with_transition(frame: Mapping[str, Any], key: str) -> tuple[Mapping[str, Any], bool]:
-    """What a keyframe sets, and whether it is kept until the next one sets it anew."""
+    """Setting of a keyframe, and whether it stays until the next one sets it anew."""
     outer = _get(frame, key, dict)
     transition = _get(outer, "transition", dict, {"name": "linear"}).get("name")
     if transition not in ("linear", "step"):

@@ -65,7 +65,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 
 def _refuse(tacton: Tacton) -> None:
-    """What the format has no words for."""
+    """Refuse a Tacton that the format has no words for."""
     parts = {
         "several foci": len(tacton.foci) > 1,
         "a second AM frequency": tacton.superposition[1] > 0 and tacton.second_am_frequency > 0,
@@ -127,7 +127,7 @@ def _corners(path: Trajectory, end: float, ahead: float) -> tuple[Floats, Floats
 
 
 def _needed(values: Floats) -> np.ndarray:
-    """Which of the two sides of a corner to keep: one, where they agree."""
+    """Sides of a corner to keep, both or, where they agree, one."""
     same = np.abs(np.diff(values, axis=0)).max(axis=1) < 1e-8
     return np.concatenate([[True], ~same])
 

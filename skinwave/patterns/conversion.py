@@ -16,7 +16,7 @@ LARGEST = {".adaptics": 16_000_000, ".csv": 128_000_000, ".wav": 32_000_000}  # 
 def convert(
     source: Path, target: Path, options: Options, base: Scene | None = None
 ) -> tuple[bytes, tuple[str, ...]]:
-    """What to write to the target, and notes on what was decided, left out or approximated.
+    """Contents of the target file, and notes on what was decided, left out or approximated.
 
     Parameters
     ----------

@@ -55,8 +55,7 @@ def read(content: bytes, options: Options) -> Pattern:
         raise ValueError("intensity must lie in 0..1, the sound pressure over that at full drive")
     if len(points) > 1:
         notes.append(
-            f"{len(points)} points at a time: each pushes with 1/{len(points)} of the pressure of "
-            "one alone"
+            f"{len(points)} points at a time: each has 1/{len(points)} of the pressure of one alone"
         )
     if not tidy:
         notes.append(f"samples at {options.rate:g} Hz")
@@ -132,7 +131,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of what is not empty and no comment."""
+    """Line numbers and fields of the lines that are neither empty nor comments."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""What a pattern file says, and what a user may decide about it."""
+"""Contents of a pattern file, and what a user may decide about it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -28,7 +28,7 @@ class Pattern:
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What a file does not say.
+    """Choices that a file leaves open.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ def loudness(pressure: MovingPressure, t: ArrayLike) -> Floats:
     Raises
     ------
     ValueError
-        If the load pulls, which no sound does.
+        If the load is negative at times, which no radiation pressure is.
     """
     full = replace(pressure, tacton=Tacton(foci=pressure.tacton.foci)).gain(np.zeros(1))
     relative = pressure.gain(t) / full if full else np.zeros(np.shape(t))
     if (relative < -1e-12).any():
         raise ValueError(
-            f"drive '{pressure.drive}' pulls half of the time, which no device can; take drive "
-            "'pressure_squared' or 'force_corrected'"
+            f"drive '{pressure.drive}' has negative pressure half of the time, which no device can "
+            "exert; take drive 'pressure_squared' or 'force_corrected'"
         )
     return np.sqrt(np.clip(relative, 0, 1))

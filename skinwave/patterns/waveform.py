@@ -18,7 +18,7 @@ from skinwave.scene import Scene
 SCALES = ("full", "peak", "rms")
 WRITTEN_RATE = 48_000.0  # Hz
 CUT = 0.02  # beyond full drive that is cut off: what rounding adds to a sine of 8 bits
-STEP = 2.0**-15  # of full scale, the least that 16 bits tell: rounding below 0 is no pull
+STEP = 2.0**-15  # of full scale, the resolution of 16 bits: rounding below 0 is no negative load
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
@@ -57,7 +57,7 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """What modulates the amplitude, or its level in time, 32-bit float, and notes on how it is read
+    """Modulation of the amplitude, or its level in time, 32-bit float, and notes on how it is read
     back to the same load.
     """
     rate = options.rate or WRITTEN_RATE

@@ -17,7 +17,7 @@ from skinwave.numbers import significant
 from skinwave.pictures.styles import LABELS, STYLES, Style
 from skinwave.run import Run
 
-# Okabe and Ito's colours, told apart by every kind of colour vision; one model, one colour.
+# Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
 COLOURS = {
     "point-kernel": "#000000",
     "point-kernel-published": "#999999",
@@ -123,7 +123,7 @@ def label(column: str) -> str:
 
 
 def answered(run: Run) -> str:
-    """The name of a body and of the model that answered for it."""
+    """The name of a body and of the model of its response."""
     return label(run.column) if run.body == "none" else f"{label(run.body)} ({run.model})"
 
 

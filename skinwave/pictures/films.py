@@ -66,7 +66,7 @@ def check_format(path: Path) -> None:
 
 
 def seam(view: View) -> str:
-    """What part of a view's motion is shown, and whether it repeats without a seam, in words."""
+    """Part of a view's motion that is shown, and whether it repeats without a seam, in words."""
     span, whole = f"{significant(1e3 * view.period)} ms", speeds.period(view.scene.pressure)
     jump = speeds.seam(view.scene.tacton, view.period)
     if jump < ROUND_OFF:

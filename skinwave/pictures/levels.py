@@ -1,4 +1,4 @@
-"""The lines of a motion beside what is felt of them (matplotlib)."""
+"""Spectral lines of a motion and the detection threshold (matplotlib)."""
 
 import re
 from collections.abc import Sequence
@@ -90,7 +90,7 @@ def _draw_threshold(ax: Axes) -> None:
 
 
 def _shown(run: Run, probe: int) -> list[str]:
-    """Lines that are drawn, those that are felt most first, or else those that move most."""
+    """Lines that are drawn, by sensation level or, on a sheet, by amplitude, the highest first."""
     if run.is_skin:
         return [n for n, level in felt_lines(run, probe).items() if level > LOWEST_LEVEL]
     return sorted(run.listed, key=lambda name: -run.table.amplitudes[name][probe])

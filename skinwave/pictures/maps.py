@@ -20,12 +20,12 @@ from skinwave.pictures.figures import inked, label
 from skinwave.pictures.styles import Style
 from skinwave.pictures.views import Trace, View, path_points, spread_radius, starting_time
 
-SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # told apart by every kind of colour vision
+SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # distinguishable with every kind of colour vision
 PIXELS = 201  # of a map's side
 DEEPEST = -40.0  # dB shown
 FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
 DROPS = {-6: "solid", -20: "dashed"}
-FELT = "#ff2fd0"  # the borderline of what is felt
+FELT = "#ff2fd0"  # the detection contour
 MAP, LEGEND = 3.4, 0.4  # inch, side of a map and height of a legend
 
 
@@ -53,13 +53,13 @@ def common_raster(views: Sequence[View]) -> Raster:
 
 
 def sampler(view: View, raster: Raster) -> Callable[[Floats], Floats]:
-    """What carries values (s,) of a view's surface onto a grid (y, x), linear between points."""
+    """Linear interpolation of values (s,) of a view's surface onto a grid (y, x)."""
     X, Y = np.meshgrid(raster.x, raster.y)
     return carrier(view, np.stack([X, Y], axis=-1))
 
 
 def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
-    """What carries values (s,) of a view's surface to places (..., 2), linear between points."""
+    """Linear interpolation of values (s,) of a view's surface to places (..., 2)."""
     x, y = view.places.T
     found: Any = Triangulation(x, y, view.triangles).get_trifinder()(places[..., 0], places[..., 1])
     corners = view.places[view.triangles[found]]  # (..., 3, 2)
@@ -83,9 +83,7 @@ def decibel(view: View) -> Floats:
 
 
 def rms_figure(views: Sequence[View], style: Style) -> Figure:
-    """RMS motion of each model over its own largest, with its spread and the borderline of what
-    is felt.
-    """
+    """RMS motion of each model over its own largest, with its spread and detection contour."""
     raster = common_raster(views)
     with mpl.rc_context(style.rc):
         figure, axes = _panels(len(views), style)
@@ -108,7 +106,7 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
             "path of the focus": {"color": style.ink, "ls": "dotted"},
         }
         if any((view.sensation > 0).any() for view in views):
-            entries[f"just felt (and ±{BAND:g} dB)"] = {"color": FELT, "ls": "solid"}
+            entries[f"detection threshold (and ±{BAND:g} dB)"] = {"color": FELT, "ls": "solid"}
         _legend(figure, entries)
     return figure
 

@@ -41,7 +41,7 @@ class Waves:
 
 
 def probe_response(scene: Scene, moved: Waves) -> Response:
-    """What the probes of a scene see of its body's motion."""
+    """Response at the probes of a scene, from its body's motion."""
     times, points = sample_times(scene), scene.probe_points
     read = fem.probe_operator(moved.mesh, points) @ moved.basis
     return Response(
@@ -58,7 +58,7 @@ def waves(
     h: float | None = None,
     solver: str = "auto",
 ) -> Waves:
-    """What `skinwave.field` is made of, for as many times as one likes; raises what it does."""
+    """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
     check_knobs(solver, h=h)
     clock, report = Clock(), progress or silent
     build = meshed(scene.body, h, clock, report)

@@ -1,7 +1,7 @@
 """Views in three dimensions (pyvista, off screen): bodies side by side, cut open or from above.
 
 Ask `renderer` first whether there is anything to draw with. Lengths are in mm here, and cameras
-without perspective, so that one scale bar holds for the whole picture.
+without perspective, so that one scale bar is right for the whole picture.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,9 +35,9 @@ ABOVE = 0.4  # mm, by which marks are lifted off the surface
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """What is drawn of one view: points (n, 3) in mm of a skin of triangles, which points of the
-    view they are, marks that ride on it, the focus and what is under it at every frame, and by
-    what motion is multiplied.
+    """Geometry drawn of one view: points (n, 3) in mm of a skin of triangles, their indices in the
+    view, marks that ride on it, the focus and what is under it at every frame, and the factor by
+    which motion is multiplied.
     """
 
     view: View

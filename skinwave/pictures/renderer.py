@@ -30,7 +30,7 @@ class Renderer:
 
 @cache
 def renderer() -> Renderer:
-    """What draws in this environment, probed once a process."""
+    """Renderer of this environment, probed once a process."""
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=PATIENCE

@@ -60,6 +60,6 @@ def surfaces_figure(scene: Scene, surfaces: Mapping[str, SurfaceMap]) -> Figure:
 
 SURFACES = (
     "RMS of the steady vibration about its mean. Beyond the dashed line the point kernel predicts "
-    "less than a tenth of its largest; what the body moves there is what propagation adds, "
-    "and what edges that reflect make of it."
+    "less than a tenth of its largest; motion of the body there is due to propagation, with the "
+    "waves that its edges reflect."
 )

@@ -1,4 +1,4 @@
-"""What pictures show of one model's answer: its surface through a period, and where it moves most.
+"""View of one model's response in pictures: its surface through a period, and where it moves most.
 
 Motion is about its mean: a steady push bends a sheet far more than its vibration does.
 """
@@ -50,7 +50,7 @@ class Trace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """One model's answer to a scene, as pictures need it.
+    """One model's response in a scene, as pictures need it.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ class View:
     times : (f,) float, s, through the part of the steady state that is played, `period`: that of
         the whole pattern, see `speeds.shown_part`
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
-    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the level in
-        dB of its strongest line above the threshold of detection, of the point kernel above that
-        of a pressure; minus infinity where nothing vibrates, and on a sheet, which is no skin
+    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the highest
+        sensation level of its lines in dB, of the point kernel above the threshold of a pressure;
+        minus infinity where nothing vibrates, and on a sheet, which is no skin
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
     ray : outwards along x from the path's outermost point; track : along the path, None if the
         focus rests; both in the steady state, about the mean
@@ -89,7 +89,7 @@ class View:
 
     @property
     def column(self) -> str:
-        """What tables and figures know it by, as `Run.column`."""
+        """Name in tables and figures, as `Run.column`."""
         return self.model if self.body == "none" else self.body
 
     @property

@@ -1,4 +1,4 @@
-"""A scene's answers by every model that pictures put side by side, kept in a folder.
+"""A scene's responses by all models that pictures show side by side, in a folder.
 
 scene.toml  plan.json  trust.json  lines.csv
 COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz
@@ -41,8 +41,8 @@ CASES = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a seco
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Album:
-    """What a folder holds: runs; views by body, where there are any; what was planned, how far
-    that agrees with the pictures, and the command that made it, where these were kept.
+    """Contents of a folder: runs; views by body, where there are any; the plan, how far its
+    response agrees with the pictures, and the command that made it, where these were saved.
     """
 
     title: str
@@ -104,7 +104,7 @@ def make(
     beside: Sequence[str] = (),
     command: str = "",
 ) -> list[str]:
-    """Answer a scene by every model and fill a folder with it; the warnings of all of them.
+    """Compute a scene's response by every model and fill a folder with it; the warnings of all.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def answers(
     fastest = max(map(fastest_line, moved.values()), default=tones)
     part = shown_part(scene.pressure, fastest, frames)  # the same for all, side by side
     for column, its in shown.items():
-        progress(f"answer by {column}", 0.0)
+        progress(f"response of {column}", 0.0)
         if column in moved:
             progress(f"{column}: compare with a coarser mesh", 0.0)
             response = assessed_probes(its, moved[column], h, PLANNED, solver)
@@ -173,7 +173,7 @@ def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver:
 def _plan(
     folder: Path, scene: Scene, runs: Sequence[Run], progress: Progress, solver: str, command: str
 ) -> None:
-    """What `plan` requires of the scene, and how far its answer agrees with what was drawn."""
+    """Requirements of the scene by `plan`, and the difference of its response from that drawn."""
     progress("plan", 0.0)
     required = plan(scene, PLANNED, solver=solver)
     table = asdict(replace(required, prepared=None)) | {"tolerance": PLANNED}
@@ -187,7 +187,7 @@ def _plan(
 
 
 def _verified(progress: Progress) -> list[dict[str, Any]]:
-    """A few quick cases of the verification suite, as this installation answers them."""
+    """Results of a few quick cases of the verification suite on this installation."""
     progress("verify", 0.0)
     cases = [entry.run() for entry in suite() if entry.name in CASES]
     return [
@@ -203,13 +203,13 @@ def _planned_answer(scene: Scene, required: Plan, solver: str) -> Response:
 
 
 def _misfit(planned: Response, drawn: Response) -> float:
-    """Relative difference of two answers over all probes."""
+    """Relative difference of two responses over all probes."""
     size = float(np.linalg.norm(planned.displacement))
     return float(np.linalg.norm(drawn.displacement - planned.displacement)) / (size or 1.0)
 
 
 def open_album(folder: Path) -> Album:
-    """What a folder holds that `run`, `compare` or `report` wrote; no model is run.
+    """Results in a folder that `run`, `compare` or `report` wrote; no model is run.
 
     Raises
     ------
@@ -279,7 +279,7 @@ def _run(path: Path) -> Run:
 
 
 def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
-    """What a file holds, if there is one, as `fitting` takes it."""
+    """Contents of a file, if there is one, as `fitting` takes it."""
     if not path.exists():
         return None
     found: dict[str, Any] = fitting(reading.parsed(path), pattern, str(path))

@@ -118,7 +118,7 @@ def flat(
 
 
 def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
-    """Waveforms, spectra and what is felt, for every Tacton of an album."""
+    """Waveforms, spectra and sensation levels, for every Tacton of an album."""
     parts: list[str] = []
     for name, runs in tactons(album).items():
         progress(f"draw {name}", 0.0)
@@ -131,7 +131,7 @@ def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]
 
 
 def _waveforms(runs: Sequence[Run]) -> str:
-    """What the waveforms of a Tacton show, and what each difference between them comes from."""
+    """Caption of a Tacton's waveforms, and the cause of each difference between them."""
     columns = [run.column for run in runs]
     text = "Waveforms and spectra. Rows are probes."
     if {"point-kernel-published", "point-kernel"} <= set(columns):
@@ -179,7 +179,7 @@ def _film_part(path: Path, caption: str) -> str:
 
 
 def _film(view: View) -> str:
-    """What the film plays, and how much more slowly."""
+    """Caption of the film: the part of the motion that it plays, and how much more slowly."""
     count = len(view.times)
     slower = numbers.significant(lasts(count) / view.period, 2)
     return f"Film: {seam(view)}. {count} frames, {slower} times more slowly."
@@ -193,7 +193,7 @@ def _part(image: render.Image, caption: str, name: str) -> str:
 
 
 NO_VIEWS = (
-    "No motion of whole bodies is kept here, and so there is no picture of a surface; "
+    "No motion of whole bodies was saved here, and so there is no picture of a surface; "
     "skinwave report SCENE computes it."
 )
 MARKS = "Black: path and focus; yellow: probes."
@@ -205,8 +205,9 @@ RMS = (
     "RMS motion about its mean over the whole steady state, relative to each model's largest. All "
     "models receive the same load, so that a body's map differs from the kernel's by propagation "
     "alone. Spread is the distance of the outermost -6 and -20 dB from the centre of the path. "
-    "Just felt: a body's strongest line at its threshold for a focal spot; the point kernel's peak "
-    "pressure at the 4.4 Pa that is felt with AM at 200 Hz."
+    "Detection contour: where the line with the highest sensation level is at threshold: of a "
+    "body, the displacement threshold for a focal spot; of the point kernel, 2.2 Pa at 200 Hz (a "
+    "peak of 4.4 Pa with AM), at other frequencies in proportion to the displacement threshold."
 )
 DIFFERENCE = (
     "What propagation changes: the level of a body's RMS motion minus that of the point kernel's "
@@ -230,10 +231,10 @@ WAVES = (
 )
 LOADS = (
     "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "
-    "others have the scene's: what the two kernels differ by, drive law and focal spot change."
+    "others have the scene's: the two kernels differ by drive law and focal spot."
 )
-PROPAGATED = "What a body differs by from the kernel under the same load, propagation changes."
+PROPAGATED = "A body differs from the kernel under the same load by propagation alone."
 FELT = (
-    "Lines of the motion at the probe that moves most, beside the threshold of detection (a focal "
+    "Lines of the motion at the probe that moves most, and the detection threshold (for a focal "
     "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."
 )

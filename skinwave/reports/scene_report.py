@@ -38,7 +38,7 @@ from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
-JUDGED = 0.5  # s that a Tacton must last for statements about its lines to be judged
+JUDGED = 0.5  # s that a Tacton must last for claims about its lines to be assessed
 
 
 def write_report(
@@ -85,13 +85,13 @@ def write_report(
 
 
 def _names(runs: Sequence[Run]) -> list[str]:
-    """What runs are called where one is named: by body and, if there are several, by Tacton."""
+    """Names of runs: by body and, if there are several, by Tacton."""
     several = len({run.tacton for run in runs}) > 1
     return [f"{run.tacton} on {run.body}" if several else run.body for run in runs]
 
 
 def _first_screen(album: Album, gallery: Gallery) -> list[str]:
-    """What propagation changes of the first Tacton, with maps where views are kept."""
+    """Effect of propagation on the first Tacton, with maps where views were saved."""
     groups = {name: _with_kernels(runs) for name, runs in tactons(album).items()}
     first = shown(groups, lambda run: _maps(album, run))
     if first is None:
@@ -101,7 +101,7 @@ def _first_screen(album: Album, gallery: Gallery) -> list[str]:
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
-    """Runs of one Tacton with both point kernels, which are formulas, where they are not kept."""
+    """Runs of one Tacton with both point kernels, computed anew, as they are formulas."""
     bodies = [run for run in runs if run.response.unit == "m"]
     return [*beside_kernels(bodies[0])[:2], *bodies] if bodies else runs
 
@@ -162,7 +162,7 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
 def _modelled(album: Album) -> list[str]:
     parts = [document.paragraph(text) for text in modelled(list(album.runs))]
     if album.planned is None:
-        return [*parts, document.paragraph("No plan was kept with these results; skinwave plan "
+        return [*parts, document.paragraph("No plan was saved with these results; skinwave plan "
                                          "scene.toml makes one.")]  # fmt: skip
     planned = album.planned
     rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
@@ -247,7 +247,7 @@ def _comparison(album: Album) -> list[str]:
     long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
     verdicts = evaluate(long)
     if verdicts:
-        parts.append(document.paragraph("What Lim, Seifi and Park state, evaluated on these runs:"))
+        parts.append(document.paragraph("Claims of Lim, Seifi and Park, evaluated on these runs:"))
         parts.append(tables.claims_table(verdicts))
     return parts or [document.paragraph("There is one model only.")]
 
@@ -264,9 +264,9 @@ def _trust(album: Album) -> list[str]:
         effort = run.response.effort
         if effort.dofs:
             found.append(
-                f"{label(run.body)}: the work of the load and what has become of it differ by "
-                f"{effort.energy_imbalance:.0e} of either (refused beyond 1e-2); reduction leaves "
-                f"an estimated {significant(100 * effort.estimate, 2)} %."
+                f"{label(run.body)}: relative error of the energy balance "
+                f"{effort.energy_imbalance:.0e} (refused beyond 1e-2); estimated relative error of "
+                f"the reduced-order model {significant(100 * effort.estimate, 2)} %."
             )
     trust: Mapping[str, Any] = album.trust or {}
     if {"misfit", "model"} <= trust.keys():
@@ -278,8 +278,8 @@ def _trust(album: Album) -> list[str]:
     parts: list[str] = [document.paragraph(text) for text in dict.fromkeys(found)]
     if trust.get("cases"):
         parts.append(document.paragraph(
-            "Cases of skinwave verify as this installation answered them; the whole suite holds "
-            "the program against closed forms, series and published tables."))  # fmt: skip
+            "Results of some cases of skinwave verify on this installation; the whole suite "
+            "compares the program with closed forms, series and published tables."))  # fmt: skip
         parts.append(_cases(trust["cases"]))
     return parts
 
@@ -290,7 +290,8 @@ def _cases(cases: Sequence[Mapping[str, Any]]) -> str:
          f"{case['bar']:.1e}", "passed" if case["passed"] else "FAILED", case["source"]]
         for case in cases
     ]  # fmt: skip
-    header = ["case, by its check nearest to the bar", "value", "reference", "error", "bar", ""]
+    header = ["case, by its check nearest to the tolerance", "value", "reference", "error",
+              "tolerance", ""]  # fmt: skip
     return document.table([*header, "source"], rows)
 
 

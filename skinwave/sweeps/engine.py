@@ -17,7 +17,7 @@ from skinwave.processes import guarded, pool
 
 LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker
-CONNECTED = 10  # s that a scheduler may take to answer
+CONNECTED = 10  # s that a scheduler may take to respond
 
 
 def check(scheduler: str) -> None:
@@ -49,7 +49,7 @@ def workers(scheduler: str, asked: int | None = None) -> int:
     Raises
     ------
     ValueError
-        If fewer than one is asked for, or a scheduler does not answer.
+        If fewer than one is asked for, or a scheduler does not respond.
     """
     if asked is not None and asked < 1:
         raise ValueError(f"--workers = {asked} is below 1; give one at least")
@@ -162,7 +162,7 @@ def _client(address: str) -> Iterator[Any]:
     except (OSError, ValueError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(
-            f"no scheduler answers at {address} ({said}); start one with dask scheduler"
+            f"no scheduler responds at {address} ({said}); start one with dask scheduler"
         ) from None
     with client:
         yield client

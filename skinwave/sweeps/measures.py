@@ -53,7 +53,7 @@ def columns(cases: Iterable[Case]) -> dict[str, str]:
 
 
 def _columned(scene: Scene) -> Iterable[str]:
-    """Lines that have columns: the strongest of the load, and those that are judged."""
+    """Lines that have columns: the strongest of the load, and those that claims are about."""
     return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=JUDGED)
 
 
@@ -74,7 +74,7 @@ def commanded(case: Case) -> dict[str, Any]:
 
 
 def measured(scene: Scene, response: Response) -> dict[str, Any]:
-    """The part of a row that an answer gives: what it is, beside the point kernel, and its cost."""
+    """Columns of a row that a response gives: its amplitudes, comparison with the kernel, cost."""
     kernel = response
     if response.unit == "m":
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
@@ -119,7 +119,7 @@ def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
 
 
 def _felt(run: Run) -> dict[str, Any]:
-    """Lines above threshold and, if these are all, the one that is felt most."""
+    """Sensation levels of lines and, if all are resolved, the line with the highest."""
     levels = {n: sensation_level(a, run.frequencies[n]) for n, a in run.lines.items()}
     row: dict[str, Any] = {f"{name}_db": level for name, level in levels.items()}
     if levels and not run.untold:

@@ -1,4 +1,4 @@
-"""Many scenes in one table: which runs, each body prepared once, each run once."""
+"""Parameter sweep: many scenes in one table, each body reduced once, each run once."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -24,12 +24,12 @@ from skinwave.sweeps.measures import columns, commanded, measured
 from skinwave.sweeps.variation import Case
 
 BATCH = 8  # runs of one body that are handed out together, at most
-KEPT = 4  # bodies that a worker keeps in memory, on two meshes each
+KEPT = 4  # bodies that a worker caches in memory, on two meshes each
 
 
 @dataclass(frozen=True, kw_only=True)
 class Knobs:
-    """How every run is answered; h in metre."""
+    """Model, tolerance, element size h in metre and solver of every run."""
 
     model: str = "auto"
     tolerance: float = 0.05
@@ -39,8 +39,8 @@ class Knobs:
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """The element size in metre that the runs on a body share, that of the `coarser` mesh which
-    tells each how wrong it is, or the `error` why there is none.
+    """The element size in metre that the runs on a body share, that of the `coarser` mesh by which
+    the error of each is estimated, or the `error` why there is none.
     """
 
     h: float | None = None
@@ -50,7 +50,7 @@ class Mesh:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a sweep left: rows `planned`, `found` there before, `done` and `failed` now."""
+    """Result of a sweep: rows `planned`, `found` there before, `done` and `failed` now."""
 
     planned: int
     found: int
@@ -75,7 +75,7 @@ def sweep(
     workers: int | None = None,
     command: Mapping[str, Any] | None = None,
 ) -> Outcome:
-    """Answer every case that the folder has no row of, and append a row for each.
+    """Run every case that the folder has no row of, and append a row for each.
 
     Parameters
     ----------
@@ -90,8 +90,8 @@ def sweep(
     Raises
     ------
     ValueError
-        If a knob is wrong, an extra is not installed, no scheduler answers, or the folder is not
-        that of a sweep.
+        If a solver option is wrong, an extra is not installed, no scheduler responds, or the folder
+        is not that of a sweep.
     """
     started = time.perf_counter()
     report = progress or silent
@@ -139,10 +139,10 @@ def sweep(
 
 
 def model_of(scene: Scene, asked: str) -> str:
-    """The model that answers a scene: as asked, or the cheapest that leaves nothing out.
+    """The model of a scene: as asked, or the cheapest that leaves nothing out.
 
-    That is the point kernel without a body, exact waves for a flat body whose sides send nothing
-    back, and else finite elements.
+    That is the point kernel without a body, the wavenumber integral for a flat body whose sides
+    reflect nothing, and else finite elements.
     """
     if asked != "auto":
         return asked
@@ -165,7 +165,7 @@ Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
 
 
 def _solid(case: Case, knobs: Knobs) -> Solid | None:
-    """What a run shares with others, if it does."""
+    """Body and probes by which a run shares a reduced body with others, if it does."""
     scene = case.scene
     if scene is None or model_of(scene, knobs.model) != "fem" or scene.body.kind == "none":
         return None
@@ -175,7 +175,7 @@ def _solid(case: Case, knobs: Knobs) -> Solid | None:
 def _shared_meshes(
     runs: dict[str, Case], knobs: Knobs, scheduler: str, count: int, report: Progress
 ) -> dict[Solid, Mesh]:
-    """Find a mesh for each body that several runs share, and prepare it, each body once."""
+    """Find a mesh for each body that several runs share, and reduce it, each body once."""
     hardest: dict[Solid, Scene] = {}
     for case in runs.values():
         if (solid := _solid(case, knobs)) and case.scene:
@@ -186,9 +186,9 @@ def _shared_meshes(
 
     def done(k: int, mesh: Mesh) -> None:
         found[solids[k]] = mesh
-        report("prepare bodies", len(found) / len(solids))
+        report("reduce bodies", len(found) / len(solids))
 
-    report("prepare bodies", 0.0)
+    report("reduce bodies", 0.0)
     engine.run_all(partial(_mesh, knobs), list(hardest.values()), scheduler, count, done)
     lost = Mesh(error="its worker was killed each time; give it more memory or larger elements")
     return {solid: found.get(solid, lost) for solid in solids}
@@ -200,7 +200,7 @@ def _highest(scene: Scene) -> float:
 
 
 def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
-    """The mesh that is right for the hardest scene of a body; kept on disk for all workers."""
+    """The mesh that the hardest scene of a body requires; cached on disk for all workers."""
     try:
         if knobs.h:
             _prepared(scene.body, scene.probes, knobs.h, knobs)
@@ -270,7 +270,7 @@ def _row(case: Case, knobs: Knobs, mesh: Mesh | None) -> dict[str, Any]:
 
 
 def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> Response:
-    """An answer of the body prepared, with what it is expected to be wrong by."""
+    """Response of a reduced body, with its expected relative error."""
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
     prepared = _prepared(scene.body, scene.probes, mesh.h, knobs)
@@ -283,7 +283,7 @@ def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> Response:
 
 
 def _said(error: Exception) -> str:
-    """An error as a cell of the table; its kind, too, where it is not a refusal."""
+    """An error as an entry of the table; its kind, too, where it is not a refusal."""
     text = " ".join(str(error).split())
     refusal = isinstance(error, ValueError | ArithmeticError) and text
     return text if refusal else f"{type(error).__name__}: {text}"

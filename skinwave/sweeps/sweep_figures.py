@@ -44,7 +44,7 @@ def varied(rows: Sequence[Row]) -> list[str]:
 
 
 def finished(rows: Sequence[Row]) -> list[Row]:
-    """The rows that have an answer.
+    """The rows that have a response.
 
     Raises
     ------
@@ -53,12 +53,12 @@ def finished(rows: Sequence[Row]) -> list[Row]:
     """
     found = [row for row in rows if row.get("status") == "done"]
     if not found:
-        raise ValueError(f"none of {len(rows)} runs has an answer: {rows[0].get('error')}")
+        raise ValueError(f"none of {len(rows)} runs has a response: {rows[0].get('error')}")
     return found
 
 
 def value(row: Row, column: str) -> float:
-    """A cell as a number: what is told at each probe by the largest, `name[2]` by that of one."""
+    """An entry as a number: the largest of a list over the probes, `name[2]` that of one probe."""
     name, probe = _at_probe(column)
     cell = row.get(name)
     if isinstance(cell, list):
@@ -191,7 +191,7 @@ def _joined(rows: Sequence[Row], x: str, by: str | None) -> bool:
 
 
 def axis_label(column: str) -> str:
-    """What a column is, and its unit."""
+    """Label of an axis: the quantity of a column and its unit."""
     name, probe = _at_probe(column)
     words = NAMES.get(name)
     if words is None:

@@ -1,4 +1,4 @@
-"""What a sweep varies: keys of a scene file, their values, and which of them meet."""
+"""Design of a sweep: keys of a scene file, their values, and how these are combined."""
 
 import hashlib
 import itertools
@@ -46,7 +46,7 @@ class Case:
     error: str = ""
 
     def name(self, *knobs: object) -> str:
-        """A hash of the complete scene, of the file of its body, and of how it is answered."""
+        """A hash of the complete scene, of the file of its body, and of the solver options."""
         digest = hashlib.sha256(repr((self.text, *knobs)).encode())
         if self.scene and self.scene.body.file:
             digest.update(_content(self.scene.body.file))
@@ -54,7 +54,7 @@ class Case:
 
 
 def parse(text: str) -> Variation:
-    """What `key=v1,v2`, `key=start:stop:n` or, within bounds, `key=start:stop` varies.
+    """Variation of `key=v1,v2`, `key=start:stop:n` or, within bounds, `key=start:stop`.
 
     Raises
     ------
@@ -265,7 +265,7 @@ def _presets() -> Sequence[str]:
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:
-    """Keys with their section, and values that fit one cell of a table."""
+    """Keys with their section, and values that fit one entry of a table."""
     found: dict[str, float | str] = {}
     for section, values in table.items():
         if isinstance(values, dict):

@@ -1,10 +1,11 @@
-"""The interactive tool: turn a Tacton's parameters, and see at once what a point of the skin feels.
+"""The interactive tool: change a Tacton's parameters and see at once how a point of the skin moves.
 
-`controls` are what can be turned, `scenes` makes a scene of them, `model` arrays, `plots`,
-`drawings` and `moving` what a page draws, all without a browser. `waves` and `worker` answer with a
-body, in a process of its own; `session`, `shown` and `layout` are the page, with curves and body
-drawn in `static`; `front` gives each page a process of its own (`processes`), when it is its turn
-(`turns`); `page` is its text, `access` says who may open one, and `asked` what it may send.
+`controls` are the parameters, `scenes` makes a scene of them, `model` arrays, `plots`, `drawings`
+and `moving` the contents of plots, maps and the moving body, all without a browser. `waves` and
+`worker` compute the response of a body, in a process of its own; `session`, `shown` and `layout`
+are the page, with curves and body drawn in `static`; `front` gives each page a process of its own
+(`processes`), when it is its turn (`turns`); `page` is its text, `access` says who may open one,
+and `asked` what it may send.
 """
 
 EXTRA = ("trame", "trame_vuetify")

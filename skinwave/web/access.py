@@ -66,7 +66,7 @@ def with_token(token: str) -> Any:
 
 
 async def secured(request: web.Request, response: web.StreamResponse) -> None:
-    """Headers of every answer (a signal of aiohttp, before it is sent)."""
+    """Headers of every HTTP response (a signal of aiohttp, before it is sent)."""
     response.headers["Content-Security-Policy"] = policy(request.headers.get("Host", ""))
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Referrer-Policy"] = "no-referrer"
@@ -87,7 +87,7 @@ def policy(host: str) -> str:
 
 
 def one_line(said: Any) -> str:
-    """What someone else said as one line of a terminal."""
+    """Text from outside the program as one line of a terminal."""
     return printable(str(said)[:LONGEST_LINE].rstrip(), keep="")[:LONGEST_LINE]
 
 

@@ -1,4 +1,4 @@
-"""What a page may send to its process: values of controls, of how things look, and its triggers.
+"""Requests that a page may send to its process: values of controls, of the view, and triggers.
 
 A page's own script is not the only one that can talk: whatever has the page's password can set any
 variable of trame's state and call any of its triggers with any content. What is of another kind
@@ -65,7 +65,7 @@ SET: dict[str, Callable[[Any], bool]] = {
 
 
 def kept(changes: Any) -> list[dict[str, Any]]:
-    """Of the changes of a state that a page sends those that its own script would."""
+    """Changes of a state that the page's own script would send, among those that were sent."""
     if not isinstance(changes, list):
         return []
     return [
@@ -92,7 +92,7 @@ def numbers(*given: Any) -> tuple[float, ...]:
 
 
 def checked_call(make: Callable[..., Any] | None, args: Any, kwargs: Any) -> Sequence[Any]:
-    """What a trigger is called with.
+    """Arguments of a trigger, checked.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What can be turned: ranges, units and steps, and the same as text for an address or undo.
+"""Controls of the page: ranges, units and steps, and the same as text for an address or undo.
 
 Values are in the units that a page shows. Ranges are those of Lim, Seifi and Park, CHI EA '24,
 section 2.2, where they give one: amplitude, ratio, duration, shape and size.

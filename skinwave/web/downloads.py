@@ -1,4 +1,4 @@
-"""What a page gives to keep: the scene, waveforms as tables and sound, a figure, the report."""
+"""Files that a page saves: the scene, waveforms as tables and sound, a figure, the report."""
 
 import asyncio
 import multiprocessing
@@ -22,16 +22,16 @@ FORMATS = ("svg", "png", "pdf")  # matplotlib knows others, some of which start 
 
 
 def offered(session: Any) -> dict[str, Callable[..., Any]]:
-    """What makes each file of what a session shows, by its name as a trigger of the page.
+    """Functions that make the files of a session, by their names as triggers of the page.
 
-    Waves are those of a body if it has answered; a file of several answers has the kernel's, too.
+    Waves are those of a body if its response is there; a file of several has the kernel's, too.
     """
 
     one_at_a_time = asyncio.Lock()
 
     def there() -> tuple[Answer, ...]:
         if not session.answers:
-            raise ValueError("there is no answer that could be saved; correct the controls first")
+            raise ValueError("there is no response to save; correct the controls first")
         return tuple(session.answers)
 
     async def report() -> bytes:
@@ -53,8 +53,8 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
 
 
 async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:
-    """What a function makes, in a process of its own: the page stays live, and all that drawing
-    takes of memory is gone with it.
+    """Result of a function in a process of its own: the page stays live, and all the memory that
+    drawing takes is freed with it.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def _make(pipe: Connection, make: Callable[..., bytes], given: tuple[Any, ...]) 
 
 
 def csv_of(answers: Sequence[Answer]) -> bytes:
-    """Time in s and a column an answer, with its unit and place in the header."""
+    """Time in s and a column for each response, with its unit and place in the header."""
     x, y = 1e3 * answers[0].response.probes[0]
     kinds = {"Pa": "pressure", "m": "displacement"}
     header = ["time, s"] + [
@@ -109,7 +109,7 @@ def wav_of(answer: Answer) -> bytes:
 
 
 def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
-    """The report of `skinwave report` as one page, from the answers there are; no model is run."""
+    """The report of `skinwave report` as one page, of the responses there are; no model is run."""
     from skinwave.effort import silent, versions
     from skinwave.files import fill
     from skinwave.pictures.styles import style
@@ -131,14 +131,14 @@ def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
 
 
 def _body_of(scene: Scene, answer: Answer) -> str:
-    """The name of the body that answered."""
+    """The name of the body whose response this is."""
     if answer.response.unit == "Pa":
         return "none"
     return next((n for n, body in BODIES.items() if body == scene.body), scene.body.kind)
 
 
 def _column(scene: Scene, answer: Answer) -> str:
-    """What tables and figures know an answer by, as `Run.column`."""
+    """Name of a response in tables and figures, as `Run.column`."""
     name = _body_of(scene, answer)
     return answer.response.model if name == "none" else name
 

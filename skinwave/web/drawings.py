@@ -1,4 +1,4 @@
-"""What a page draws beside curves: maps as small pictures, paths in mm, and the table of lines."""
+"""Drawings of a page other than curves: maps as small pictures, paths in mm, table of lines."""
 
 import base64
 from collections.abc import Sequence
@@ -49,8 +49,8 @@ def speeds(tacton: Tacton) -> str:
 
 
 def ends(largest: float, unit: str) -> list[str]:
-    """What the left end, the middle and the right end of a colour bar stand for: 0 to `largest`,
-    Pa or m in micrometre.
+    """Labels of a colour bar at its left end, middle and right end: 0 to `largest`, Pa, or m in
+    micrometre.
     """
     value, said = (largest, "Pa") if unit == "Pa" else (1e6 * largest, "µm")
     return ["0", f"{value / 2:.3g}", f"{value:.3g} {said}"]
@@ -93,7 +93,7 @@ def _gradient(colours: Floats, places: Floats) -> str:
 
 @cache
 def _shades() -> NDArray[np.float64]:
-    """Colours (256, 3) from least to most, told apart by every kind of colour vision."""
+    """Colours (256, 3) from least to most, distinguishable with every kind of colour vision."""
     from matplotlib import colormaps
 
     return np.asarray(np.round(255 * colormaps["cividis"](np.arange(256))[:, :3]))

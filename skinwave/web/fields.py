@@ -62,6 +62,6 @@ def heading(said: str) -> None:
 
 
 def error(key: str) -> None:
-    """What is wrong with what was typed, if anything is."""
+    """Message about an invalid entry, if there is one."""
     html.Div("{{ errors.%s }}" % key, v_if=f"errors.{key}", classes="sw-error",  # noqa: UP031
              id=f"{key}-error", raw_attrs=['role="alert"'])  # fmt: skip

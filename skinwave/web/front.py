@@ -169,7 +169,7 @@ class Front:
 
 
 def asked(text: str) -> dict[str, str]:
-    """What a page asks for as it opens, of the values of the controls.
+    """Values of the controls that a page asks for as it opens.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def asked(text: str) -> dict[str, str]:
 
 
 def _name(request: web.Request) -> str:
-    """What a page calls itself while it waits."""
+    """Name that a page gives itself while it waits."""
     return request.query.get("page", "")[:64] or uuid.uuid4().hex
 
 

@@ -21,14 +21,15 @@ MODULE = {
 }
 LOST = """
 <div id="sw-lost" role="alert" style="font: 1rem sans-serif; padding: 3rem; text-align: center">
-  <p>The connection to skinwave is lost. This page comes back by itself, with what its address says,
-  as soon as the program answers.</p><p id="sw-lost-why"></p><p><a href="">Try now</a></p>
+  <p>The connection to skinwave is lost. This page reloads by itself, with the parameters in its
+  address, as soon as the program is running again.</p><p id="sw-lost-why"></p>
+  <p><a href="">Try now</a></p>
 </div>
 """
 PLOTS = {
     "commanded_plot": "The commanded signal over time",
     "waveform_plot": "Waveform at the selected point",
-    "spectrum_plot": "Spectrum at the selected point, with its lines and what is felt of them",
+    "spectrum_plot": "Spectrum at the selected point, with its lines and the detection threshold",
 }
 SAVED = {  # name of the file, what makes it, its kind, what it is called
     "scene.toml": ("scene_toml", "", "application/toml", "Scene (TOML)"),
@@ -148,7 +149,7 @@ def _maps(session: Session) -> None:
             html.Div(
                 "<span><b aria-hidden='true' style='color:#56B4E9'>━</b> path, foci</span> "
                 "<span><b aria-hidden='true'>┄</b> border of the influence</span> "
-                "<span><b aria-hidden='true' style='color:#CC4FA0'>━</b> of what can be felt"
+                "<span><b aria-hidden='true' style='color:#CC4FA0'>━</b> detection threshold"
                 "</span> "
                 "<span><b aria-hidden='true' style='color:#D55E00'>✕</b> selected</span>",
                 classes="sw-caption sw-legend",
@@ -175,7 +176,7 @@ def _plots() -> None:
 
 
 def _looks() -> None:
-    """What is shown of the answer."""
+    """Selectors of the part of the response that is shown."""
     v3.VSelect(v_model=("span",), items=("spans", list(SPANS)), density="compact", id="span",
                hide_details=True, variant="plain", style="flex: 0 0 120px",
                raw_attrs=['aria-label="Part of the Tacton that is shown"'])  # fmt: skip

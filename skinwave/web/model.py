@@ -1,4 +1,4 @@
-"""From a scene to everything that a page shows of the point kernel's answer, and of any other."""
+"""Arrays of a page: a scene's response under the point kernel or another model, lines and maps."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -42,15 +42,15 @@ MOST_SHOWN = 1500  # points of a curve
 MOST_ENVELOPE = 600  # of the commanded Tacton without its carrier
 HIGHEST = 1000.0  # Hz of spectra
 FAINTEST = 1e-3  # of the strongest line: weaker ones are not named
-UNTRUSTED = 0.5  # of a response: lines that what is left cannot tell apart are not named
+UNTRUSTED = 0.5  # share of a response left to settle: lines unresolved in the rest are not named
 RESOLVED = 10  # samples of a period of the carrier
 SMOOTH = 16  # and of the fastest modulation, whose peaks are then within 2 %
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Map:
-    """A quantity over the area: `rms` (y, x) of it about its mean, in its unit, not a number beside
-    the body, and the borderline `felt` of what is felt, closed lines (k, 2) in metre.
+    """A quantity over the area: `rms` (y, x) of it about its mean, in its unit, NaN outside the
+    body, and its detection contour, closed lines (k, 2) in metre.
     """
 
     rms: Floats
@@ -71,7 +71,7 @@ class Line:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """A model's answer: the `response` at the one point that is selected, its `frequencies` (f,)
+    """Response of a model: the `response` at the one point that is selected, its `frequencies` (f,)
     in Hz with the amplitudes `spectrum` (f,), its named `lines`, the strongest first, the map
     and, if it was asked for, the motion of the whole body.
     """
@@ -97,19 +97,19 @@ class Commanded:
 
 
 def kernel(scene: Scene) -> Answer:
-    """The point kernel's answer to a scene of one probe, under the load that a body receives."""
+    """The point kernel's response in a scene of one probe, under the load that a body receives."""
     return answer_of(scene, compute(scene, "point-kernel"), kernel_map(scene.pressure))
 
 
 def as_published(scene: Scene) -> Answer:
-    """The point kernel's answer under the published load, whatever load the scene has."""
+    """The point kernel's response under the published load, whatever load the scene has."""
     return answer_of(
         scene, compute(scene, "point-kernel-published"), kernel_map(published(scene.pressure))
     )
 
 
 def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:
-    """What is shown of a response at one point."""
+    """Spectrum, named lines and map of a response at one point, as a page shows them."""
     f, amplitude = spectrum(response)
     shown = f <= HIGHEST
     return Answer(
@@ -152,8 +152,8 @@ def places(side: int = SIDE) -> Floats:
 
 
 def kernel_map(pressure: MovingPressure) -> Map:
-    """Where the pressure changes, of a rhythm while a pulse is on; and where the strongest line of
-    it, of a rhythm with its pauses, is at the threshold of skin.
+    """RMS pressure about its mean, of a rhythm while a pulse is on; and the contour where the line
+    with the highest sensation level, of a rhythm with its pauses, is at the threshold of skin.
     """
     tacton = replace(pressure.tacton, rhythm=None)
     path = tacton.trajectory
@@ -170,7 +170,7 @@ def kernel_map(pressure: MovingPressure) -> Map:
 
 
 def mean_level(pressure: MovingPressure) -> float:
-    """What the pauses of a rhythm leave of lines, over those while a pulse is on; 1 without."""
+    """Amplitude of lines with the pauses of a rhythm over that while a pulse is on; 1 without."""
     rhythm = pressure.tacton.rhythm
     if rhythm is None:
         return 1.0
@@ -219,7 +219,7 @@ def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
 
 
 def influenced(tacton: Tacton, height: float) -> tuple[Floats, ...]:
-    """The borderline of the influenced area: as far from a path as the main lobe reaches."""
+    """Contour of the influenced area: as far from a path as the main lobe reaches."""
     return _influenced(at_any_speed(tacton.trajectory), tacton.n_paths, height)
 
 

@@ -1,4 +1,4 @@
-"""What a page does to its session: controls, presets, undo, pinning, zooming, opening a scene.
+"""Actions of a page on its session: controls, presets, undo, pinning, zooming, opening a scene.
 
 `connect` binds each to a key of the state or to a trigger. Doing the same without a browser is
 calling them, or setting a key, within `with session.state:`.
@@ -24,7 +24,7 @@ LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 
 
 def connect(session: Session) -> None:
-    """Have a page's session follow what is done on it, and answer it for the first time."""
+    """Have a page's session follow what is done on it, and compute its first response."""
     watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
         (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest")), (phase, ("phase",)),
         (solid, ("solid",)), (opened, ("opened",)), (published, ("published",)),
@@ -47,7 +47,7 @@ def controlled(session: Session) -> None:
 
 def turn(session: Session, given: Values, whole: bool = False) -> None:
     """Set controls; what is refused is marked at its field, which keeps what was typed, for it may
-    be half of a number. A `whole` Tacton brings its own drawing frequency, held from then.
+    be half of a number. A `whole` Tacton brings its own drawing frequency, constant from then.
     """
     state = session.state
     accepted, errors, typed = _checked(session, given)
@@ -64,7 +64,7 @@ def turn(session: Session, given: Values, whole: bool = False) -> None:
             values |= scenes.held(values, moved[-1], state.held_frequency)
             errors.pop("hold", None)
         except ValueError as error:
-            errors["hold"] = f"the drawing frequency cannot be held: {error}"
+            errors["hold"] = f"the drawing frequency cannot be kept constant: {error}"
     state.update({"errors": errors, "typed": typed})
     put(session, values)
     session.history.push(values)
@@ -75,7 +75,7 @@ def turn(session: Session, given: Values, whole: bool = False) -> None:
 
 
 def _checked(session: Session, given: Values) -> tuple[Values, dict[str, str], dict[str, str]]:
-    """What is accepted; what is wrong and was typed of each field, with what was so before."""
+    """Accepted values; errors and typed texts of each field, with those from before."""
     accepted: Values = {}
     errors, typed = dict(session.state.errors), dict(session.state.typed)
     for key, value in given.items():
@@ -89,7 +89,7 @@ def _checked(session: Session, given: Values) -> tuple[Values, dict[str, str], d
 
 
 def setter(session: Session, key: str) -> Callable[[Any], None]:
-    """What a field of a control calls with what was typed."""
+    """Function that a control's field calls with what was typed."""
     return lambda given: turn(session, {key: given})
 
 
@@ -207,7 +207,7 @@ def published(session: Session) -> None:
 
 
 def look(session: Session) -> None:
-    """Something else is to be seen of the same answer."""
+    """Another view of the same response is to be seen."""
     session.zoomed = None
     draw(session)
 

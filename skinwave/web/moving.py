@@ -63,8 +63,8 @@ def slab_shape(body: Body, places: Floats) -> Shape:
 
 
 def skin_of(made: Any, body: Body) -> tuple[Shape, Ints]:
-    """What is seen of a meshed body, and which nodes (n,) of the mesh its points are: the upper
-    side of a sheet, all around of others, without what only takes waves away.
+    """Visible surface of a meshed body, and the nodes (n,) of the mesh that are its points: the
+    upper side of a sheet, the whole surface of others, without the absorbing layer.
     """
     mesh = made.mesh
     if body.kind == "sheet":
@@ -127,8 +127,8 @@ def sent_motion(moving: Moving, pressure: MovingPressure) -> dict[str, Any]:
 
 
 def signed_ends(largest: float) -> list[str]:
-    """What the left end, the middle and the right end of a colour bar stand for, of motion up to
-    `largest` metre about its mean.
+    """Labels of a colour bar at its left end, middle and right end, of motion up to `largest` metre
+    about its mean.
     """
     value = f"{1e6 * largest:.3g} µm"
     return [f"{value} out of the body", "0", f"{value} into the body"]

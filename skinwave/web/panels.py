@@ -25,12 +25,12 @@ PROFILES = {
 }
 REACH_MM = NUMBERS["x"].high
 LEFT_OUT = (
-    "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): a skin point feels the pressure of the "
-    "focus where it is, weighted by distance. Nothing propagates, no body deflects. <i>Kernel, "
-    "same load</i> has the drive law and focus profile that are chosen, as every body has; "
-    "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. What "
-    "drive and profile change is the one against the other; what propagation changes is the waves "
-    "against the kernel under the same load.",
+    "<b>Point kernel</b> (Lim, Seifi, Park, CHI EA '24): the stimulus at a point of the skin is "
+    "the pressure of the focus, weighted by distance. Nothing propagates, no body deflects. "
+    "<i>Kernel, same load</i> has the drive law and focus profile that are chosen, as every body; "
+    "<i>kernel, as published</i> the linear drive and the main lobe, whatever is chosen. These two "
+    "differ by drive law and profile; waves and the kernel under the same load differ by "
+    "propagation.",
     "<b>Skin slab</b>: wavenumber integral of an infinite flat layer of soft tissue of 15 mm on "
     "bone; no sides. <b>Paper sheet, palm</b>: finite elements, coarser than those of <i>skinwave "
     "compare</i>: some per cent of the motion. Another shape, size or height of the focus reduces "
@@ -40,11 +40,13 @@ LEFT_OUT = (
     "Motion is linear and begins from rest; a real sheet of paper stiffens as it sags. The "
     "pressure, 50 Pa at full drive, is uncertain by a factor of 2. Air is left out.",
     "Side lobes of the focus, and what several simultaneous foci do to each other, are left out: "
-    "simultaneous and time-multiplexed foci push alike here, devices differ.",
-    "Foci on paths of their own all push alike and are drawn equally often; a circle is then a "
-    "polygon, nowhere further from it than 0.01 mm.",
-    "Thresholds of what is felt differ by 5 dB between people. Waves: the strongest line, in dB "
-    "above the threshold for a focal spot; kernel: 4.4 Pa, just felt with AM at 200 Hz. "
+    "simultaneous and time-multiplexed foci are the same load here, devices differ.",
+    "Foci on paths of their own have equal pressure and are drawn equally often; a circle is then "
+    "a polygon, nowhere further from it than 0.01 mm.",
+    "Detection thresholds differ by 5 dB between people. The contour in a map is where the line "
+    "with the highest sensation level is at threshold: of waves, the displacement threshold for a "
+    "focal spot; of the kernel, 2.2 Pa at 200 Hz (a peak of 4.4 Pa with AM), at other frequencies "
+    "in proportion to the displacement threshold. "
     "Maps of a rhythm are those of its pulses while they are on.",
     "Weights of the superposition multiply the two "
     "AM sinusoids; a frequency of 0 is a factor of 1.",
@@ -52,7 +54,7 @@ LEFT_OUT = (
 
 
 def control_panel(session: Session) -> None:
-    """All that can be turned."""
+    """All controls."""
     with html.Div(classes="sw-controls", id="controls"):
         v3.VSelect(v_model=("body",), items=("bodies",), label="Body", density="compact",
                    hide_details=True, id="body", style="margin-top: 8px")  # fmt: skip
@@ -142,7 +144,7 @@ def body() -> None:
 
 
 def differences() -> None:
-    """What is pinned and what is shown: where the two sets of values differ."""
+    """Differences between the values that are pinned and those that are shown."""
     columns = "<td v-for='row in differs' :key='row.name'>{{ row.%s }}</td>"
     HtmlElement("table", v_if="pinned", classes="sw-differs", id="differs", children=[
         "<tr><th scope='col'>{{ differs.length ? '' : 'A and B are the same' }}</th>"
@@ -154,18 +156,18 @@ def differences() -> None:
 
 
 def summary() -> None:
-    """What propagation and the drive law do, in a sentence each."""
+    """Effects of propagation and of the drive law, in a sentence each."""
     with html.Div(v_if="summary.length", classes="sw-summary", id="summary",
                   raw_attrs=['aria-label="What propagation changes"']):  # fmt: skip
         html.Span("{{ said + ' ' }}", v_for="said in summary", key="said")
 
 
 def warnings() -> None:
-    """What is less than was asked for, and how wrong the answer may be: as text, for sentences may
-    quote what came from a file.
+    """Warnings and the expected error of the response: as text, for sentences may quote what came
+    from a file.
     """
     with html.Div(v_if="warnings.length || expected", classes="sw-warnings", id="warnings",
-                  raw_attrs=['role="status"', 'aria-label="Warnings of this answer"']):  # fmt: skip
+                  raw_attrs=['role="status"', 'aria-label="Warnings and errors"']):  # fmt: skip
         html.P("Warning: {{ said }}", v_for="said in warnings", key="said")
         html.P("{{ expected }}", v_if="expected", id="expected")
 
@@ -185,7 +187,7 @@ def line_table() -> None:
         html.Tr(
             "<th scope='col'>line</th><th scope='col'>Hz</th><th scope='col'>Pa</th>"
             "<th scope='col'>µm</th>"
-            "<th scope='col' title='above the threshold of detection'>felt, dB</th>"
+            "<th scope='col' title='sensation level: dB above the detection threshold'>dB SL</th>"
         )
         html.Tr(
             "<td><template v-for='(part, k) in row.name.split(/<.?sub>/)' :key='k'>"
@@ -199,12 +201,12 @@ def line_table() -> None:
 
 
 def notices() -> None:
-    """What cannot be."""
+    """Error messages of the controls' values."""
     v3.VAlert("{{ problem }}", v_if="problem", type="error", density="compact", id="problem")
 
 
 def computing(session: Session) -> None:
-    """What is being computed, over where it is to be seen."""
+    """Progress of a computation, over the place of its result."""
     with html.Div(v_if="busy", id="busy", classes="sw-busy"):
         html.Div("{{ body }}: {{ busy }}{{ left ? ', ' + left : '' }}", id="busy-said")
         v3.VProgressLinear(model_value=("done",), indeterminate=("!done",), height=6)
@@ -212,7 +214,7 @@ def computing(session: Session) -> None:
 
 
 def about() -> None:
-    """What the models are, and what they leave out."""
+    """Assumptions of the models, and what they leave out."""
     with v3.VNavigationDrawer(
         v_model=("about", False), location="right", temporary=True, width=380,
         raw_attrs=['aria-label="About this model"'],

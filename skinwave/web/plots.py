@@ -20,7 +20,7 @@ from skinwave.web.drawings import written
 from skinwave.web.model import Answer, commanded_curve, thinned
 
 DIGITS = 5  # of the largest number of a curve that are sent
-STALE = 0.2  # opacity of an answer that is not that of the controls
+STALE = 0.2  # opacity of a response that is not that of the controls
 NAMED = 6  # lines with a name in the plot
 SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (-0.06, 0.0),
          "all": (0.0, np.inf)}  # fmt: skip
@@ -31,8 +31,8 @@ Plot = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """What is drawn in one plot: the `kernel` under the load that the `waves` answer to, as well,
-    which are of other controls while `stale`; the kernel as `published`; and what is `pinned`.
+    """Responses in one plot: the `kernel` under the load of the `waves`, which are of other
+    controls while `stale`; the kernel as `published`; and those that are `pinned`.
     """
 
     kernel: Answer
@@ -105,7 +105,7 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> Plot:
 
 
 def spectrum_plot(curves: Curves, highest: float = 600.0) -> Plot:
-    """The spectra at the selected point, their lines named, and what is felt of them."""
+    """The spectra at the selected point, their lines named, and the detection threshold."""
     data, waves = [], curves.waves
     for answer, style in _styled(curves):
         shown = answer.frequencies <= highest
@@ -126,7 +126,7 @@ def _in_unit(answer: Answer) -> float:
 
 
 def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
-    """What is drawn, in the order of its names: kernels, waves, and all that is pinned, as A."""
+    """Curves with their styles in the order of the legend: kernels, waves, all pinned ones as A."""
     shown = "B: " if curves.pinned else ""
     found: list[tuple[Answer, dict[str, Any]]] = []
     if curves.published is not None:
@@ -167,7 +167,7 @@ def _pressure_curve(highest: float) -> dict[str, Any]:
 
 
 def _tallest(waves: Answer | None, highest: float) -> float | None:
-    """What the axis of displacement has to reach: the lines, and the least of the threshold."""
+    """Least range of the axis of displacement: the lines, and the minimum of the threshold."""
     if waves is None:
         return None
     f = np.linspace(50, highest, 60)

@@ -16,7 +16,7 @@ from skinwave.web.access import one_line
 
 PATIENCE = 60.0  # s that a session may take to start
 # For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
-# limit to what was freed once, and a process that answers for hours fills with gaps.
+# limit to what was freed once, and the heap of a process that runs for hours is fragmented.
 RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
 COMMAND = (sys.executable, "-m", "skinwave.web.serve")
 FAILURES = (OSError, TimeoutError, ValueError)  # of a process that does not start

@@ -100,7 +100,7 @@ def values_of(scene: Scene) -> Values:
         f"profile = {pressure.focus} of the focus": pressure.focus not in CHOICES["profile"],
     }  # fmt: skip
     if said := [what for what, holds in beyond.items() if holds]:
-        raise ValueError(f"{' and '.join(said)} cannot be turned here; use skinwave run")
+        raise ValueError(f"{' and '.join(said)} cannot be set here; use skinwave run")
     rhythm, (x, y) = tacton.rhythm, scene.probes[0]
     pulses = rhythm.pulses if rhythm else ()
     return STARTS | {

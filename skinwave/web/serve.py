@@ -49,7 +49,7 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
 
 def _on_one_thread() -> None:
     """Have numpy compute on one thread here: what a move takes is too small to share out, and
-    threads that wait for each other delay it. The process that answers with a body has more.
+    threads that wait for each other delay it. The process that computes a body's response has more.
     """
     from skinwave.web.worker import limits
 
@@ -60,7 +60,7 @@ def _on_one_thread() -> None:
 
 
 def _quiet() -> None:
-    """What other libraries log of messages that cannot be read: one line of each."""
+    """Log unreadable messages, as other libraries report them, in one line each."""
     from skinwave.web.access import in_lines
 
     logging.getLogger("wslink").setLevel(logging.CRITICAL + 1)  # `guard` says what is a fault here

@@ -16,11 +16,11 @@ from skinwave.web.worker import Worker
 
 
 class Session:
-    """What one page shows.
+    """Record of what one page shows.
 
     `good` are the values that the controls had last without a mistake, `number` counts the
-    questions to the process that answers with a body, `own` is a body from a file and `zoomed` the
-    part in s of the commanded Tacton, if it is not the one that is chosen.
+    requests to the process that computes the response of a body, `own` is a body from a file and
+    `zoomed` the part in s of the commanded Tacton, if it is not the one that is chosen.
     """
 
     def __init__(self, server: Any, values: Values | None = None, own: Body | None = None) -> None:
@@ -41,12 +41,12 @@ class Session:
 
     @property
     def values(self) -> Values:
-        """What the controls say."""
+        """Values of the controls."""
         return {key: self.state[key] for key in KEYS}
 
     @property
     def answers(self) -> tuple[Answer, ...]:
-        """The point kernel's answer and, if it is that of the controls, the body's."""
+        """The point kernel's response and, if it is that of the controls, the body's."""
         current = None if self.state.waves_stale else self.waves
         return tuple(answer for answer in (self.kernel, current) if answer)
 
@@ -57,12 +57,12 @@ class Session:
             self.ask()
 
     def ask(self) -> None:
-        """Have the body answered by the other process, if there is a page to tell."""
+        """Have the other process compute the body's response, if there is a page to tell."""
         if self._loop:
             self.worker.ask(self.number, self.scene, bool(self.state.solid))
 
     def _told_elsewhere(self, what: str, number: int, content: Any) -> None:
-        """What the other process tells, brought to where the page is served."""
+        """Messages of the other process, brought to where the page is served."""
         if self._loop is None:
             return
 
@@ -82,13 +82,13 @@ def take(session: Session, values: Values | None) -> None:
 
 
 def put(session: Session, values: Values) -> None:
-    """Set the controls, without an answer to them."""
+    """Set the controls, without computing a response."""
     session.good = {key: values[key] for key in KEYS}
     session.state.update(session.good)
 
 
 def refresh(session: Session) -> None:
-    """Answer the controls: the point kernel at once, a body when its process has."""
+    """Compute the response to the controls: the point kernel at once, a body in its process."""
     state = session.state
     try:
         session.scene = scenes.scene_of(session.good, session.own)
@@ -116,14 +116,14 @@ def refresh(session: Session) -> None:
 
 
 def told(session: Session, what: str, number: int, content: Any) -> None:
-    """The process that answers with a body has something to tell."""
+    """Take a message of the process that computes the response of a body."""
     state = session.state
     if what == "progress":
         if session.good["body"] != "none":  # else told before it was cancelled
             state.update({"busy": content.name, "done": round(100 * content.done),
                           "left": content.time_left})  # fmt: skip
     elif number != session.number:
-        return  # an older question's
+        return  # an older request's
     elif what == "failed":
         session.waves = None
         state.update({"busy": "", "problem": content, "waves_stale": False})
@@ -136,13 +136,13 @@ def told(session: Session, what: str, number: int, content: Any) -> None:
 
 
 def solid(session: Session) -> None:
-    """Have the motion of the whole body answered, too, if it is to be seen and is not there."""
+    """Have the motion of the whole body computed, too, if it is to be seen and is not there."""
     if session.state.solid and session.waves is not None and session.waves.moving is None:
         session.ask()
 
 
 def draw(session: Session) -> None:
-    """All that is seen, from the answers there are."""
+    """Draw all that is seen, from the responses there are."""
     if session.kernel is not None:
         shown.commanded(session.state, session.scene, session.zoomed)
         shown.foci(session.state, session.scene)

@@ -1,4 +1,4 @@
-"""From answers to the keys of a page's state that its plots, maps and tables show."""
+"""Keys of a page's state that its plots, maps and tables show, from the responses of models."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,7 +25,7 @@ def bodies(own: Body | None) -> list[str]:
 
 
 def first(own: Body | None) -> dict[str, Any]:
-    """The state beside the controls before anything was answered."""
+    """The state apart from the controls before there is a response."""
     return {
         "errors": {}, "typed": {}, "problem": "", "stale": False, "waves_stale": False,
         "busy": "", "done": 0, "left": "",
@@ -42,7 +42,7 @@ def first(own: Body | None) -> dict[str, Any]:
 
 
 def answers(state: Any, scene: Scene, curves: Curves) -> None:
-    """Plots, maps and table of answers."""
+    """Plots, maps and table of responses."""
     kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
     span = plots.span_of(state.span, tacton.duration)
     state.update({
@@ -69,8 +69,8 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
 
 
 def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
-    """What propagation does, if a body's answer follows the kernel's, what the drive law does, and
-    what is strongest at the selected point.
+    """Sentences on the effect of propagation, if a body's response follows the kernel's, on that of
+    the drive law, and on the line with the highest sensation level at the selected point.
     """
     new = added_names(scene.pressure)[:NAMED]
     said = f"adds {', '.join(new)}, which the published load lacks" if new else "adds no component"
@@ -80,15 +80,15 @@ def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
         return [drive]
     share = 100 * share_outside(kernel.map.rms, waves.map.rms)
     texts = [
-        f"Waves carry {share:.0f} % of the motion in this area to where the point kernel, under "
-        "the same load, predicts less than a tenth of its largest.",
+        f"Waves carry {share:.0f} % of the mean-square motion in this area to where the point "
+        "kernel, under the same load, predicts less than a tenth of its largest.",
         drive,
     ]
     levels = {line: line.sensation for line in waves.lines if line.sensation is not None}
     if levels:
         line = max(levels, key=lambda each: levels[each])
         texts.append(
-            f"Strongest at the selected point: {line.name}, {line.frequency:.0f} Hz, "
+            f"Highest sensation level at the selected point: {line.name}, {line.frequency:.0f} Hz, "
             f"{levels[line]:+.0f} dB re threshold."
         )
     return texts
@@ -104,18 +104,18 @@ def added_names(pressure: MovingPressure) -> list[str]:
 
 
 def warnings(answers: Sequence[Answer]) -> list[str]:
-    """What answers say is less than was asked for, each sentence once."""
+    """Warnings of responses, each sentence once."""
     return list(dict.fromkeys(s for answer in answers for s in answer.response.effort.warnings))
 
 
 def expected(answer: Answer) -> str:
-    """How wrong an answer is expected to be, in words, if it says so."""
+    """Expected relative error of a response, in words, if it has one."""
     error = getattr(answer.response, "expected_error", np.nan)
     return f"Expected numerical error: {100 * error:.2g} %" if error > 0 else ""
 
 
 def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
-    """What differs between two sets of values, as a table: A is pinned, B is what is shown."""
+    """Table of the differences between two sets of values: A is pinned, B is shown."""
     return [
         {"name": NAMES[key], "a": said(key, pinned[key]), "b": said(key, values[key])}
         for key in KEYS
@@ -124,11 +124,11 @@ def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
 
 
 def untold(count: int, duration: float) -> str:
-    """What the table of lines leaves out of a Tacton of this duration in s."""
+    """Unresolved lines, which the table leaves out, of a Tacton of this duration in s."""
     if not count:
         return ""
     lines = f"{count} line{'s' * (count > 1)}"
-    return f"{lines} cannot be told apart in {duration:g} s; make the Tacton longer."
+    return f"{lines} cannot be resolved in {duration:g} s; make the Tacton longer."
 
 
 def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> None:

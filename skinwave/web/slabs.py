@@ -2,9 +2,10 @@
 
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
-of which only the spot S depends on the height: G, which takes the time, is kept on one grid of
-wavenumbers that is fine and wide enough for the narrowest spot. As in `simple_model.flat_body` the
-path of integration runs above the real axis, away from the poles of waves.
+in which only the transform S of the focal pressure profile depends on the height: G, which takes
+the time, is cached on one grid of wavenumbers that is fine and wide enough for the narrowest
+profile. As in `simple_model.flat_body` the path of integration runs above the real axis, away from
+the poles of waves.
 """
 
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from skinwave.scene import Body
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
 FURTHEST = 0.145  # m: from a path in one corner of the area to the other
-LOWEST = 0.02  # m: the height whose spot is the narrowest
+LOWEST = 0.02  # m: the height whose focal spot is the narrowest
 ORDER = 16  # of Gauss and Legendre's rule on each panel
 FEWEST_NODES = 512  # of the wavenumber grid
 LOOKED = 16  # every so many frequencies and distances the grid is checked at
@@ -88,7 +89,7 @@ def _distances(height: float) -> Floats:
 def _tabulated(known: Wavenumbers, height: float, distances: Floats) -> fem.Complex:
     """g (f, r) at the distances (r,) in metre."""
     width = spot_width(height)
-    counts = known.along <= 6.5 / width  # beyond, the spot has nothing
+    counts = known.along <= 6.5 / width  # beyond, the transform of the profile is negligible
     k = known.k[counts]
     spot = width**2 * np.exp(-((k * width) ** 2) / 2)
     carried = known.G[:, counts] * (spot * k * known.weights[counts])

@@ -54,7 +54,7 @@ def _one_path(session: Session) -> None:
     html.Div("drawing frequency: <b id='drawing'>{{ drawing_frequency.toFixed(2) }} Hz</b>",
              classes="sw-note")  # fmt: skip
     v3.VCheckbox(v_model=("hold", False), density="compact", hide_details=True, id="hold",
-                 label="hold it while size or speed moves")  # fmt: skip
+                 label="constant drawing frequency")  # fmt: skip
     error("hold")
     with html.Div(v_if="foci > 1"):
         text(session, "phases", "Phases in % of the path, such as 0, 25, 60; empty is even")
@@ -64,7 +64,7 @@ def _own_paths(session: Session) -> None:
     number(session, "drawn")
     options = "".join(f'<option value="{name}">{name}</option>' for name in SHAPES)
     cells = "".join(
-        # What is being typed stays when the answer to the cell before arrives.
+        # What is being typed stays when the update after the field before arrives.
         f'<td><input inputmode="decimal" :id="`own-{part}-${{k}}`" '
         f':value="draft[`{part}-${{k}}`] ?? row[{part}]" '
         f'@input="draft = {{ [`{part}-${{k}}`]: $event.target.value }}" '

@@ -6,14 +6,14 @@ and leaves the line.
 
 import time
 
-# Pages at a time: 0.2 GB each with the skin slab (0.12 GB, and 0.085 GB of the process that answers
-# with waves), measured as what they do not share; bodies of finite elements take more.
+# Pages at a time: 0.2 GB each with the skin slab (0.12 GB, and 0.085 GB of the process that
+# computes waves), measured as what they do not share; finite-element bodies take more.
 MOST = 12
 AT_ONCE = 2  # pages that are opened at a time: more of them wait for each other's imports
 FORGOTTEN = 5.0  # s after which a page that does not ask any more has left the line
 LONGEST_LINE = 1000
 FULL = (
-    f"{MOST} pages are open, as many as skinwave keeps at a time; this one opens as soon as "
+    f"{MOST} pages are open, as many as skinwave allows at a time; this one opens as soon as "
     "another is closed"
 )
 BUSY = f"Other pages are being opened, {AT_ONCE} at a time; this one opens when it is its turn"

@@ -1,4 +1,4 @@
-"""What a body makes of a Tacton, quickly enough to follow a slider.
+"""Response of a body to a Tacton, quickly enough to follow a slider.
 
 Slab: the wavenumber integral of an infinite one. A table of g(r, w) for a height carries every
 path (`slabs`); a probe's motion from rest is then a sum over harmonics of the path, as in
@@ -66,9 +66,9 @@ TOLERANCE = 0.02  # of a reduction
 MANY = 264  # knots, of which every second spans the same pressures
 NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 BAND = 1000.0  # Hz
-# Metre. Coarser than what `compare` takes: some per cent, for an answer that does not keep waiting.
+# Metre. Coarser than in `compare`: an error of some per cent, for a response within seconds.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
-# As in `skinwave.steps`; a body that is kept begins with the third.
+# As in `skinwave.steps`; a body that is cached begins with the third.
 STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.15, "reduce": 0.7, "read the surface": 0.05}
 KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
@@ -95,7 +95,7 @@ class Reduced:
 
 
 class Waves:
-    """Answers with a body; keeps what the next answer can use."""
+    """Responses of bodies; caches what the next one can use."""
 
     def __init__(self) -> None:
         self._kept: dict[str, dict[Any, Any]] = {
@@ -103,7 +103,7 @@ class Waves:
         }  # fmt: skip
 
     def __call__(self, scene: Scene, progress: Progress, moving: bool = False) -> Answer:
-        """The answer to a scene of one probe, with the motion of the whole body if `moving`;
+        """The response in a scene of one probe, with the motion of the whole body if `moving`;
         raises what `simulate` does.
         """
         if has_exact_waves(scene.body):
@@ -132,7 +132,7 @@ class Waves:
 
 
 def warned_of(scene: Scene, answer: Answer) -> Answer:
-    """The answer with the warnings of the command line, but for those that take a second mesh."""
+    """The response with the warnings of the command line, except those that need a second mesh."""
     response = answer.response
     if has_exact_waves(scene.body) and scene.body.sides == "absorbing":
         return answer  # an infinite slab, whose sides reflect nothing
@@ -142,7 +142,7 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
 
 
 def gaussian_only(pressure: MovingPressure) -> None:
-    """Refuse what a table of a Gaussian spot cannot answer.
+    """Refuse a focal profile for which there is no table, any but a Gaussian.
 
     Raises
     ------
@@ -223,8 +223,8 @@ def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
 
 def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> Map:
     """The map of lines (f,) in Hz whose complex amplitudes (f, SIDE^2) in metre are known, of a
-    rhythm while a pulse is on; and where the strongest line, of a rhythm with its pauses as in the
-    table of lines, is at the threshold, which a sheet has not.
+    rhythm while a pulse is on; and the contour where the line with the highest sensation level, of
+    a rhythm with its pauses as in the table of lines, is at the threshold, which a sheet has not.
     """
     amplitudes = np.abs(motion)
     felt = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])

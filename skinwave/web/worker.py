@@ -1,4 +1,4 @@
-"""A process that answers with a body, so that a page never waits: newest question first, cancel."""
+"""Process that computes responses of bodies while a page stays live: newest request first."""
 
 import contextlib
 import multiprocessing
@@ -13,15 +13,15 @@ from skinwave.effort import THREADS
 from skinwave.processes import environment
 from skinwave.steps import Step, follower
 
-Told = Callable[[str, int, Any], None]  # what, number of the question, content
+Told = Callable[[str, int, Any], None]  # what, number of the request, content
 LEAST_STEP = 0.02  # of progress that is told
 
 
 def answer_forever(pipe: Connection) -> None:
-    """Answer questions (number, scene, moving) until the other end is closed.
+    """Compute requests (number, scene, moving) until the other end is closed.
 
-    Tells ("progress", number, Step), then ("answer", number, Answer) or
-    ("failed", number, sentence).
+    Sends ("progress", number, Step), then the response with its number or ("failed", number,
+    sentence).
     """
     from skinwave.web.waves import Waves
 
@@ -100,7 +100,7 @@ def _teller(pipe: Connection, number: int) -> Callable[[str, float], None]:
 
 
 class Worker:
-    """The process and the one question that it is at; of those that wait only the newest counts.
+    """The process and the one request that it is at; of those that wait only the newest counts.
 
     `told` is called from a thread of this process with everything that the other one tells.
     """
@@ -114,8 +114,8 @@ class Worker:
         self._waiting: tuple[int, Any, bool] | None = None
 
     def ask(self, number: int, scene: Any, moving: bool = False) -> None:
-        """Ask for a scene's answer, with the motion of the whole body if `moving`; an older
-        question that still waits is forgotten.
+        """Request a scene's response, with the motion of the whole body if `moving`; an older
+        request that still waits is forgotten.
         """
         with self._lock:
             if self._at is not None:
@@ -125,7 +125,7 @@ class Worker:
             self._send(number, scene, moving)
 
     def cancel(self) -> None:
-        """Forget all questions, and end the process if it is at one."""
+        """Forget all requests, and end the process if it is at one."""
         with self._lock:
             self._waiting = None
             if self._at is not None:
@@ -175,7 +175,7 @@ class Worker:
                 lost = self._waiting[0] if self._waiting else self._at
                 self._at = self._waiting = self._process = self._pipe = None
         if lost is not None:  # the newest: of an older one nothing is awaited any more
-            self._told("failed", lost, "the process that answers has ended; choose the body again")
+            self._told("failed", lost, "the computing process has ended; choose the body again")
 
     def _next(self, number: int) -> None:
         with self._lock:

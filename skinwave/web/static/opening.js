@@ -3,7 +3,7 @@
 // waits for its turn, and says why.
 (() => {
   const OFTEN = 1000; // ms
-  const LOST = "skinwave does not answer; this page opens as soon as it does.";
+  const LOST = "skinwave does not respond; this page opens as soon as it does.";
   const { main, keys } = document.currentScript.dataset, address = new URL(window.location);
   const kept = keys.split(" ");
   const taken = [...address.searchParams.keys()].filter((key) => !kept.includes(key));

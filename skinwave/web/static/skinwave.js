@@ -1,4 +1,4 @@
-// What only a page itself can do: its address, the point under a pointer, coming back after a loss.
+// Functions of the page itself: its address, the point under a pointer, reloading after a loss.
 window.trame.utils.skinwave = {
   address(query) {
     const at = window.location.pathname + (query ? "?" + query : "");
@@ -10,7 +10,7 @@ window.trame.utils.skinwave = {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix);
     return [at.x, -at.y];
   },
-  // Move the selected point: every press counts, however many come before an answer does.
+  // Move the selected point: every press counts, however many come before an update does.
   step(dx, dy, limit) {
     const { state } = window.trame;
     const moved = (key, by) => {
