@@ -204,7 +204,7 @@ def test_the_first_screen_says_what_each_difference_changes():
     assert "same load" in waves
     assert "f_d" in drive
     assert "not propagation" in drive
-    assert "Felt out to" in felt
+    assert "Above threshold out to" in felt
     assert "half or twice the pressure" in felt
     assert "varied one by one, the share is" in felt
     rows = small_table(list(first.changes.values()), "one")
@@ -225,7 +225,7 @@ def test_a_constant_pressure_at_rest_moves_nothing(drive):
 
 
 def test_the_strongest_component_is_one_of_amplitude_in_kernel_and_body():
-    """What is felt most follows from the threshold, which is not propagation's."""
+    """The highest sensation level follows from the threshold, which is not propagation's."""
     scene = Scene(pressure=MovingPressure(tacton=circle(80, 0, 0)), body=Body())
     _, kernel, run = beside_kernels(_run(scene, "flat-body-harmonic"))
     found = propagation(run, kernel)
@@ -239,7 +239,7 @@ def test_paper_has_no_sensation_level():
     first = shown({"one": beside_kernels(_run(scene, "flat-body-harmonic"))}, quick_maps)
     assert first.changes["sheet"].strongest.level is None
     assert "say nothing of paper" in sentences(first)[2]
-    assert "Felt" not in sentences(first)[2]
+    assert "Above threshold" not in sentences(first)[2]
 
 
 def _run(scene, model, name="one"):
