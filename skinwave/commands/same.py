@@ -7,7 +7,7 @@ from skinwave.commands.common import add_reporting, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     for name in ("first", "second"):
         parser.add_argument(name, type=Path, metavar="DIR", help="folder of results")
     parser.add_argument(
