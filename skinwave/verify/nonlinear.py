@@ -257,7 +257,7 @@ def too_much() -> Case:
 
 
 def reduced_against_full() -> Case:
-    """The bending modes against all unknowns on the same mesh, through 0.06 s of a Tacton."""
+    """The bending modes against all dofs on the same mesh, through 0.06 s of a Tacton."""
     scene, h = _scene(PAPER, 1.0, 0.06), 0.1 / 12
     modes, full = (compute(scene, m, h=h) for m in ("fem-nonlinear", "fem-nonlinear-transient"))
     swing = full.displacement - full.displacement.mean(axis=0)
@@ -268,15 +268,15 @@ def reduced_against_full() -> Case:
     ]
     shown = 1e6 * full.displacement[:, 0], 1e6 * modes.displacement[:, 0]
     return Case(
-        title="A sheet in its bending modes against all of its unknowns",
+        title="A sheet in its bending modes against all of its dofs",
         source="the same equations without reduction; Hollkamp and Gordon, J Sound Vib 318:1139 "
         "(2008): implicit condensation",
-        mesh=f"12 by 12 by 1 cells, {full.effort.dofs:,} unknowns, {modes.effort.reduced_dofs} "
+        mesh=f"12 by 12 by 1 cells, {full.effort.dofs:,} dofs, {modes.effort.reduced_dofs} "
         f"modes; {full.effort.steps} steps",
         checks=tuple(checks),
         plot=Plot(
-            x="time, ms", y="displacement of the centre, um", drawn=("all unknowns",),
-            lines={"all unknowns": (1e3 * full.times, shown[0]), "modes":
+            x="time, ms", y="displacement of the centre, um", drawn=("all dofs",),
+            lines={"all dofs": (1e3 * full.times, shown[0]), "modes":
                    (1e3 * modes.times[::10], shown[1][::10])},
         ),
     )  # fmt: skip
