@@ -1,4 +1,4 @@
-"""Where the preparation of a body is: step n of m, the share done, and the time left."""
+"""Progress of the offline stage of a body: step n of m, the share done, and the time left."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -39,7 +39,7 @@ class Step:
 def follower(
     steps: Mapping[str, float] = PREPARING, clock: Callable[[], float] = time.monotonic
 ) -> Callable[[str, float], Step]:
-    """What makes a `Step` of each report of progress (phase, fraction of it done).
+    """Function that makes a `Step` of each report of progress (phase, fraction of it done).
 
     The time left goes by what was done since these steps began, perhaps not with the first of them.
     """
