@@ -1,9 +1,9 @@
 """Soak test of the page: `python -m bench.web_soak [seconds] [seed] [bodies]`.
 
-Two browsers at random: whatever can be turned, clicked, opened or saved, in any order. Every body is
-built first, as often as is cached, which a busy machine takes minutes for: "none,skin-slab" does without. Counted: what
-either page's console or the server says of errors, and by how much memory has grown between the end
-of the first fifth and the end.
+Two browsers at random: whatever can be turned, clicked, opened or saved, in any order. Every body
+is built first, as often as is cached, which a busy machine takes minutes for: "none,skin-slab" does
+without. Counted: errors on either page's console or of the server, and by how much memory has grown
+between the end of the first fifth and the end.
 """
 
 import os
