@@ -1,4 +1,4 @@
-"""skinwave beside what a user would pick instead: the same mesh, material and load, in turn.
+"""skinwave against other codes: the same mesh, material and load, in turn.
 
 The skin slab of the scenes with two changes that let every code take part: free sides, as
 absorbing ones are not in all of them, and Poisson's ratio 0.45, up to which plain quadratic

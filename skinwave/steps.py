@@ -7,7 +7,7 @@ from dataclasses import dataclass
 # Steps in their order, each with its share of the time: between those of a sheet and of a palm.
 PREPARING = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
 SAME = {"march": "reduce"}  # what another model does at that step
-LEAST = 0.2  # of all, after which the time that is left is told: a sheet is meshed at once
+LEAST = 0.2  # of all, after which the time that is left is shown: a sheet is meshed at once
 
 
 @dataclass(frozen=True, kw_only=True)

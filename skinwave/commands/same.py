@@ -19,7 +19,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; 0 if they hold the same, 1 if not."""
+    """Run the command; 0 if they hold the same, 1 if not."""
     from skinwave.same import differences
 
     found = differences(options.first, options.second, options.rtol)

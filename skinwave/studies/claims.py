@@ -87,7 +87,7 @@ def _single_line(runs: list[Run]) -> Judgement:
         worst < ABSENT,
         worst,
         ABSENT,
-        f"the strongest line beside f_AM is at {decibel(worst)} dB re f_AM",
+        f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM",
     )
 
 
@@ -273,12 +273,12 @@ def _rivals(run: Run) -> list[str]:
 
 
 def _others(run: Run, velocity: bool = False) -> Floats:
-    """Level of the strongest line beside f_AM at each probe, dB re f_AM there."""
+    """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
     return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
 
 
 def _rival(run: Run) -> tuple[str, float]:
-    """The strongest line beside f_AM, and the radius in mm of the probe where it is."""
+    """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
     names = _rivals(run)
     levels = _probe_levels(run, names, "f_AM")
     line, probe = np.unravel_index(np.argmax(levels), levels.shape)

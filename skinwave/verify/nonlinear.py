@@ -27,7 +27,7 @@ AM = 140.0  # Hz
 
 
 def elastica() -> Case:
-    """A thin strip bent by a force at its tip that keeps its direction."""
+    """A thin strip bent by a dead load at its tip."""
     length, width, thickness = 1.0, 0.05, 0.02
     material = fem.from_young(density=1, young=1e9, poisson=0.0)
     mesh = meshes.extrude(np.linspace(0, length, 21), [0, width], [-thickness, 0])
@@ -213,7 +213,7 @@ def free_energy() -> Case:
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
     return Case(
         title="Free oscillation of a sheet from three thicknesses, 2000 steps",
-        source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration keeps "
+        source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration conserves "
         "the energy of a linear body; of a nonlinear one to second order in the step",
         mesh=described(mesh, f"4 by 4 by 1 cells, no loss; steps of {1e3 * dt:g} ms"),
         checks=(
