@@ -213,8 +213,8 @@ def free_energy() -> Case:
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
     return Case(
         title="Free oscillation of a sheet from three thicknesses, 2000 steps",
-        source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration conserves "
-        "the energy of a linear body; of a nonlinear one to second order in the step",
+        source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration "
+        "conserves the energy of a linear body; of a nonlinear one to second order in the step",
         mesh=described(mesh, f"4 by 4 by 1 cells, no loss; steps of {1e3 * dt:g} ms"),
         checks=(
             relative("released from, w / h", (S @ u)[0] / PAPER.depth, 3.0, 0.05),
