@@ -1,4 +1,4 @@
-"""Discretisation that a scene requires, and why."""
+"""Model and discretisation that a scene requires, and why."""
 
 import argparse
 import json

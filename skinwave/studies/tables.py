@@ -92,7 +92,7 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
         )
     header = ["body", "dofs", "reduced to", "estimated reduction error"]
     header += ["relative energy imbalance", "share of loss radiated", "solver"]
-    header += ["offline stage", "peak memory so far, GiB"]
+    header += ["time by phase", "peak memory so far, GiB"]
     versions = next(iter(efforts.values())).versions if efforts else {}
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
