@@ -18,14 +18,14 @@ HEADER = ("value", "reference", "error", "tolerance")
 COLOURS = ("#0072B2", "#D55E00", *SPARE, "#000000")
 SCOPE = (
     "Verification asks whether the equations are solved right: references are closed forms, series "
-    "or integrals from the literature, computed without this program's solvers. Only the cases "
-    "that compare two of its models (finite elements with wavenumber integrals, an absorbing layer "
-    "with a wider slab, a sheet in modes with all of its dofs, a nonlinear with a linear sheet) "
-    "take their reference from the program; the cases on flat-body check the wavenumber integrals. "
-    "Whether these are the right equations for a hand is another question, which only measurements "
-    "on hands can decide. Errors are relative unless they are called absolute. A case passes if "
-    "each of its errors is within its tolerance; the summary shows the one nearest to its "
-    "tolerance."
+    "or integrals from the literature, computed without this program's solvers. Other cases "
+    "compare two of its models (finite elements with wavenumber integrals, an absorbing layer with "
+    "a wider slab, a sheet in modes with all of its dofs, a nonlinear with a linear sheet), or one "
+    "model with its own limits or in other units; the cases on flat-body check the wavenumber "
+    "integrals. Whether these are the right equations for a hand is another question, which only "
+    "measurements on hands can decide. Errors are relative unless they are called absolute. A case "
+    "passes if each of its errors is within its tolerance; the summary shows the one nearest to "
+    "its tolerance."
 )
 
 
