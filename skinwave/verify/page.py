@@ -17,8 +17,8 @@ from skinwave.verify.case import Check, Entry, Plot, Result
 HEADER = ("value", "reference", "error", "tolerance")
 COLOURS = ("#0072B2", "#D55E00", *SPARE, "#000000")
 SCOPE = (
-    "Verification asks whether the equations are solved right: references are closed forms, series "
-    "or integrals from the literature, computed without this program's solvers. Other cases "
+    "Verification asks whether the equations are solved right. Most references are closed forms, "
+    "series or integrals from the literature, computed without this program's solvers. Other cases "
     "compare two of its models (finite elements with wavenumber integrals, an absorbing layer with "
     "a wider slab, a sheet in modes with all of its dofs, a nonlinear with a linear sheet), or one "
     "model with its own limits or in other units; the cases on flat-body check the wavenumber "
