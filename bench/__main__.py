@@ -16,12 +16,12 @@ def main() -> None:
     parser.add_argument("tables", nargs="*", metavar="TABLE", help=", ".join(TABLES))
     parser.add_argument("--across", type=int, default=40, help="cells across, of assembly")
     parser.add_argument(
-        "--h", type=float, default=4.7, help="mm, elements of waves: 4.7 is 30 k unknowns, 2.9 89 k"
+        "--h", type=float, default=4.7, help="mm, elements of waves: 4.7 is 30 k dofs, 2.9 89 k"
     )
     asked = parser.parse_args()
     if unknown := set(asked.tables) - set(TABLES):
         parser.error(f"no table {', '.join(unknown)}; there are {', '.join(TABLES)}")
-    os.environ["SKINWAVE_CACHE"] = ""  # every first answer is a cold one
+    os.environ["SKINWAVE_CACHE"] = ""  # every first response is a cold one
     print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     run = {
         "growth": growth,

@@ -1,8 +1,8 @@
-"""skinwave beside what a user would pick instead: the same mesh, material and load, in turn.
+"""skinwave against other codes: the same mesh, material and load, in turn.
 
 The skin slab of the scenes with two changes that let every code take part: free sides, as
 absorbing ones are not in all of them, and Poisson's ratio 0.45, up to which plain quadratic
-tetrahedra need no remedy against locking. Nodal forces are skinwave's own, computed beforehand
+tetrahedra do not lock. Nodal forces are skinwave's own, computed beforehand
 and carried over by the nodes' coordinates, so that no code pays for them while it steps.
 """
 
@@ -34,7 +34,7 @@ TACTON = "am140-stm20"
 SMALL = 9e-3  # m, elements of the small mesh, on which waveforms are compared
 SHORT = 0.1  # s of those waveforms
 RATES = (4_000, 5_000, 6_000, 8_000, 10_000, 12_000, 16_000, 20_000)  # Hz, the longest step first
-FINE = 80_000  # Hz, the steps by which those are judged
+FINE = 80_000  # Hz, the steps by which those are assessed
 WRONG = 0.01  # relative error that the time steps may make at the worst probe
 STEPS = 1000  # at most, from which a second is extrapolated
 PATIENCE = 1800  # s for all that one code is asked for
@@ -60,14 +60,14 @@ def assembly(across: int) -> None:
 
 
 def waves(h: float) -> None:
-    """Time to answer one Tacton of a second, and fifteen, on the skin slab with elements of h."""
+    """Time for one Tacton of a second, and for fifteen, on the skin slab with elements of h."""
     reference = reduced_waveform()
     rate = slowest_rate()
     small, large = problem(SMALL, rate, SHORT), problem(h, rate, STEPS / rate)
     free = large.fixed.size - int(large.fixed.sum())
     print(
         f"\none Tacton of 1 s (AM 140 Hz, circle of 20 mm at 12 m/s) at {len(PROBES)} probes, "
-        f"cold: {free:,} unknowns, {rate:,} steps"
+        f"cold: {free:,} dofs, {rate:,} steps"
     )
     print(f"{'code':<12} {'solver':<24} {'assemble':>8} {'factorise':>9} {'ms/step':>8} "
           f"{'from':>5} {'1 Tacton':>9} {'ratio':>6} {'15':>9} {'ratio':>6} {'wave':>8} "
@@ -96,7 +96,7 @@ def waves(h: float) -> None:
     print(
         f"""all but the first row: seconds extrapolated from the median of the steps under 'from'
 wave, to ours: relative L2 difference of the worst probe's first {SHORT:g} s, on {compared:,}
-unknowns, to skinwave's steps and to its reduced model"""
+dofs, to skinwave's steps and to its reduced model"""
     )
 
 
@@ -196,7 +196,7 @@ def unloaded(mesh: meshes.TetMesh) -> Problem:
 
 
 def in_turn(small: Problem, large: Problem) -> Iterator[tuple[str, dict | str]]:
-    """What every code measured, one process after the other; or why it did not."""
+    """Measurements of every code, one process after the other, or why there are none."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [p.save(Path(folder, f"{k}.npz")) for k, p in enumerate((small, large))]
         result = Path(folder, "result.npz")

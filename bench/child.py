@@ -58,7 +58,7 @@ def _first_acceleration(body: Assembled, force: np.ndarray, free: np.ndarray) ->
 
 
 def measured(assemble: Callable[[Problem], Assembled], small: Problem, p: Problem) -> dict:
-    """Seconds of the large problem after a warm-up on the small one, whose waveform is kept."""
+    """Seconds of the large problem after a warm-up on the small one, whose waveform is returned."""
     body = assemble(small)
     results = {"waveform": march(body, small)["seen"]} if len(small.forces) else {}
     body = assemble(p)

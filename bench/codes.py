@@ -1,4 +1,4 @@
-"""What a user of each code does with a `Problem`: assemble K and M, and factorise M + c K.
+"""Assembly of K and M and factorisation of M + c K by each code, as its user would do it.
 
 Nothing else of a code is needed to step in time, so that all share one loop. Loads and probes are
 those of the mesh's nodes, carried over by `to_nodes`; only assembly and factorisation differ.
@@ -21,10 +21,10 @@ Solve = Callable[[np.ndarray], np.ndarray]
 
 @dataclass
 class Assembled:
-    """`K` and `M` multiply vectors of the code's own unknowns by `@`.
+    """`K` and `M` multiply vectors of the code's own dofs by `@`.
 
-    `to_nodes` (3 n, unknowns) gives the displacement of the nodes, component fastest;
-    `factorise(c, free)` solves with M + c K on the free unknowns and leaves 0 on the others.
+    `to_nodes` (3 n, dofs) gives the displacement of the nodes, component fastest;
+    `factorise(c, free)` solves with M + c K on the free dofs and leaves 0 on the others.
     """
 
     seconds: float
@@ -137,7 +137,7 @@ def _of_arrays(operator: Any) -> Solve:
 
 
 def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
-    """Nodal values of NGSolve's unknowns: values at corners, then one bubble for each edge."""
+    """Nodal values from NGSolve's dofs: values at corners, then one bubble for each edge."""
     import ngsolve as ng
 
     ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
@@ -150,7 +150,7 @@ def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
     columns = np.concatenate([np.arange(corners), *ends.T, corners + np.arange(edges)])
     values = np.concatenate([np.ones(corners), np.full(2 * edges, 0.5), np.full(edges, height)])
     scalar = sparse.csr_array((values, (rows, columns)), shape=(len(p.nodes), corners + edges))
-    # Unknowns are ordered component by component, ours node by node.
+    # Its dofs are ordered component by component, ours node by node.
     by_component = sparse.csr_array(sparse.kron(np.eye(3), scalar))
     return by_component[np.arange(3 * len(p.nodes)).reshape(3, -1).T.ravel()]
 
@@ -199,7 +199,7 @@ def sfepy(p: Problem) -> Assembled:
     seconds = time.perf_counter() - started
 
     def factorised(A: Any) -> Solve:
-        # As its example of elastodynamics does: factorised once, kept for all steps.
+        # As its example of elastodynamics does: factorised once for all steps.
         conf = Struct(name="ls", kind="ls.auto_direct", use_presolve=True, use_mtx_digest=False)
         solver = Solver.any_from_conf(conf)
         solver.presolve(A, use_mtx_digest=False)
@@ -276,7 +276,7 @@ def dolfinx(p: Problem) -> Assembled:
 def _scipy(
     seconds: float, K: Any, M: Any, numbers: np.ndarray, factorised: Callable[[Any], Solve]
 ) -> Assembled:
-    """Matrices of SciPy; unknown i is the mesh's component `numbers[i]`."""
+    """Matrices of SciPy; dof i is the mesh's component `numbers[i]`."""
 
     def factorise(c: float, free: np.ndarray) -> Solve:
         kept = np.flatnonzero(free)

@@ -1,10 +1,10 @@
-"""Did a change of the code change a number? `python -m bench.frozen write DIR`, then, after the
-change, `python -m bench.frozen compare DIR`.
+"""Regression check of all numbers: `python -m bench.frozen write DIR`, then, after a change of the
+code, `python -m bench.frozen compare DIR`.
 
 Everything goes through the command line, on scenes that are kept in DIR, so that what is inside may
 be rebuilt in between: `compare` runs the same commands again. Text may differ (it is counted), and
-what took how long; numbers must agree to 1e-9 of the largest of their column, or of their bar in a
-verification. Palms are filled with other tetrahedra in each run: their numbers are compared to 5 %.
+what took how long; numbers must agree to 1e-9 of the largest of their column, or of their tolerance
+in a verification. Palms are meshed anew in each run: their numbers are compared to 5 %.
 """
 
 import argparse
@@ -91,7 +91,7 @@ def _cells(path: Path) -> Iterator[tuple[str, object]]:
 
 
 def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
-    """Everything in a JSON value; the checks of a verification over their bars."""
+    """Everything in a JSON value; the checks of a verification over their tolerances."""
     if isinstance(value, dict) and "bar" in value:
         unit = max(abs(value["reference"] or 0.0), 1e6 * value["bar"])
         yield f"{name} check", float(value["value"] or 0.0) / (unit or 1.0)
@@ -120,7 +120,7 @@ def _split(found: Iterator[tuple[str, object]]) -> tuple[dict[str, np.ndarray], 
 
 
 def differences(before: Path, after: Path) -> Iterator[str]:
-    """What differs between two files by more than it may; names may have changed, order not."""
+    """Differences between two files beyond the tolerance; names may have changed, order not."""
     (old, old_text), (new, new_text) = numbers(before), numbers(after)
     changed = sum(a != b for a, b in zip(old_text, new_text, strict=False))
     if changed:

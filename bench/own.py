@@ -16,14 +16,14 @@ from skinwave.models.prepared import answer, prepare
 from skinwave.scene import PROBES, Body
 from skinwave.studies import paper15
 
-SIZES = (10e-3, 6e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.7e-3)  # m, of elements: to 500 k unknowns
+SIZES = (10e-3, 6e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.7e-3)  # m, of elements: to 500 k dofs
 MOST_MEMORY = 16 * 2**30  # bytes
 
 
 def growth() -> None:
     """One reduced model at each size; the solver's share is its factorisation and its solves."""
     print("\ngrowth: skin slab reduced to 5 probes, first installed solver")
-    print(f"{'unknowns':>9} {'assemble s':>11} {'factorise s':>12} {'solves s':>9} {'rest s':>7} "
+    print(f"{'dofs':>9} {'assemble s':>11} {'factorise s':>12} {'solves s':>9} {'rest s':>7} "
           f"{'total s':>8} {'in solver':>10} {'peak GiB':>9}")  # fmt: skip
     sizes, costs = [], []
     before = peak_memory()
@@ -44,13 +44,13 @@ def growth() -> None:
         )
     total, factorise, memory = np.polyfit(np.log(sizes), np.log(costs), 1)[0]
     print(
-        f"unknowns to the power {total:.2f}: time; {factorise:.2f}: time to factorise; "
+        f"dofs to the power {total:.2f}: time; {factorise:.2f}: time to factorise; "
         f"{memory:.2f}: memory beyond the {before / 2**30:.2f} GiB of the start"
     )
 
 
 def reduction(h: float) -> tuple[float, float, float, float]:
-    """Seconds to assemble, to factorise, in solves, and in all until the model can answer."""
+    """Seconds to assemble, to factorise, in solves, and in all of the offline stage."""
     spent = {"factorise": 0.0, "solve": 0.0}
 
     def timed(name: str, run: Callable, *arguments: object, **options: object) -> object:
@@ -102,7 +102,7 @@ def models() -> None:
         next(states)
     full = (time.perf_counter() - started) / steps * TRANSIENT_RATE
     print(
-        f"reduced model of {len(ops.free):,} unknowns: ready in {ready:.1f} s; one more Tacton "
+        f"reduced model of {len(ops.free):,} dofs: ready in {ready:.1f} s; one more Tacton "
         f"{warm:.2f} s, 1/{full / warm:.0f} of {TRANSIENT_RATE:.0f} full time steps ({full:.0f} s, "
         f"from {steps})"
     )

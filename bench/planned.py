@@ -1,9 +1,9 @@
-"""Is the plan right? `python -m bench.planned [scenes]`: random scenes, planned and measured.
+"""Accuracy and cost of the plan, `python -m bench.planned [scenes]`: random scenes, measured.
 
 For each scene and tolerance: the error of what `plan` chooses against the finest finite elements
-that this machine affords, and its time over that of the cheapest candidate that is good enough,
+that this machine affords, and its time over that of the cheapest candidate within the tolerance,
 which nobody knows beforehand; without and with the time that planning took.
-Absorbing sides stand for an endless body: the reference's are moved twice as far away.
+Absorbing sides stand for a laterally infinite body: the reference's are twice as far away.
 """
 
 import os
@@ -74,9 +74,9 @@ def timed(scene: Scene, model: str, **knobs: float) -> tuple[Response, float]:
 
 
 def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, float]:
-    """The model that is planned, its answer, and the seconds of it and of the planning before.
+    """Planned model, its response, and the seconds of it and of the planning before.
 
-    A plan that has prepared the body on the mesh it chose has that time taken from its own.
+    A plan that has reduced the body on the mesh it chose has that time taken from its own.
     """
     started = time.perf_counter()
     chosen = plan(scene, tolerance)
@@ -90,7 +90,7 @@ def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, floa
 
 
 def judge(seed: int) -> tuple[bool, bool, bool]:
-    """Print one row; whether the planned answer is within the tolerance, and whether its price is
+    """Print one row; whether the planned response is within the tolerance, and whether its price is
     fair without and with planning.
     """
     asked, tolerance = scene(seed)
@@ -109,7 +109,7 @@ def judge(seed: int) -> tuple[bool, bool, bool]:
         found, cost = timed(asked, other, **knobs)
         if error(found, reference) <= tolerance:
             good.append((cost, other, knobs))
-            break  # by rising cost: the first that is good enough is the cheapest
+            break  # by rising cost: the first within the tolerance is the cheapest
     cost, best, knobs = min(good, default=(np.inf, "none", {}))
     name = best + "".join(f" {1e3 * v:.1f} mm" for v in knobs.values())
     shape, am = asked.tacton.trajectory.shape, asked.tacton.am_frequency
@@ -127,7 +127,7 @@ if __name__ == "__main__":
     os.environ["SKINWAVE_CACHE"] = ""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print("    body             path       f_AM  asked   error   chosen                   planning"
-          "  cheapest good enough     ratio   with")  # fmt: skip
+          "  cheapest in tolerance    ratio   with")  # fmt: skip
     held = np.array([judge(seed) for seed in range(count)]).sum(axis=0)
     print(f"{held[0]} of {count} within the tolerance; {held[1]} at no more than five times the "
           f"cheapest, {held[2]} with planning")  # fmt: skip

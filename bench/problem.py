@@ -12,7 +12,7 @@ def nothing() -> np.ndarray:
 
 @dataclass(kw_only=True)
 class Problem:
-    """A body of straight 10-node tetrahedra, and how it is held, pushed and watched.
+    """A body of straight 10-node tetrahedra, with its constraints, loads and probes.
 
     `nodes` (n, 3) in metre, corners first; `cells` (m, 10) in VTK's order; `surface` (k, 3) the
     boundary's corners; `material` mu Pa, nu, rho kg/m3. Without `forces` it is only assembled.

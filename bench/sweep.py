@@ -1,7 +1,7 @@
-"""What a sweep saves: `python -m bench.sweep`: 200 runs on one body beside calls of skinwave run.
+"""Sweep against single runs, `python -m bench.sweep`: 200 runs on one body.
 
 4 speeds x 5 sizes x 10 AM frequencies, the reduced model of the skin slab on one mesh. Both begin
-with no body kept on disk, and keep those that they prepare.
+with a cold cache, and cache the bodies that they reduce.
 """
 
 import itertools
@@ -48,7 +48,7 @@ def main() -> None:
                       cache=name + "/a")  # fmt: skip
         warm = called(folder, "sweep", "scene.toml", "--vary", *lists, "--out", "warm",
                       cache=name + "/a")  # fmt: skip
-        print(f"sweep of {len(every)} runs: {cold:.1f} s, {warm:.1f} s with the body kept",
+        print(f"sweep of {len(every)} runs: {cold:.1f} s, {warm:.1f} s with the body cached",
               f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores", flush=True)  # fmt: skip
         seconds = []
         for k, (speed, size, tone) in enumerate(every[:: len(every) // COUNTED][:COUNTED]):

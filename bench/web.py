@@ -1,8 +1,8 @@
-"""How soon the page follows? `python -m bench.web [moves]`, in Debian's chromium without a window.
+"""Latency of the page: `python -m bench.web [moves]`, in Debian's chromium without a window.
 
-From a key press on a slider to plots on the screen with the new answer; the process's own share of
-that, in CPU time, which other work on the machine disturbs little; and from opening a page to its
-plots.
+From a key press on a slider to plots on the screen with the new response; the process's own share
+of that, in CPU time, which other work on the machine disturbs little; and from opening a page to
+its plots.
 """
 
 import os
@@ -79,7 +79,7 @@ def own_share(moves: int) -> None:
 
 
 def in_a_browser(moves: int) -> None:
-    """What a user waits for."""
+    """Waiting times of a user."""
     from playwright.sync_api import sync_playwright
 
     command = [sys.executable, "-m", "skinwave", "web", "--port", "0"]

@@ -1,4 +1,4 @@
-"""What is done on the page at random: whatever can be turned, clicked, opened or saved."""
+"""Random moves on the page: whatever can be turned, clicked, opened or saved."""
 
 import random
 import tempfile

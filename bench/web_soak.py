@@ -1,9 +1,9 @@
-"""Does the page last? `python -m bench.web_soak [seconds] [seed] [bodies]`: two browsers at random.
+"""Soak test of the page: `python -m bench.web_soak [seconds] [seed] [bodies]`.
 
-Whatever can be turned, clicked, opened or saved, in any order. Every body is built first, as often
-as is kept, which a busy machine takes minutes for: "none,skin-slab" does without. Counted: what
-either page's console or the server says of errors, and by how much memory has grown between the end
-of the first fifth and the end.
+Two browsers at random: whatever can be turned, clicked, opened or saved, in any order. Every body
+is built first, as often as is cached, which a busy machine takes minutes for: "none,skin-slab" does
+without. Counted: errors on either page's console or of the server, and by how much memory has grown
+between the end of the first fifth and the end.
 """
 
 import os
@@ -50,7 +50,7 @@ def family(pid: int) -> list[int]:
 
 
 def memory(pid: int) -> float:
-    """What a process and all that it has started hold, in MB; what they share counts once."""
+    """Memory in MB of a process and all that it has started; shared pages count once."""
     kilobytes = 0
     for each in family(pid):
         try:
@@ -62,7 +62,7 @@ def memory(pid: int) -> float:
 
 
 def heap(page: Page) -> float:
-    """What scripts of a page hold, in MB, after what nobody needs has gone."""
+    """Memory in MB of a page's scripts, after garbage collection."""
     client = page.context.new_cdp_session(page)
     client.send("HeapProfiler.collectGarbage")
     used = client.send("Runtime.getHeapUsage")["usedSize"]
@@ -78,7 +78,7 @@ def settled(page: Page) -> None:
 
 
 def warm(pages: list[Page], bodies: Sequence[str]) -> None:
-    """Have the processes behind pages build each body as often as they keep."""
+    """Have the processes behind pages build each body as often as they cache it."""
     for name in (name for name in bodies if name != "none"):
         for k in range(KEPT):
             query = f"body={name}&size={10 + 2 * k}&height={200 + 5 * k}"

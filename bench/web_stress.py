@@ -1,8 +1,8 @@
-"""Does the server hold? `python -m bench.web_stress [seconds] [seed] [pages]`: pages at random.
+"""Stress test of the server, `python -m bench.web_stress [seconds] [seed] [pages]`: random pages.
 
 As many pages as are asked for, without a browser, do what a page can at random while one of their
-processes is killed now and then. Every page must answer or be told why not, the server itself may
-not grow, and after Ctrl-C nothing of it may be left within three seconds.
+processes is killed now and then. Every page must get a response or a reason why not, the server
+itself may not grow, and after Ctrl-C nothing of it may be left within three seconds.
 """
 
 import asyncio
@@ -109,7 +109,7 @@ def _read(path: str) -> bytes:
 
 
 async def used(server: int, address: str, seconds: float, rng: random.Random, pages: int) -> Any:
-    """What was done, and what the server held after a part of the time and in the end, in MB."""
+    """Counts of moves, and the server's memory in MB after a part of the time and in the end."""
     made, end = Made(), time.monotonic() + seconds
     each = [asyncio.create_task(turned(address, random.Random(rng.random()), end, made))
             for _ in range(pages)]  # fmt: skip

@@ -3,7 +3,7 @@
     scene = skinwave.read("scene.toml")
     response = skinwave.simulate(scene)
 
-Names are looked up when they are first used, so that `skinwave --help` answers at once.
+Names are imported when they are first used, so that `skinwave --help` is immediate.
 """
 
 from skinwave.safe_path import leave_out_working_folder
@@ -48,7 +48,7 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    """What is installed; "unknown" of sources that were never installed."""
+    """Installed version; "unknown" of sources that were never installed."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

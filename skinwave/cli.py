@@ -1,6 +1,6 @@
 """The command line: `skinwave COMMAND`, each in a module of `skinwave.commands`.
 
-Only argparse is imported before a command is known, so that help answers at once.
+Only argparse is imported before a command is known, so that help is immediate.
 """
 
 import argparse
@@ -74,7 +74,7 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """One whose errors a terminal shows and does not obey; of its kind are those of commands."""
+    """Argument parser, of the commands too, whose errors a terminal shows and does not obey."""
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message, keep=""))

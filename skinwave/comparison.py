@@ -1,4 +1,4 @@
-"""How far two answers agree: waveforms, lines, phase delay and spread."""
+"""Comparison of two responses: waveforms, lines, phase delay and spread."""
 
 from dataclasses import dataclass
 
@@ -153,7 +153,7 @@ def _vertex(y: Floats) -> tuple[float, float]:
 
 
 def _moving(response: Response, settle: float = SETTLE) -> Floats:
-    """The response (t, p) about its mean, without the first part of it."""
+    """The response (t, p) about its mean, after the transient in its first part."""
     kept = response.displacement[int(settle * len(response.times)) :]
     return np.asarray(kept - kept.mean(axis=0))
 

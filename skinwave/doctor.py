@@ -1,4 +1,4 @@
-"""What a machine brings along for this program, and how to have what it lacks."""
+"""Installation check: what this machine has for this program, and how to add what it lacks."""
 
 import os
 import platform
@@ -23,7 +23,7 @@ OPTIONAL = (
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One thing that was looked at; `cure` says what to do if it is not as it could be."""
+    """One finding; `cure` says how to improve it, if it can be."""
 
     what: str
     value: str

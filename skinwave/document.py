@@ -104,13 +104,13 @@ def paragraph(text: str) -> Html:
 
 
 def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Html:
-    """All warnings of some answers by name, for the top of a page; nothing if there are none."""
+    """All warnings of some responses by name, for the top of a page; nothing if there are none."""
     shown = joined((paragraph(f"Take care: {text}.") for text in worst_warnings(efforts)), "")
     return markup('<div class="warning" role="note">{}</div>', shown) if shown else Html()
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
-    """The warnings of some answers with their names; of those that differ by numbers only, the one
+    """Warnings of some responses with their names; of those that differ by numbers only, the one
     with the largest, and how many more there are.
     """
     alike: dict[str, list[tuple[str, str]]] = {}

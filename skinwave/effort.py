@@ -1,4 +1,4 @@
-"""What an answer cost: seconds by phase, memory, versions."""
+"""Cost of a response: seconds by phase, memory, versions."""
 
 import os
 import platform
@@ -24,7 +24,7 @@ Progress = Callable[[str, float], None]  # phase and fraction of it done
 
 
 class SkinwaveWarning(UserWarning):
-    """One sentence on what is less than was asked for."""
+    """Warning that a result falls short of the request, in one sentence."""
 
 
 class Clock:
@@ -52,7 +52,7 @@ def peak_memory() -> int:
 
 
 def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """What a function returns in a new process: its memory and its caches begin empty."""
+    """Call a function in a new process, whose memory and caches begin empty."""
     with pool(1, as_part) as other:
         return other.submit(function, *args, **kwargs).result()
 
@@ -123,4 +123,4 @@ def threads() -> dict[str, str]:
 
 
 def silent(phase: str, fraction: float) -> None:
-    """Progress that nobody watches."""
+    """Progress that is not shown."""

@@ -93,7 +93,7 @@ def _grid(view: View, frame: int) -> Any:
 
 
 def _collection(names: Sequence[str], times: Sequence[float]) -> str:
-    """What ParaView needs to know which file belongs to which time, in s."""
+    """ParaView collection: the file that belongs to each time in s."""
     rows = "".join(
         f'<DataSet timestep="{t:.9g}" group="" part="0" file="{name}"/>\n'
         for t, name in zip(times, names, strict=True)

@@ -40,9 +40,9 @@ def field(
     """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
 
     The body is reduced to the subspace of the load along the path: what it takes grows with the
-    length of the path, and another path needs another reduction. What is less than was asked for,
-    by a coarser mesh beside this one, is told in `effort.warnings`, and each sentence is a
-    `SkinwaveWarning` once.
+    length of the path, and another path needs another reduction. The error
+    against a coarser mesh and all else that falls short of the request is in `effort.warnings`,
+    each sentence issued once as a `SkinwaveWarning`.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def field(
 def assessed_probes(
     scene: Scene, moved: Waves, h: float | None, tolerance: float, solver: str
 ) -> Response:
-    """`probe_response` with its expected error and all warnings, by a coarser mesh beside this."""
+    """`probe_response` with its expected error, from a coarser mesh, and all warnings."""
     found = probe_response(scene, moved)
     if scene.body.is_held:
         return told(scene, found, found.displacement, h, tolerance, solver)

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder."""
+"""Files of a run in its folder."""
 
 import csv
 import json
@@ -111,13 +111,13 @@ def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
 
 
 def write_claims(path: Path, verdicts: Iterable[Verdict]) -> None:
-    """Every statement's verdict per body and model."""
+    """Every assessed claim per body and model."""
     rows = ((*astuple(v)[:4], _short(v.value), v.bar, v.sentence) for v in verdicts)
     _write_csv(path, [field.name for field in fields(Verdict)], rows)
 
 
 def write_effort(path: Path, effort: Effort) -> None:
-    """What an answer cost, as JSON."""
+    """Cost of a response, as JSON."""
     path.write_text(json.dumps(asdict(effort), indent=1), encoding="utf-8")
 
 

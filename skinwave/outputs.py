@@ -219,7 +219,7 @@ def _kept(aside: Path, report: Sequence[str]) -> str:
 
 
 def _identity(out: Path) -> tuple[int, int] | None:
-    """What tells a folder from another that takes its name, None if there is none."""
+    """Identity of a folder, which another of the same name has not; None if there is none."""
     if not os.path.lexists(out):
         return None
     mark = out / record.FILE

@@ -89,7 +89,7 @@ def end(number: int, _: object = None) -> None:
 
 
 def guarded(work: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """What `work` returns; a signal that ends it ends the process, too.
+    """Return what `work` returns; a signal that ends it ends the process, too.
 
     A pool would take the SystemExit for the result, and begin what is next.
     """

@@ -1,4 +1,4 @@
-"""What propagation changes: a body's motion beside the point kernel under the same load.
+"""Effect of propagation: a body's motion beside the point kernel under the same load.
 
 Share outside: integral of squared RMS motion over the surface where the kernel's RMS is 20 dB below
 its largest, over the integral everywhere. Spread: largest distance from the path of a place whose
@@ -20,14 +20,14 @@ from skinwave.scene import Scene
 from skinwave.surface import SurfaceMap
 
 OUTSIDE, NEAR = -20.0, -6.0  # dB re the largest RMS: the kernel's region, and the spread
-PRESENT, ABSENT = -40.0, -100.0  # dB re the strongest component of the same answer
+PRESENT, ABSENT = -40.0, -100.0  # dB re the strongest component of the same response
 FACTOR_OF_TWO = 20 * np.log10(2.0)  # dB: how well the pressure of a device is known
 
 
 @dataclass(frozen=True, kw_only=True)
 class Component:
     """A spectral line where it is strongest: `name`, `frequency` in Hz, `amplitude` in the unit of
-    the response, the `probe`, and the `level` in dB above threshold, None of what is not skin.
+    the response, the `probe`, and the sensation `level` in dB, None of what is not skin.
     """
 
     name: str
@@ -47,13 +47,13 @@ class Reach:
 
 @dataclass(frozen=True, kw_only=True)
 class Propagation:
-    """What propagation changes of one Tacton on one body.
+    """Effect of propagation on one Tacton and one body.
 
     Parameters
     ----------
     column : the body, as `Run.column`
     strongest, kernel_strongest : the component of largest amplitude
-    felt_most : the component above threshold by most, None of what is not skin
+    felt_most : the component of highest sensation level, None of what is not skin
     delay : float, s, of the strongest component behind the kernel's at the probe next to the path
         where both move, or None
     share, spread, kernel_spread : of the maps, None where there is none
@@ -78,7 +78,7 @@ def propagation(
     surface: SurfaceMap | None = None,
     kernel_surface: SurfaceMap | None = None,
 ) -> Propagation:
-    """What a body's answer has that the point kernel's under the same load lacks.
+    """Difference of a body's response from the point kernel's under the same load.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def propagation(
     """
     if run.scene.pressure != kernel.scene.pressure:
         raise ValueError(
-            f"{run.column} and {kernel.column} have different loads; compare answers to the same"
+            f"{run.column} and {kernel.column} have different loads; compare responses to the same"
         )
     strongest = strongest_component(run)
     found = Propagation(
@@ -137,7 +137,7 @@ def distance_from_path(scene: Scene, surface: SurfaceMap) -> Floats:
 
 
 def strongest_component(run: Run, *, felt: bool = False) -> Component | None:
-    """The line of largest amplitude at any probe or, if `felt`, above threshold by most; None of
+    """Line of largest amplitude at any probe or, if `felt`, of highest sensation level; None of
     none.
     """
     names = [name for name, f in run.frequencies.items() if f > 0]

@@ -1,4 +1,4 @@
-"""What is needed to repeat a result, and what tells whether it came out again: record.json."""
+"""Record of a result, record.json: input to repeat it, and digests to compare it by."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""One answer beside the scene that it answers, and its lines by name."""
+"""Response of one model to a scene, and its lines by name."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,7 +8,7 @@ from simple_model import LineTable, Response, Unnamed, line_table
 from simple_model.line_names import SAME, line_frequency
 from skinwave.scene import Body, Scene
 
-# Lines that are judged whether or not the load has them, of one focus.
+# Lines that claims are about, of one focus, whether or not the load has them.
 JUDGED = (
     "f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM", "f_d", "2f_d", "3f_d",
     "f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM",
@@ -16,14 +16,14 @@ JUDGED = (
 
 
 def is_skin(body: Body) -> bool:
-    """Whether a body feels: a sheet is paper."""
+    """Whether a body is skin: a sheet is paper."""
     return body.kind not in ("none", "sheet")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One Tacton on one body, answered by one model; the lines of its response are those of the
-    load of its scene.
+    """One Tacton on one body by one model; the lines of its response are those of the load of its
+    scene.
     """
 
     tacton: str
@@ -33,12 +33,12 @@ class Run:
 
     @property
     def model(self) -> str:
-        """The model that answered."""
+        """The model of the response."""
         return self.response.model
 
     @property
     def column(self) -> str:
-        """What tables and figures know it by: its body or, of a point kernel, the model."""
+        """Name in tables and figures: its body or, of a point kernel, the model."""
         return self.model if self.body == "none" else self.body
 
     @cached_property
@@ -49,17 +49,17 @@ class Run:
 
     @property
     def listed(self) -> dict[str, float]:
-        """Names and frequencies in Hz of the lines of the load, each once, but for `untold`."""
+        """Names and frequencies in Hz of the resolved lines of the load, each once."""
         return self.table.frequencies
 
     @property
     def unnamed(self) -> tuple[Unnamed, ...]:
-        """What else the spectrum shows above -40 dB, such as a free vibration."""
+        """Other spectral peaks above -40 dB, such as a free vibration."""
         return self.table.unnamed
 
     @cached_property
     def frequencies(self) -> dict[str, float]:
-        """Frequencies in Hz by name, of lines that coincide by each name that is judged."""
+        """Frequencies in Hz by name; of lines that coincide, by each name that claims are about."""
         return {name: self.listed[own] for name, own in self._own.items()}
 
     @cached_property
@@ -69,7 +69,7 @@ class Run:
 
     @property
     def untold(self) -> tuple[str, ...]:
-        """Names of lines that the response is too short to tell from 0 Hz or from each other."""
+        """Unresolved lines: too close to 0 Hz or to each other for the length of the response."""
         return tuple(self.table.unresolved)
 
     @cached_property

@@ -18,14 +18,14 @@ WRITTEN = 1.1e-5  # of a number in lines.csv, whose six digits may differ by one
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """What differs, in words, and by how much of the largest there; infinite if not in number."""
+    """One difference, in words, and its size over the largest there; infinite if not in number."""
 
     words: str
     size: float = np.inf
 
 
 def differences(first: Path, second: Path, rtol: float) -> list[Difference]:
-    """What differs by more than `rtol` of the largest value of an array or a column, worst first.
+    """Differences of more than `rtol` of the largest value of an array or a column, worst first.
 
     Raises
     ------

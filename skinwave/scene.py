@@ -44,8 +44,8 @@ class Layer:
 
 @dataclass(frozen=True, kw_only=True)
 class Relief:
-    """What makes a palm of a slab, in metre, as in `meshes.Palm`; all heights 0 is a slab with
-    rounded edges.
+    """Relief of a palm, in metre, as in `meshes.Palm`; with all heights 0 a slab with rounded
+    edges.
     """
 
     cup_depth: float = Palm.cup_depth
@@ -126,7 +126,7 @@ class Body:
         (soft tissue on bone, `depth` below the middle of the palm) or "mesh" (from a file)
     material : the name of a preset, or a Material
     width, height, depth : float, metre, along x, y and downwards, at most 2; a slab's depth may
-        be inf, a half-space, which only flat-body answers
+        be inf, a half-space, which only flat-body can compute
     base, sides : "clamped", "absorbing" or "free"; of a hand the part that looks downwards, and
         the ends at the wrist and the fingers or the cuts of a file
     layers : from the surface downwards; what is below them is of `material`
@@ -172,7 +172,10 @@ class Body:
                     f"{length:g} mm are {name} = {length / 1e3:g}, or {name}_mm = {length:g}"
                 )
         if self.kind != "none" and self.base == self.sides == "free":
-            raise ValueError("a body with free base and free sides flies away; clamp one of them")
+            raise ValueError(
+                "a body with free base and free sides is unconstrained and drifts under the mean "
+                "load; clamp one of them"
+            )
 
         self._check_layers()
 
@@ -213,12 +216,12 @@ class Body:
 
     @property
     def bending_stiffness(self) -> float:
-        """E d^3 / 12 (1 - nu^2) of a sheet, N m."""
+        """Bending stiffness E d^3 / 12 (1 - nu^2) of a sheet, N m."""
         return self.solid.young * self.depth**3 / 12 / (1 - self.solid.poisson**2)
 
     @property
     def mass_per_area(self) -> float:
-        """Of a sheet, kg/m2."""
+        """Mass per area of a sheet, kg/m2."""
         return self.solid.density * self.depth
 
     @property
@@ -237,7 +240,7 @@ class Body:
 
     @property
     def is_held(self) -> bool:
-        """Whether anything keeps it in its place."""
+        """Whether it is constrained: clamped at its base or its sides."""
         return "clamped" in (self.base, self.sides)
 
     @property

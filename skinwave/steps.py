@@ -1,4 +1,4 @@
-"""Where the preparation of a body is: step n of m, the share done, and the time left."""
+"""Progress of the offline stage of a body: step n of m, the share done, and the time left."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 # Steps in their order, each with its share of the time: between those of a sheet and of a palm.
 PREPARING = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
 SAME = {"march": "reduce"}  # what another model does at that step
-LEAST = 0.2  # of all, after which the time that is left is told: a sheet is meshed at once
+LEAST = 0.2  # of all, after which the time that is left is shown: a sheet is meshed at once
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class Step:
 def follower(
     steps: Mapping[str, float] = PREPARING, clock: Callable[[], float] = time.monotonic
 ) -> Callable[[str, float], Step]:
-    """What makes a `Step` of each report of progress (phase, fraction of it done).
+    """Function that makes a `Step` of each report of progress (phase, fraction of it done).
 
     The time left goes by what was done since these steps began, perhaps not with the first of them.
     """

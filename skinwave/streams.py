@@ -50,7 +50,7 @@ def reader_gone(error: BaseException) -> bool:
 
 
 def explained(error: OSError) -> str:
-    """What, why and cure of an error of the system, which says it without a place or a cure."""
+    """Message for an error of the system, with the place and a cure, which its own text lacks."""
     if not error.strerror:
         return str(error)
     place = error.filename if error.filename is not None else "standard output or a file"

@@ -1,7 +1,7 @@
 """Steady vibration of a whole surface, line by line: the point kernel's pressure and a body's
 motion under the same load, on one grid.
 
-Where a body has a wavenumber integral it answers, else finite elements in reduced coordinates.
+A body's motion is its wavenumber integral where it has one, else that of its reduced-order model.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ SILENT = -200.0  # dB, finite so that it can be interpolated
 RADIAL = 0.5e-3  # m between the radii that stand for a map where it is a figure of revolution
 # Than the default element size, of solids and sheets: a map is not looked at as closely as a probe.
 COARSER = (1.5, 2.0)
-REDUCED = 0.1  # relative error of the reduced coordinates of a map
+REDUCED = 0.1  # relative error of the reduced-order model of a map
 
 Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
 
@@ -39,7 +39,7 @@ class SurfaceMap:
     ----------
     x, y : (nx,), (ny,) float, metre, equally spaced
     rms : (ny, nx) float, in `unit`, "m" or "Pa"; not a number off the body
-    level : (ny, nx) float, dB, of the component that is above the threshold of detection by most,
+    level : (ny, nx) float, dB, the sensation level of the component where it is highest,
         were the body skin; minus infinity of a pressure
     note : str, how it was computed, if another way than the probes
     """
@@ -105,17 +105,17 @@ def body_map(
         return steady_lines(compliance, scene.pressure, places, threshold=FAINT)
 
     found = _mapped(scene.pressure, answer, x, y, "m")
-    return replace(found, note="infinite layer")
+    return replace(found, note="laterally infinite layer")
 
 
 def has_wavenumber_integral(scene: Scene) -> bool:
-    """Whether a wavenumber integral stands for the scene, its sides being absorbing or far."""
+    """Whether a wavenumber integral stands for the scene, whose sides then absorb."""
     plain = scene.pressure.focus == "gaussian" and scene.tacton.trajectory.shape != "recorded"
     return plain and scene.body.sides == "absorbing" and has_exact_waves(scene.body)
 
 
 def element_map(moved: Waves, x: Floats, y: Floats) -> SurfaceMap:
-    """The same of motion that finite elements have given."""
+    """Map of a motion by finite elements."""
     top = moved.mesh.points[np.unique(moved.mesh.facets["top"])]
     frequencies, amplitudes = line_amplitudes(moved, fem.probe_operator(moved.mesh, top))
     lines = frequencies, amplitudes
@@ -127,7 +127,7 @@ def element_map(moved: Waves, x: Floats, y: Floats) -> SurfaceMap:
 def _mapped(
     pressure: MovingPressure, answer: Callable[[Floats], Lines], x: Floats, y: Floats, unit: str
 ) -> SurfaceMap:
-    """What answers places (p, 2) with frequencies (f,) and amplitudes (f, p), on a grid."""
+    """Map on a grid from a function that returns the lines (f,), (f, p) at places (p, 2)."""
     X, Y = np.meshgrid(x, y)
     radius = np.hypot(X, Y)
     if _is_round(pressure):

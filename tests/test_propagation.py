@@ -204,7 +204,7 @@ def test_the_first_screen_says_what_each_difference_changes():
     assert "same load" in waves
     assert "f_d" in drive
     assert "not propagation" in drive
-    assert "Felt out to" in felt
+    assert "Above threshold out to" in felt
     assert "half or twice the pressure" in felt
     assert "varied one by one, the share is" in felt
     rows = small_table(list(first.changes.values()), "one")
@@ -239,7 +239,7 @@ def test_paper_has_no_sensation_level():
     first = shown({"one": beside_kernels(_run(scene, "flat-body-harmonic"))}, quick_maps)
     assert first.changes["sheet"].strongest.level is None
     assert "say nothing of paper" in sentences(first)[2]
-    assert "Felt" not in sentences(first)[2]
+    assert "Above threshold" not in sentences(first)[2]
 
 
 def _run(scene, model, name="one"):

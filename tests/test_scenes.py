@@ -95,7 +95,7 @@ WRONG = {
     "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nwidth_mm = 50": "path reaches 30 mm",
     "[body]\nkind = 'slap'": "did you mean 'slab'",
     "[body]\nmaterial = 'palms'": "did you mean 'palm'",
-    "[body]\nbase = 'free'\nsides = 'free'": "flies away",
+    "[body]\nbase = 'free'\nsides = 'free'": "unconstrained and drifts",
     "[body]\ndepth_mm = -1": "must be finite and above 0",
     "[body]\ndepth_mm = 15000": "body depth = 15 m is more than 2 m, the limit",
     "[body]\nwidth_mm = 1e5": "body width = 100 m is more than 2 m, the limit",

@@ -1,6 +1,6 @@
-"""What can be typed after `skinwave`: a module each, with `options(parser)` and `run(options)`.
+"""Subcommands of `skinwave`: a module each, with `options(parser)` and `run(options)`.
 
-The one line of a module is its help. Whatever is slow to import is imported in `run`.
+The one line of a module is its help. Slow imports are made in `run`.
 """
 
 from skinwave.commands import (

@@ -1,4 +1,4 @@
-"""Where meshes and reduced bodies are cached, how much there is; clear it."""
+"""Cache of meshes and reduced bodies: where it is and how large; clear it."""
 
 import argparse
 
@@ -6,7 +6,7 @@ from skinwave.commands.common import add_reporting, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "--clear", action="store_true",
         help="remove all entries; above 5 GiB those used longest ago are removed anyway",
@@ -16,7 +16,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from meshes import cache
 
     found = cache.clear() if options.clear else cache.contents()

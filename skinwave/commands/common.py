@@ -1,4 +1,4 @@
-"""What commands share: options, progress, the closing line."""
+"""Options, progress and closing line that commands share."""
 
 import argparse
 import json
@@ -25,7 +25,7 @@ TOLERANCE = "relative error of waveforms"
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
-    """Where and how results are written."""
+    """Options of output: where and how results are written."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
     parser.add_argument(
         "--overwrite", action="store_true", help="replace a folder that skinwave wrote"
@@ -35,7 +35,7 @@ def add_output(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reporting(parser: argparse.ArgumentParser) -> None:
-    """How to say what came out."""
+    """Options of reporting."""
     parser.add_argument("--json", action="store_true", help="summary as JSON")
     parser.add_argument("--debug", action="store_true", help="traceback of an error")
 
@@ -46,22 +46,22 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
 
 
 def add_mesh(parser: argparse.ArgumentParser) -> None:
-    """Element size and solver."""
+    """Solver options: element size and direct solver."""
     parser.add_argument("--h", type=float, metavar="MM", help="element size, mm (default: planned)")
     parser.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:
-    """Which model answers, and how well."""
+    """Options of the model: its name, its tolerance and its time step."""
     parser.add_argument("--model", choices=("auto", *MODELS), default="auto")
     parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
-    parser.add_argument("--dt", type=float, metavar="S", help="time step of models that step, s")
+    parser.add_argument("--dt", type=float, metavar="S", help="time step of transient models, s")
 
 
 def required_plan(
     options: argparse.Namespace, scene: "Scene", progress: "Progress | None" = None
 ) -> "Plan":
-    """The plan, with what the user has decided; what breaks the tolerance is warned of."""
+    """Plan with the user's choices; a warning for each that exceeds the tolerance."""
     from skinwave.simulation import required_plan
 
     required = required_plan(
@@ -73,13 +73,13 @@ def required_plan(
 
 
 def warn(sentences: Iterable[str]) -> None:
-    """Say what is less than was asked for."""
+    """Print warnings of what falls short of the request."""
     for sentence in sentences:
         say(f"skinwave: warning: {' '.join(sentence.split())}", sys.stderr)
 
 
 def told(response: "Response") -> dict[str, Any]:
-    """What a summary in JSON says of how far a response can be trusted."""
+    """Accuracy of a response, as a summary in JSON has it."""
     error = response.expected_error
     return {
         "expected_error": error if isfinite(error) else None,

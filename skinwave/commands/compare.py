@@ -14,7 +14,7 @@ TITLE = "The paper's 15 Tactons: point kernel, {}"
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "scene", nargs="?", default="paper-15", metavar="SCENE",
         help="scene file, or paper-15, the 15 Tactons of Lim, Seifi and Park (default)",
@@ -30,7 +30,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.files import folder_name
     from skinwave.outputs import output_folder
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
         options,
         summary,
         f"{outcome.runs} of {outcome.planned} runs in {outcome.seconds:.0f} s, "
-        f"{outcome.peak_memory / 2**30:.2f} GiB; {held} of {len(outcome.verdicts)} statements "
+        f"{outcome.peak_memory / 2**30:.2f} GiB; {held} of {len(outcome.verdicts)} claims "
         f"hold; open {out}/index.html",
     )
     return 0 if outcome.runs == outcome.planned else 1
@@ -99,7 +99,7 @@ def _again(options: argparse.Namespace) -> str:
 
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":
-    """By its name, the body of what is asked for instead of paper and skin."""
+    """By its name, the body that is asked for instead of paper and skin."""
     from skinwave.scene import BODIES, Body
 
     if options.body in BODIES:

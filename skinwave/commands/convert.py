@@ -7,7 +7,7 @@ from skinwave.commands.common import add_reporting, metre, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument("source", type=Path, metavar="IN", help=".toml .adaptics .csv .wav")
     parser.add_argument("target", type=Path, metavar="OUT", help=".toml .adaptics .csv .wav .py")
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="what to put the pattern on")
@@ -22,7 +22,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave.outputs import output_file
     from skinwave.patterns import Options, convert
     from skinwave.scene_file import read

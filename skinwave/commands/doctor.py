@@ -1,4 +1,4 @@
-"""What is installed here, what draws and solves, and what is missing."""
+"""Installed versions, renderer and solver of this machine, and missing packages."""
 
 import argparse
 import json
@@ -7,13 +7,13 @@ from skinwave.plain_text import say
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument("--json", action="store_true", help="as JSON")
     parser.add_argument("--debug", action="store_true", help="traceback of an error")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave.doctor import examine
 
     found = examine()

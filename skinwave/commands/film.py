@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "source", type=Path, metavar="SCENE|DIR",
         help="scene file, or a folder that report wrote: then no model is run",
@@ -42,7 +42,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave.outputs import output_path
     from skinwave.pictures.films import check_format, film, seam
     from skinwave.pictures.renderer import renderer
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
-    """What is to be shown: of a folder what it keeps, of a scene every model's answer."""
+    """Motion to show: of a folder what it keeps, of a scene every model's response."""
     from skinwave.document import worst_warnings
     from skinwave.reports.album import answers, open_album, shown_scenes
     from skinwave.scene_file import read

@@ -7,7 +7,7 @@ from skinwave.commands.common import add_reporting, progress_of, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, glb, vtp) or mesh (vtu, "
         "msh, inp, vtk)",
@@ -27,7 +27,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from meshes import body_from_file, dihedral_angles, write
     from meshes.files import WRITTEN
     from skinwave.outputs import output_path

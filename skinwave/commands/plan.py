@@ -1,4 +1,4 @@
-"""What a scene requires, and why."""
+"""Model and discretisation that a scene requires, and why."""
 
 import argparse
 import json
@@ -8,7 +8,7 @@ from skinwave.plain_text import say
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     add_scene(parser)
     add_model(parser)
     add_mesh(parser)
@@ -16,7 +16,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from dataclasses import asdict, replace
 
     from skinwave.scene_file import read

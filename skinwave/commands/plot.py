@@ -10,7 +10,7 @@ PRESETS = ("speed",)
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a sweep")
     parser.add_argument(
         "--column", action="append", metavar="NAME",
@@ -19,7 +19,10 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--x", metavar="KEY", help="along the axis (default: most values)")
     parser.add_argument("--by", metavar="KEY", help="a curve for each value (default: the next)")
     parser.add_argument("--heat", action="store_true", help="a map over --x and --by instead")
-    parser.add_argument("--preset", choices=PRESETS, help="speed: what is felt over drawing speed")
+    parser.add_argument(
+        "--preset", choices=PRESETS,
+        help="speed: displacement and sensation level over drawing speed",
+    )  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="png")
     parser.add_argument("--style", default="report", help="report, talk or print")
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: DIR/figures")
@@ -29,7 +32,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave.sweeps import dataset, engine
 
     engine.check("threads")

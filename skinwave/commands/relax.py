@@ -1,4 +1,4 @@
-"""What each assumption of the published model changes on a scene, and what dropping it costs."""
+"""Model hierarchy: effect and cost of dropping each assumption of the published model."""
 
 import argparse
 from pathlib import Path
@@ -7,26 +7,26 @@ from skinwave.commands.common import add_output, metre, progress_of, summarise, 
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "scene", metavar="SCENE", help="scene file, or paper-vs-skin: which mechanism makes which "
         "line of the 15 Tactons",
     )  # fmt: skip
-    parser.add_argument("--h", type=float, metavar="MM", help="element size of all rungs, mm")
+    parser.add_argument("--h", type=float, metavar="MM", help="element size of all steps, mm")
     parser.add_argument(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
         help="how often the device moves its focus: 20 or 40 kHz",
     )  # fmt: skip
     parser.add_argument(
         "--points", type=int, metavar="N",
-        help="how many points on the path the device holds, one after another; as many as its rate "
-        "allows",
+        help="how many points on the path the focus rests on, one after another; as many as the "
+        "update rate allows",
     )  # fmt: skip
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import document, record
     from skinwave.outputs import output_folder
     from skinwave.scene_file import read

@@ -10,7 +10,7 @@ STYLES, FORMATS = ("report", "talk", "print"), ("png", "svg", "pdf")
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "source", type=Path, metavar="SCENE|DIR",
         help="scene file, or a folder that run, compare or report wrote: then no model is run",
@@ -29,7 +29,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
     from skinwave.pictures.styles import style

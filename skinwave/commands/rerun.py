@@ -20,7 +20,7 @@ REPEATED = ("run", "compare", "report")
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "folder", type=Path, metavar="DIR", help="folder that run, compare or report wrote, or a "
         "folder of one run in it; the new one is DIR-rerun",
@@ -29,7 +29,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.effort import threads
     from skinwave.marks import within
@@ -110,7 +110,7 @@ def _words(key: str, value: Any) -> Iterator[str]:
 
 
 def _parsed(words: list[str]) -> argparse.Namespace:
-    """What the command line makes of words, which come from a file: nobody reads its usage."""
+    """Parse words that come from a file, without printing the usage."""
     from skinwave.cli import parser
 
     said = io.StringIO()

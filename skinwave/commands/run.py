@@ -20,7 +20,7 @@ from skinwave.commands.common import (
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     add_scene(parser)
     add_model(parser)
     add_mesh(parser)
@@ -31,7 +31,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
     from skinwave.run import Run
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _mapped(scheduler: str | None) -> AbstractContextManager[Any]:
-    """What maps a function over lines: here, or on the workers of a scheduler."""
+    """Map of a function over lines: here, or on the workers of a scheduler."""
     if scheduler is None:
         return nullcontext(map)
     from skinwave.sweeps import engine

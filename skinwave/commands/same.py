@@ -7,7 +7,7 @@ from skinwave.commands.common import add_reporting, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     for name in ("first", "second"):
         parser.add_argument(name, type=Path, metavar="DIR", help="folder of results")
     parser.add_argument(
@@ -19,7 +19,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; 0 if they hold the same, 1 if not."""
+    """Run the command; 0 if they hold the same, 1 if not."""
     from skinwave.same import differences
 
     found = differences(options.first, options.second, options.rtol)

@@ -27,7 +27,7 @@ SAID_EACH = 5.0  # s between two lines of progress on a pipe
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     add_scene(parser)
     parser.add_argument(
         "--vary", action="extend", nargs="+", metavar="KEY=VALUES", required=True,
@@ -52,7 +52,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.sweeps import dataset, engine
 

@@ -1,4 +1,4 @@
-"""What accuracy costs on a scene, measured."""
+"""Cost of accuracy on a scene, measured for every model."""
 
 import argparse
 from pathlib import Path
@@ -7,13 +7,13 @@ from skinwave.commands.common import add_output, add_scene, progress_of, summari
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     add_scene(parser)
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
     from skinwave.scene_file import read

@@ -1,4 +1,4 @@
-"""Closed forms and series against what this program answers."""
+"""Verification against closed forms and series from the literature."""
 
 import argparse
 from pathlib import Path
@@ -7,13 +7,13 @@ from skinwave.commands.common import add_output, progress_of, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument("--quick", action="store_true", help="only cases of a few seconds each")
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
     from skinwave.verify.page import summary_table

@@ -1,4 +1,4 @@
-"""The interactive tool, in a browser: turn a Tacton's parameters, and see what is felt."""
+"""Interactive tool in a browser: a Tacton's parameters, its waves and its sensation level."""
 
 import argparse
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    """What a user may ask of it."""
+    """Declare the command-line options."""
     parser.add_argument(
         "scene", nargs="?", type=Path, metavar="SCENE", help="scene file (TOML) to begin with"
     )
@@ -17,7 +17,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it; the exit code."""
+    """Run the command; the exit code."""
     from skinwave.web import check_extra
 
     if not 0 <= options.port <= 65535:

@@ -1,8 +1,8 @@
-"""What the published model assumes, and a scene with some of these assumptions dropped.
+"""Assumptions of the published model, and a scene with some of them dropped.
 
-The paper's model (Lim, Seifi and Park, CHI EA '24, section 2) is a round spot without side lobes
-that pushes as hard as it is commanded to and is felt where it is, on a flat skin in which nothing
-propagates. Each name in `ASSUMPTIONS` turns one of these off.
+The paper's model (Lim, Seifi and Park, CHI EA '24, section 2) is a round focal spot without side
+lobes, whose pressure follows the command and stimulates only where it acts, on a flat skin in which
+nothing propagates. Each name in `ASSUMPTIONS` turns one of these off.
 """
 
 from collections.abc import Collection, Sequence
@@ -19,22 +19,22 @@ ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",
     "sinc^2 profile": "the focal spot is a Gaussian of the same half width",
     "no propagation": "waves run through an infinite flat body under the same load",
-    "little loss": "the material loses as much as it does",
-    "viscous loss": "what is lost relaxes, as in a standard linear solid, and is the same only at "
-    "the strongest line",
-    "endless": "the body has its own size and sides, and is made of elements",
+    "little loss": "the material has its full damping",
+    "viscous loss": "the damping is that of a standard linear solid, equal to the viscous one only "
+    "at the strongest line",
+    "endless": "the body has its own size and side conditions, and is meshed with finite elements",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
-    "one material": "skin has layers",
-    "flat": "the palm is curved, and its layers are one of their mean stiffness",
+    "one material": "skin is layered",
+    "flat": "the palm is curved, and its layers are merged into one of their mean stiffness",
     "small deflection": "the sheet stretches as it bends",
 }
 ELEMENTS = {"endless", "continuous path", "one material", "flat", "small deflection"}
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
-LOSS_LEFT = 0.1  # of the material's own: with none at all a resonance has no limit
+LOSS_LEFT = 0.1  # of the material's own: an undamped resonance is unbounded
 RELAXATION_TIME = PRESETS["palm-zener"].relaxation_time
-LEAST_LASTING = 0.5  # of a modulus that remains at rest, when a part of it relaxes instead
+LEAST_LASTING = 0.5  # long-term share of a modulus, at the least, where part of it is made to relax
 LAYERS = (
     Layer(thickness=0.3e-3, material="epidermis"),
     Layer(thickness=1.0e-3, material="dermis"),
@@ -43,7 +43,7 @@ LAYERS = (
 
 
 def ladder(scene: Scene) -> tuple[str, ...]:
-    """The assumptions that can be dropped for a scene, in the order of the ladder.
+    """Assumptions that can be dropped for a scene, in the order of the model hierarchy.
 
     Raises
     ------
@@ -70,10 +70,11 @@ def ladder(scene: Scene) -> tuple[str, ...]:
 
 
 def beside(scene: Scene) -> tuple[str, ...]:
-    """What is dropped on the rung beside the ladder, with a second law of loss; () if none is lost.
+    """Assumptions dropped in a side step of the hierarchy, with a second damping law; () without
+    viscosity.
 
-    Fast waves lose little in a standard linear solid, and elements take many times as long; where
-    the scene does not ask for it, it is tried where exact waves answer, and goes no further.
+    Fast waves lose little in a standard linear solid, and finite elements take many times as long;
+    where the scene does not have it, it is tried on the wavenumber integral only.
     """
     names = ladder(scene)
     if "viscous loss" in names or scene.body.kind != "slab" or not scene.body.solid.viscosity:
@@ -82,9 +83,9 @@ def beside(scene: Scene) -> tuple[str, ...]:
 
 
 def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
-    """Whether all others can be dropped without an assumption: the array's field has no profile of
-    its own, and an infinite body of elements is one whose sides absorb, if they do not anyway, and
-    if something holds it then.
+    """Whether all assumptions but one can be dropped: the array's field has no profile of its own,
+    and an infinite body of elements is one with absorbing sides, if it has none anyway and is
+    constrained elsewhere.
     """
     if name == "sinc^2 profile":
         return "main lobe only" not in names
@@ -100,7 +101,7 @@ def relaxed(
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
 ) -> tuple[Scene, str]:
-    """A scene without the dropped assumptions, and the model that answers it.
+    """Scene without the dropped assumptions, and the model that computes it.
 
     What is assumed of the load is the same with and without propagation.
 
@@ -135,7 +136,7 @@ def relaxed(
 def held(
     path: Trajectory, update_rate: float = DEVICE_RATES[0], points: int | None = None
 ) -> Trajectory:
-    """A path as a device draws it: points equally far apart along it, each held until the next.
+    """Path as a device draws it: points equally spaced along it, the focus at rest on each.
 
     Parameters
     ----------
@@ -214,7 +215,7 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
 
 
 def as_one(layers: Sequence[Layer]) -> Layer:
-    """A layer as thick as all and of their mean stiffness, for elements that follow none."""
+    """One layer as thick as all and of their mean stiffness, for a mesh without interfaces."""
     thickness = sum(layer.thickness for layer in layers)
     solids = [solid_of(layer.material) for layer in layers]
 
@@ -234,7 +235,7 @@ def as_one(layers: Sequence[Layer]) -> Layer:
 
 
 def with_little_loss(solid: Material, w: float) -> Material:
-    """A tenth of the loss, and the same stiffness at w in rad/s."""
+    """A tenth of the damping, and the same storage modulus at w in rad/s."""
     turned = (w * solid.relaxation_time) ** 2
     stiffer = (1 - LOSS_LEFT) * solid.relaxing_modulus * turned / (1 + turned)
     return _of_modulus(
@@ -249,16 +250,16 @@ def with_little_loss(solid: Material, w: float) -> Material:
 
 
 def _of_modulus(solid: Material, shear_modulus: float) -> Material:
-    """With another modulus at rest, of which as much is lost by hysteresis."""
+    """Material with another long-term modulus and the same hysteretic loss modulus."""
     lost = solid.loss_factor * solid.shear_modulus / shear_modulus
     return replace(solid, shear_modulus=shear_modulus, loss_factor=lost)
 
 
 def as_relaxing(solid: Material, w: float) -> Material:
-    """A standard linear solid of the same complex modulus at w in rad/s as one that is viscous.
+    """Standard linear solid with the complex modulus at w in rad/s of a Kelvin-Voigt solid.
 
-    Two numbers leave the time open: it is that of the preset, or less where so much is lost that
-    more than half of the modulus would have to relax.
+    One complex number leaves the relaxation time open: it is that of the preset, or shorter where
+    the long-term modulus would otherwise fall below half of the static one.
     """
     loss = w * solid.viscosity
     if not loss or solid.relaxing_modulus:  # nothing to fit, or fitted already
@@ -274,7 +275,7 @@ def as_relaxing(solid: Material, w: float) -> Material:
 
 
 def as_viscous(solid: Material, w: float) -> Material:
-    """Kelvin and Voigt's solid of the same complex modulus at w in rad/s as one that relaxes."""
+    """Kelvin-Voigt solid with the complex modulus at w in rad/s of a standard linear solid."""
     if not w or not solid.relaxing_modulus:
         return solid
     turned = 1j * w * solid.relaxation_time
@@ -287,9 +288,9 @@ def as_viscous(solid: Material, w: float) -> Material:
 
 
 def strongest_line(scene: Scene) -> float:
-    """The line in Hz that moves the probes most, 0 if none does.
+    """Line in Hz that moves the probes most, 0 if none does.
 
-    Laws of loss differ from line to line; they are made the same at this one.
+    Damping laws differ from line to line; they are matched at this one.
     """
     frequencies, shares = motion_lines(scene, 0.05)
     moving = frequencies > 0

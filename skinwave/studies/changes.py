@@ -1,4 +1,4 @@
-"""What propagation changes of every Tacton of a study, with maps of the one that is shown first."""
+"""Effect of propagation on every Tacton of a study, with maps of the one that is shown first."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ from skinwave.simulation import compute
 from skinwave.studies import paper15
 from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
 
-# What is known of skin: its stiffness to a factor of 2, its loss to one of 5 between sources.
+# Skin's stiffness is known to a factor of 2, its loss to one of 5 between sources.
 STIFFER, LOSSIER = 2.0, 5**0.5
 Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's
 Maps = Callable[[Run], Drawn]
@@ -26,7 +26,7 @@ FIRST = ("am140-stm20",)  # of the paper's Tactons, the one with both modulation
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shown:
     """The Tacton of a page's first screen: its kernel as `published` and under the same load, what
-    propagation changes by body, the maps by column, the expected relative error of the answer and
+    propagation changes by body, the maps by column, the expected relative error and
     the shares of motion outside the kernel's region over the range of materials, where known.
     """
 
@@ -40,13 +40,13 @@ class Shown:
 
     @property
     def body(self) -> Run:
-        """The one that sentences are about: skin, if there is any."""
+        """The body that the sentences describe: skin, if there is any."""
         skin = [run for run in self.bodies if run.scene.body.kind != "sheet"]
         return (skin or list(self.bodies))[-1]
 
 
 def changes(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagation]]:
-    """Tacton -> body -> what propagation changes, with maps where they cost next to nothing."""
+    """Tacton -> body -> effect of propagation, with maps where they cost next to nothing."""
     found: dict[str, dict[str, Propagation]] = {}
     for name, group in groups.items():
         kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
@@ -57,7 +57,7 @@ def changes(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagat
 
 
 def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
-    """The Tacton of the first screen; None where no body was answered beside both kernels."""
+    """The Tacton of the first screen; None where no body was run beside both kernels."""
     group = groups.get(first_of(groups), [])
     kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
     published = next((r for r in group if r.model == "point-kernel-published"), None)
@@ -125,7 +125,7 @@ def _kernel(group: Sequence[Run]) -> Run | None:
 
 
 def _error(run: Run) -> float:
-    """Relative error of the answer: as it is known, or the difference of the steady waveform from
+    """Relative error of the response: as estimated, or the difference of the steady waveform from
     the wavenumber integral's at the worst probe.
     """
     expected = run.response.expected_error

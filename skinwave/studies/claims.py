@@ -1,6 +1,6 @@
-"""What Lim, Seifi and Park state about lines, evaluated on any model's answers.
+"""Claims of Lim, Seifi and Park about spectral lines, evaluated on any model's responses.
 
-S1 to S5 are statements about their simulation, M1 to M5 about their measurement on paper.
+S1 to S5 are claims about their simulation, M1 to M5 about their measurement on paper.
 Nothing here knows which model should fulfil which.
 """
 
@@ -22,7 +22,7 @@ ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """Whether a statement holds for a body and a model, by which number against which bar."""
+    """Whether a claim holds for a body and a model, by which number against which threshold."""
 
     claim: str
     body: str
@@ -39,8 +39,8 @@ class Verdict:
 
 
 def evaluate(runs: Iterable[Run]) -> list[Verdict]:
-    """Every statement on every body and model for which there are runs to judge it by, long enough
-    to tell the lines apart that it is about.
+    """Every claim on every body and model for which there are runs to assess it by, long enough to
+    resolve the lines that it is about.
     """
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in filter(_is_single, runs):
@@ -68,14 +68,14 @@ def _is_single(run: Run) -> bool:
     """
     tacton = run.scene.tacton
     plain = len(tacton.foci) == 1 and not tacton.is_sampled and not tacton.envelope_frequency
-    # Of two sinusoids the first is the one that statements are about, and is heard alone.
+    # Of two sinusoids the first is the one that claims are about, and must act alone.
     w1, w2 = tacton.superposition
     one = (w1 > 0 or not tacton.am_frequency) and not (w2 > 0 and tacton.second_am_frequency)
     return bool(plain and one and tacton.trajectory.shape != "recorded")
 
 
 def _is_told(run: Run, claim: str) -> bool:
-    """Whether the lines that a statement is about are known; some are about all lines."""
+    """Whether the lines that a claim is about are resolved; some are about all lines."""
     if claim in NEEDED:
         return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
     return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.untold
@@ -87,7 +87,7 @@ def _single_line(runs: list[Run]) -> Judgement:
         worst < ABSENT,
         worst,
         ABSENT,
-        f"the strongest line beside f_AM is at {decibel(worst)} dB re f_AM",
+        f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM",
     )
 
 
@@ -170,7 +170,7 @@ def _am_highest_measured(runs: list[Run]) -> Judgement:
     holds, value, bar, sentence = _am_highest(runs)
     beaten = [run.tacton for run in runs if _others(run).max() >= 0]
     if beaten:
-        sentence += f"; f_AM is beaten in {', '.join(beaten)}"
+        sentence += f"; f_AM is exceeded in {', '.join(beaten)}"
     if runs[0].response.unit == "m":  # a vibrometer reads velocity; the point kernel has none
         velocity = max(_others(run, velocity=True).max() for run in runs)
         sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
@@ -229,7 +229,7 @@ STATEMENTS: dict[str, tuple[Callable[[Run], bool], Callable[[list[Run]], Judgeme
     "M4": (_both, _am_highest_measured),
     "M5": (_both, _much_lower),
 }
-# Lines, one of these sets of which a statement is about; those not here are about all lines.
+# Lines, one of these sets of which a claim is about; claims not listed are about all lines.
 DRAWN = (("f_d", "2f_d", "3f_d"),)
 PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
 NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
@@ -267,18 +267,18 @@ def _probe_levels(run: Run, names: Iterable[str], reference: str, velocity: bool
 
 
 def _rivals(run: Run) -> list[str]:
-    """Lines that are told apart from f_AM itself."""
+    """Lines that are resolved from f_AM itself."""
     f_am = run.frequencies["f_AM"]
     return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
 
 
 def _others(run: Run, velocity: bool = False) -> Floats:
-    """Level of the strongest line beside f_AM at each probe, dB re f_AM there."""
+    """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
     return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
 
 
 def _rival(run: Run) -> tuple[str, float]:
-    """The strongest line beside f_AM, and the radius in mm of the probe where it is."""
+    """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
     names = _rivals(run)
     levels = _probe_levels(run, names, "f_AM")
     line, probe = np.unravel_index(np.argmax(levels), levels.shape)
@@ -302,7 +302,7 @@ def _peak(run: Run, line: str, reach: float = 6.0) -> float:
     f, amplitude = spectrum(run.response)
     x = amplitude[:, int(np.argmax(run.lines[line]))]
     near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= reach)
-    if len(near) < 3:  # too short a Tacton for its spectrum to tell
+    if len(near) < 3:  # too short a Tacton for its spectrum to resolve
         return np.inf
     top = near[np.argmax(x[near])]
     if top in (near[0], near[-1]) or x[top] <= 0:

@@ -1,4 +1,4 @@
-"""What was modelled, and what that leaves out, in sentences that are true of the runs at hand."""
+"""Description of the models and of what they leave out, in sentences true of the runs at hand."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,9 +16,10 @@ ANSWERS = {
     "propagates, and what it predicts is a stimulation in Pa",
     "point-kernel-published": "the same under the load of Lim, Seifi and Park: the commanded "
     "signal itself, without a mean",
-    "flat-body": "exact linear waves of an endless flat body, without a mesh",
-    "flat-body-harmonic": "the steady state of exact linear waves of an endless flat body",
-    "fem": "linear waves on 10-node tetrahedra, with few unknowns left",
+    "flat-body": "linear waves of a laterally infinite flat body, by the wavenumber integral",
+    "flat-body-harmonic": "the steady state of linear waves of a laterally infinite flat "
+    "body, by the wavenumber integral",
+    "fem": "linear waves on 10-node tetrahedra by a reduced-order model",
     "fem-harmonic": "the steady state of linear waves on 10-node tetrahedra",
     "fem-transient": "linear waves on 10-node tetrahedra, step by step",
     "fem-nonlinear": "a sheet that stretches as it bends, in its modes, about its rest "
@@ -43,7 +44,7 @@ UNCERTAIN = (
 
 
 def modelled(runs: Iterable[Run]) -> list[str]:
-    """A paragraph a body and model, and what holds for all."""
+    """A paragraph per body and model, and those true of all."""
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.body, run.model), []).append(run)
@@ -55,11 +56,11 @@ def modelled(runs: Iterable[Run]) -> list[str]:
 
 
 def untold(runs: Iterable[Run]) -> list[str]:
-    """What is not reported of Tactons that are too short, a sentence for each duration."""
+    """Unresolved lines of Tactons that are too short, a sentence for each duration."""
     missing = {run.scene.tacton.duration: run.untold for run in runs if run.untold}
     return [
         f"{len(names)} line{'s' * (len(names) > 1)}, {', '.join(names[:NAMED])}"
-        f"{', ...' * (len(names) > NAMED)}, cannot be told apart in {seconds:g} s and "
+        f"{', ...' * (len(names) > NAMED)}, cannot be resolved in {seconds:g} s and "
         f"{'are' if len(names) > 1 else 'is'} not reported; make the Tacton longer."
         for seconds, names in missing.items()
     ]
@@ -78,7 +79,7 @@ def _sentence(text: str) -> str:
 
 
 def path_of(tacton: Tacton) -> str:
-    """Where the foci go."""
+    """Paths of the foci."""
     path = tacton.trajectory
     if path.shape == "recorded":
         f_d, n = tacton.drawing_frequency, tacton.n_paths
@@ -111,7 +112,7 @@ def tones_of(tacton: Tacton) -> list[str]:
 
 
 def levels_of(tacton: Tacton) -> list[str]:
-    """What else turns the amplitude up and down."""
+    """Amplitude, rhythm and sampled signal, where there are any."""
     parts = [f"{100 * tacton.amplitude:g} % of full drive"] * (tacton.amplitude != 1)
     if tacton.rhythm:
         rhythm, count = tacton.rhythm, len(tacton.rhythm.pulses)
@@ -123,7 +124,7 @@ def levels_of(tacton: Tacton) -> list[str]:
 
 
 def extent(body: Body) -> str:
-    """What a body is and how large."""
+    """Kind, size and boundary conditions of a body."""
     if body.kind == "none":
         return "none"
     if body.kind == "mesh":
@@ -137,7 +138,7 @@ def extent(body: Body) -> str:
 
 def _body(runs: list[Run]) -> str:
     body = runs[0].scene.body
-    endless = " of which the exact waves know only the depth," * runs[0].model.startswith(
+    endless = " of which the wavenumber integral takes only the depth," * runs[0].model.startswith(
         "flat-body"
     )
     text = f"{extent(body)},{endless} of {_material(body.solid)}"
@@ -173,7 +174,7 @@ def _material(solid: Material) -> str:
         text += f", loss factor {solid.loss_factor:g}"
     if solid.relaxing_modulus:
         text += (
-            f", relaxing {solid.relaxing_modulus / 1e3:.4g} kPa in "
+            f", a Maxwell branch of {solid.relaxing_modulus / 1e3:.4g} kPa with relaxation time "
             f"{1e3 * solid.relaxation_time:g} ms"
         )
     return text
@@ -186,7 +187,7 @@ def _sheet(runs: list[Run]) -> str:
     if runs[0].model.startswith("fem"):
         text += "The mesh is a thicker sheet of the same bending stiffness and mass per area. "
     text += (
-        "Air moves along on both sides. Left out: what of it flows around the edge, and its sound"
+        "Air moves along on both sides. Left out: its flow around the edge, and sound radiation"
         if runs[0].scene.body.air
         else "Left out: the air that moves along, a fifth to a third of the mass of office paper"
     )

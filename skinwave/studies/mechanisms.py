@@ -1,4 +1,4 @@
-"""Which mechanism makes which line: the 15 Tactons on paper and on skin, one cause after another.
+"""Mechanisms behind spectral lines: the 15 Tactons on paper and on skin, one cause at a time.
 
 Lim, Seifi and Park (CHI EA '24) measured lines on paper that their model lacks. Here the same
 Tactons are driven by a linear load, by the square of the sound's amplitude, and on a sheet that
@@ -32,8 +32,8 @@ AMPLITUDES = (0.25, 0.5, 1.0)
 AM = 140.0  # Hz of the Tacton whose amplitude is varied
 STEADY = 1e-3  # relative change of a ratio that counts as none
 HARMONICS = 4
-# Loads over one period of the modulation m = sin, relative to the largest: what each would leave in
-# the ratios 2f/f, 3f/f and 4f/f before the body has its say.
+# Loads over one period of the modulation m = sin, relative to the largest: each has its own ratios
+# 2f/f, 3f/f and 4f/f, before the response of the body changes them.
 SIGNATURES: Mapping[str, Callable[[Floats], Floats]] = {
     "force follows the command, with a mean": lambda m: (1 + m) / 2,
     "square of the sound's amplitude": lambda m: ((1 + m) / 2) ** 2,
@@ -118,7 +118,7 @@ def paper_vs_skin(
 def _mechanisms(
     body: Body, h: float | None, progress: Progress, name: str
 ) -> dict[str, tuple[str, Callable[[Scene], Response]]]:
-    """Mechanism -> drive law, and what answers a scene with it."""
+    """Mechanism -> drive law, and the function that computes a scene's response with it."""
     prepared = prepare(
         body, np.array(PROBES), lambda phase, done: progress(f"{name}: {phase}", done), h=h
     )
@@ -138,7 +138,7 @@ def _scene(name: str, tacton: Tacton, body: Body, drive: str) -> Scene:
 
 
 def steady(response: Response) -> Response:
-    """The later half of a response, which the start has left."""
+    """The later half of a response, after the transient."""
     half = len(response.times) // 2
     return replace(
         response,
@@ -150,7 +150,7 @@ def steady(response: Response) -> Response:
 def _lines(
     tacton: str, body: str, mechanism: str, pressure: MovingPressure, response: Response
 ) -> list[Line]:
-    # A stretching sheet makes lines that no load has: those that are judged are looked for.
+    # A stretching sheet has lines that no load has: those that claims are about are looked for.
     later = steady(response)
     names, _ = resolved_lines(pressure, later, candidates=JUDGED, highest=700.0)
     amplitudes = lines(later, list(names.values())).max(axis=1)
@@ -172,7 +172,7 @@ def signatures() -> dict[str, tuple[float, ...]]:
 
 
 def sentences(found: Findings) -> list[str]:
-    """What is explained, what is not, and what would decide."""
+    """Conclusions: lines explained, lines not explained, and the experiment that would decide."""
     said = []
     for body in dict.fromkeys(r.body for r in found.ratios):
         for mechanism in dict.fromkeys(r.mechanism for r in found.ratios if r.body == body):
@@ -193,7 +193,7 @@ def sentences(found: Findings) -> list[str]:
                     "line of the sheet as well as of the load."
                 )
     said.append(
-        "Linear waves make no line that the load has not; multiples of f_AM and of f_d together "
+        "Linear waves add no line to those of the load; multiples of f_AM and of f_d together "
         "need a load with a mean. Contact and clipping are known by their pattern only (table): "
         "they were not simulated."
     )

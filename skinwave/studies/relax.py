@@ -1,7 +1,7 @@
-"""Assumption by assumption from the paper's model to the richest one: what each changes, and costs.
+"""Model hierarchy from the paper's model to the richest one: effect and cost of each assumption.
 
-Rungs of the ladder drop one assumption after another; beside them stand those that drop all but
-one. Each is answered in a process of its own, with nothing kept from before, so that its seconds
+Each step of the hierarchy drops one more assumption; leave-one-out models, which drop all but one,
+are run beside it. Each is computed in a process of its own with a cold cache, so that its seconds
 and its memory are its own.
 """
 
@@ -39,7 +39,7 @@ FIRST = "as published"  # by the model point-kernel-published
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rung:
-    """What was dropped, and the answer or the `error` that came instead of one."""
+    """Step of the model hierarchy: dropped assumptions, and the response or the `error` instead."""
 
     name: str
     dropped: tuple[str, ...]
@@ -52,11 +52,11 @@ class Rung:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """What one assumption changes where it changes most.
+    """Effect of dropping one assumption, at the probe where it is largest.
 
-    `waveform` relative L2 at probe `where` (x, y) in metre, `decibel` by line, both of the rung
-    without it against the rung with it (after the factor that fits best where units differ);
-    `alone` the waveform's change if it is the only assumption kept; `seconds` that dropping costs.
+    `waveform` relative L2 at probe `where` (x, y) in metre, `decibel` by line, both of the step
+    without it against the step with it (after the factor that fits best where units differ);
+    `alone` the waveform's change if it is the only assumption made; `seconds` that dropping costs.
     """
 
     name: str
@@ -69,8 +69,8 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ladder:
-    """Rungs in order, the first as published and the last the richest; those that drop one more
-    `beside` the one they follow; and those that drop all but one.
+    """Model hierarchy: steps in order, the first as published and the last the richest; side
+    steps, which drop one more assumption than the step they branch off; and leave-one-out models.
     """
 
     scene: Scene
@@ -80,12 +80,12 @@ class Ladder:
 
     @property
     def every(self) -> tuple[Rung, ...]:
-        """All rungs, as they stand in tables."""
+        """All steps, in the order of the tables."""
         return (*self.rungs, *self.beside, *self.but_one)
 
     def pairs(self) -> list[tuple[Rung, Rung]]:
-        """Each answered rung of the ladder and beside it, after the one that it is judged by: what
-        follows one that failed is not, because two assumptions differ.
+        """Each computed step, side steps included, after the one that it is compared with; a step
+        after one that failed is left out, because it differs by two assumptions.
         """
         answered = [rung for rung in self.rungs if rung.response]
         found = [(a, b) for a, b in pairwise(self.rungs) if a.response and b.response]
@@ -97,7 +97,7 @@ class Ladder:
         return found
 
     def effects(self) -> list[Effect]:
-        """What each assumption changes, the greatest first; rungs that failed are passed over."""
+        """Effect of each assumption, the largest first; failed steps are left out."""
         answered = [rung for rung in self.rungs if rung.response]
         all_of_them = set(self.rungs[-1].dropped)
         left = [(all_of_them.difference(r.dropped), r) for r in (*self.rungs, *self.but_one)]
@@ -117,11 +117,11 @@ def climb(
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
 ) -> Ladder:
-    """Answer a scene on every rung.
+    """Compute a scene at every step of the model hierarchy.
 
     Parameters
     ----------
-    h : float, metre, element size of all rungs; the default of the scene's body if not given
+    h : float, metre, element size of all steps; the default of the scene's body if not given
     update_rate, points : float, Hz, and how many on the path: of the device, as `held` takes them
 
     Raises
@@ -174,7 +174,7 @@ def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, 
     started = time.perf_counter()
     response = compute(scene, model, h=h)
     seconds, memory = time.perf_counter() - started, peak_memory()
-    # Of all rungs alike, the error of the mesh is none of what they differ by.
+    # The discretisation error is common to all steps and no part of their differences.
     effort = replace(response.effort, warnings=sentences(scene, response, h=h))
     return replace(response, effort=effort), seconds, memory
 
@@ -182,7 +182,7 @@ def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, 
 def effect(
     scene: Scene, before: Rung, after: Rung, richest: Rung, kept_alone: Rung | None
 ) -> Effect:
-    """What the assumption named by a rung changes."""
+    """Effect of the assumption that a step is named by."""
     assert before.response
     assert after.response
     change = compare(after.response, before.response)

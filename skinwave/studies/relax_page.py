@@ -1,4 +1,4 @@
-"""What dropping assumptions did, as a page, a picture and tables."""
+"""Effects of dropping assumptions, as a page, a picture and tables."""
 
 import csv
 import json
@@ -20,7 +20,7 @@ from skinwave.studies.relax import Effect, Ladder, Rung, followed_lines
 
 
 def sentence(e: Effect) -> str:
-    """What a user is told about an assumption."""
+    """Sentence on the effect and the cost of dropping an assumption."""
     x, y = (1e3 * v for v in e.where)
     text = (
         f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at ({x:g}, {y:g}) mm by "
@@ -61,14 +61,14 @@ def write(folder: Path, found: Ladder) -> None:
         ),
         document.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
         document.table(*effect_table(effects)),
-        document.section("Rungs", document.table(*rung_table(found))),
+        document.section("Steps", document.table(*rung_table(found))),
     ]
     title = f"{found.scene.name}: assumptions, one by one"
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
 
 
 def efforts(found: Ladder) -> list[tuple[str, Effort]]:
-    """What each answer took, by the name of its rung."""
+    """Effort of each response, by the name of its step."""
     return [(rung.name, rung.response.effort) for rung in found.every if rung.response]
 
 
@@ -83,18 +83,18 @@ def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]
         for e in effects
     ]  # fmt: skip
     header = ["assumption dropped", "waveform changes by, %", "at, mm"]
-    header += ["if it is the only one kept, %", "costs, s", "lines change by, dB"]
+    header += ["if it is the only one made, %", "costs, s", "lines change by, dB"]
     return header, rows
 
 
 def rung_table(found: Ladder) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of what was answered, in the order of the ladder."""
+    """Header and rows of all steps, in the order of the model hierarchy."""
     rows = []
     for rung in found.every:
         dofs = f"{rung.response.effort.dofs:,}" if rung.response else ""
         memory = f"{rung.memory / 2**30:.2f}" if rung.response else ""
         rows.append([rung.name, rung.model, dofs, f"{rung.seconds:.1f}", memory, rung.error])
-    return ["rung", "model", "unknowns", "seconds, all from the start", "GiB", "why not"], rows
+    return ["step", "model", "dofs", "seconds, all from the start", "GiB", "why not"], rows
 
 
 def figure(effects: list[Effect]) -> Figure:
@@ -122,7 +122,7 @@ def _record(rung: Rung) -> dict[str, object]:
 
 
 def _write_lines(path: Path, found: Ladder) -> None:
-    """Every line's change at each probe, from the rung before and from the richest."""
+    """Every line's change at each probe, from the step before and from the richest."""
     answered = [r for r in found.rungs if r.response]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

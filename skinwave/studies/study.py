@@ -66,9 +66,9 @@ def run_study(
     h: float | None = None,
     solver: str = "auto",
 ) -> Outcome:
-    """Answer every scene, writing each run as it is finished, then the tables and the page.
+    """Run every scene, writing each run as it is finished, then the tables and the page.
 
-    An interrupt ends the answering early; what is finished is still compared and written.
+    An interrupt ends the runs early; those that are finished are still compared and written.
     """
     check_knobs(solver, h=h)
     for solid in {s.body for group in scenes.values() for s in group.values()}:
@@ -108,7 +108,7 @@ def run_study(
     return spent
 
 
-Bodies = Callable[[Scene], tuple[Prepared, Coarser]]  # reduced, and the coarser one beside it
+Bodies = Callable[[Scene], tuple[Prepared, Coarser]]  # reduced, and the one on a coarser mesh
 
 
 def _begun_bodies(
@@ -118,8 +118,8 @@ def _begun_bodies(
     h: float | None,
     solver: str,
 ) -> Bodies:
-    """The reduced bodies: the last is prepared here when it is first asked for, and what is aside
-    meanwhile are the others and the coarser ones that answers are assessed by.
+    """Reduced bodies: the last is reduced here when it is first asked for; meanwhile the others and
+    the coarser ones that responses are assessed by, are reduced in other processes.
     """
     every = [each for group in scenes.values() for each in group.items()]
     solids = {s.body: (column, s) for column, s in every if s.body.kind != "none"}
@@ -160,7 +160,7 @@ def _begun_maps(
     h: float | None,
     solver: str,
 ) -> Maps:
-    """The maps of the Tacton that is shown first; those of elements are begun at once, aside."""
+    """Maps of the Tacton that is shown first; those by finite elements are begun at once, aside."""
     begun = {
         scene.body: aside.submit(element_maps, scene, h, solver)
         for scene in scenes[first_of(scenes)].values()
@@ -185,8 +185,8 @@ def _answered(
     h: float | None,
     solver: str,
 ) -> tuple[dict[str, list[Run]], dict[str, Prepared], dict[str, Future[bytes]]]:
-    """Every run, both kernels of all Tactons first, the bodies that were prepared for them, and
-    each Tacton's figure, drawn aside as soon as its runs are there.
+    """Every run, both kernels of all Tactons first, the reduced bodies behind them, and each
+    Tacton's figure, drawn aside as soon as its runs are there.
     """
     groups: dict[str, list[Run]] = {}
     prepared: dict[str, Prepared] = {}
@@ -210,7 +210,7 @@ def _answered(
             groups.setdefault(name, []).append(run)
             if len(groups[name]) == len(scenes[name]):
                 figures[name] = aside.submit(tacton_png, name, groups[name])
-            progress(f"answer {name} by {column}", (k + 1) / len(every))
+            progress(f"response of {name} by {column}", (k + 1) / len(every))
     if not groups:
         raise KeyboardInterrupt
     return groups, prepared, figures

@@ -27,7 +27,7 @@ EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figu
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a comparison left: its verdicts and warnings, what it cost, how much of it was done."""
+    """Outcome of a comparison: assessed claims, warnings, cost, and how much of it was done."""
 
     verdicts: list[Verdict]
     warnings: list[str]
@@ -111,7 +111,7 @@ def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
 def effort_section(
     groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: Outcome
 ) -> str:
-    """What each body and the whole cost."""
+    """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]
     efforts = {
         body: replace(
@@ -127,7 +127,7 @@ def effort_section(
 
 
 def again(command: str) -> str:
-    """How the same is had once more."""
+    """Command that repeats the comparison."""
     return document.section("Do it again", document.paragraph(
         f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."
     ))  # fmt: skip
@@ -171,7 +171,7 @@ def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str
 
 
 def _disagreements(verdicts: list[Verdict]) -> list[str]:
-    """Where a body contradicts what was measured on paper, and whether propagation is the cause."""
+    """Claims measured on paper that a body contradicts, and whether propagation is the cause."""
     of_kernel = {v.claim: v for v in verdicts if v.model == "point-kernel"}
     texts = []
     for verdict in verdicts:
@@ -200,12 +200,12 @@ LEVELS = (
 OVERVIEW_CAPTION = (
     "Top: motion about its mean at one probe, relative to each model's largest motion at any "
     "probe. Middle: its spectrum; filled markers are lines of the load, open ones free vibrations "
-    "that the start of the Tacton leaves in a body. Bottom: how far the motion spreads."
+    "excited by the start of the Tacton. Bottom: how far the motion spreads."
 )
 
 
 def caption(name: str, group: list[Run]) -> str:
-    """What a Tacton's figure shows."""
+    """Caption of a Tacton's figure."""
     tacton = group[0].scene.tacton
     moved = [] if tacton.trajectory.is_static else [path_of(tacton)]
     parts = [*tones_of(tacton), *moved, *levels_of(tacton)]

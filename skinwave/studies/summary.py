@@ -17,9 +17,9 @@ from skinwave.studies.changes import Shown
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
 ABOUT_MAPS = (
     "Share of squared displacement and spread are of maps of 44 mm either way. A slab's is that of "
-    "an infinite layer; where only elements answer, the first Tacton alone has a map. Strongest is "
-    "the largest amplitude at any probe; a phase delay is known but for whole periods and includes "
-    "the phase of a body that is driven off resonance."
+    "a laterally infinite layer; where only finite elements apply, the first Tacton alone has a "
+    "map. Strongest is the largest amplitude at any probe; a phase delay is known up to whole "
+    "periods and includes the phase of a body that is driven off resonance."
 )
 NAMED = 3  # lines that a sentence names
 
@@ -45,7 +45,7 @@ def top(shown: Shown, draw: Callable[[Figure, str], str], name: str = "") -> lis
 
 
 def sentences(shown: Shown) -> list[str]:
-    """What propagation does to a Tacton; what the drive law does; how far it is felt, how sure."""
+    """Effect of propagation, effect of the drive law, and reach above threshold with its error."""
     found = shown.changes[shown.body.column]
     return [
         _propagated(found),
@@ -68,13 +68,14 @@ def small_table(columns: Sequence[Propagation], name: str) -> str:
         + ["0", *("-" if c.delay is None else significant(1e3 * c.delay, 2) for c in columns)],
         ["strongest component"]
         + [_component(first.kernel_strongest, "Pa"), *(_component(c.strongest) for c in columns)],
-        ["component felt most"] + ["-", *(_felt_most(c.felt_most) for c in columns)],
+        ["component of highest sensation level"]
+        + ["-", *(_felt_most(c.felt_most) for c in columns)],
     ]
     return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
 
 
 def beside_published(kernel: Run, published: Run) -> Html:
-    """What the drive law and the focus change: the kernel as published beside the same load."""
+    """Effect of drive law and focus: the kernel as published beside the same load."""
     names = [n for n in kernel.frequencies if n in published.frequencies]
     levels = [
         [20 * np.log10(max(float(r.lines[n].max()), 1e-300) / top) if top else -np.inf
@@ -152,14 +153,15 @@ def _felt(found: Propagation) -> str:
         )
     most = f"most at {peak.name} ({peak.frequency:.0f} Hz, {peak.level:+.0f} dB SL)"
     if not found.felt:
-        return f"Felt {most}." if peak.level >= 0 else f"Below threshold, by least at {most[8:]}."
+        least = f"Below threshold, by least at {most[8:]}."
+        return f"Above threshold, {most}." if peak.level >= 0 else least
     half, now, twice = found.felt
     if now is None:
         return f"Below the threshold of detection everywhere, {most}."
     less = "not at all" if half is None else f"{_reach(half)} mm"
     return (
-        f"Felt out to {_reach(now)} mm from the path, {most}; with half or twice the pressure, "
-        f"which is known no better, {less} or {_reach(twice)} mm."
+        f"Above threshold out to {_reach(now)} mm from the path, {most}; with half or twice the "
+        f"pressure, which is known no better, {less} or {_reach(twice)} mm."
     )
 
 
@@ -217,5 +219,5 @@ def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Html:
     ]  # fmt: skip
     header = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
     header += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
-    header += ["felt most"]
+    header += ["highest sensation level"]
     return joined([paragraph(ABOUT_MAPS), table(header, rows)], "")

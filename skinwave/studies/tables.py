@@ -19,7 +19,7 @@ ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
 
 
 def claims_table(verdicts: list[Verdict]) -> Html:
-    """Claims down, kernels and bodies across: holds or fails, and what decides."""
+    """Claims down, kernels and bodies across: holds or fails, and the number that decides."""
     columns = list(dict.fromkeys(v.column for v in verdicts))
     found = {(v.claim, v.column): v for v in verdicts}
     rows = [
@@ -31,7 +31,7 @@ def claims_table(verdicts: list[Verdict]) -> Html:
 
 
 def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Html:
-    """Each Tacton's answers, a pair at a time between which one thing changes: drive law and focus
+    """Each Tacton's responses, in pairs between which one thing changes: drive law and focus
     from the published kernel to that under the same load, propagation from this to a body.
     """
     rows = [
@@ -46,7 +46,7 @@ def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Html:
 
 
 def pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
-    """What changes, and the two answers between which it does."""
+    """Name of the change, and the two runs between which it is made."""
     found = {run.column: run for run in group}
     kernel, published = found.get("point-kernel"), found.get("point-kernel-published")
     if kernel is None:
@@ -81,7 +81,7 @@ def _between(values: Floats) -> str:
 
 
 def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None = None) -> Html:
-    """Seconds by phase, size and memory of each prepared body, and of the whole."""
+    """Seconds by phase, size and memory of each reduced body, and of the whole."""
     rows = []
     for name, effort in efforts.items():
         phases = ", ".join(f"{phase} {seconds:.1f} s" for phase, seconds in effort.seconds.items())
@@ -90,9 +90,9 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
             + [f"{effort.energy_imbalance:.0e}", f"{100 * effort.radiated:.0f} %"]
             + [effort.solver, phases, f"{effort.peak_memory / 2**30:.2f}"]
         )
-    header = ["body", "unknowns", "reduced to", "estimated reduction error"]
-    header += ["energy balance off by", "of the lost, radiated", "solver"]
-    header += ["preparation", "peak memory so far, GiB"]
+    header = ["body", "dofs", "reduced to", "estimated reduction error"]
+    header += ["relative energy imbalance", "share of loss radiated", "solver"]
+    header += ["time by phase", "peak memory so far, GiB"]
     versions = next(iter(efforts.values())).versions if efforts else {}
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
@@ -108,6 +108,6 @@ def _spread(spread: dict[int, float]) -> str:
 
 def _verdict(verdict: Verdict | None) -> str:
     if verdict is None:
-        return "not judged"
+        return "not assessed"
     kind, word = ("yes", "holds") if verdict.holds else ("no", "fails")
     return markup('<span class="{}">{}</span><br><small>{}</small>', kind, word, verdict.sentence)

@@ -1,4 +1,6 @@
-"""What accuracy costs on one scene: every model over its knobs, against the finest fem run."""
+"""Work-precision study of one scene: every model over its discretisation parameters, against the
+finest fem run.
+"""
 
 import json
 import time
@@ -22,7 +24,7 @@ from skinwave.scene import Scene
 from skinwave.simulation import compute
 
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
-FINEST = (0.6, 0.5)  # of the two runs that the reference is accepted by
+FINEST = (0.6, 0.5)  # of the two runs whose difference decides whether the reference is accepted
 BARS = (0.01, 0.05, 0.20)
 COLOURS = {
     "point-kernel": "#000000", "flat-body-harmonic": "#E69F00", "flat-body": "#009E73",
@@ -33,8 +35,8 @@ COLOURS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A model with its knobs: element size in metre, reduction tolerance, time step in s, and
-    whether the body is taken as infinitely deep.
+    """Model and its discretisation: element size in metre, reduction tolerance, time step in s, and
+    whether the body is taken as a half-space.
     """
 
     model: str
@@ -45,7 +47,7 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """What a table calls it."""
+        """Name in tables."""
         knobs = ["half-space"] if self.endless else []
         knobs += [f"h = {1e3 * self.h:.2f} mm"] if self.h else []
         knobs += [f"reduced to {self.tolerance:g}"] if self.tolerance else []
@@ -58,7 +60,7 @@ class Measured:
     """A candidate's errors against the reference and its cost.
 
     `errors` relative L2 per probe, `line_errors` dB per line at the probe where it is strongest,
-    `delay` in s at the worst probe; `cold` and `warm` wall s; `memory` peak bytes; unknowns `dofs`.
+    `delay` in s at the worst probe; `cold` and `warm` wall s; `memory` peak bytes; `dofs`.
     """
 
     candidate: Candidate
@@ -76,7 +78,7 @@ class Measured:
         return max(self.errors)
 
     def beats(self, other: "Measured") -> bool:
-        """Whether it is as right, and as soon there the first time and the next, or better."""
+        """Whether it is as accurate and as fast, cold and warm, and better in one of these."""
         mine, theirs = ((m.error, m.cold, m.warm) for m in (self, other))
         return mine != theirs and all(a <= b for a, b in zip(mine, theirs, strict=True))
 
@@ -95,16 +97,16 @@ class Study:
         return self.self_convergence < 0.1 * min(m.error for m in self.measured)
 
     def front(self) -> list[Measured]:
-        """Candidates that none is better than in error, first answer and next answer at once."""
+        """Pareto front: candidates that no other beats in error, cold and warm time at once."""
         return [m for m in self.measured if not any(o.beats(m) for o in self.measured)]
 
     def cheapest(self, bar: float) -> Measured | None:
-        """The cheapest candidate with an error of at most the bar."""
+        """The cheapest candidate with an error within the tolerance."""
         return next((m for m in self.measured if m.error <= bar), None)
 
 
 def candidates(scene: Scene) -> list[Candidate]:
-    """Every model that can answer the scene, over the knobs that matter to it."""
+    """Every model that can compute the scene, over the discretisation parameters it has."""
     h = default_size(scene.body)
     sizes = [round(h * factor, 6) for factor in REFINEMENTS]
     found = [Candidate(model="point-kernel")]
@@ -163,7 +165,7 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
         for m in found.measured
     ]  # fmt: skip
     header = ["candidate (* on the front)", "waveform error, %", "largest line error, dB"]
-    header += ["delay, ms", "cold, s", "warm, s", "peak memory, MiB", "unknowns"]
+    header += ["delay, ms", "cold, s", "warm, s", "peak memory, MiB", "dofs"]
     (folder / "index.html").write_text(
         document.page(
             f"Speed against accuracy: {scene.name}",
@@ -176,14 +178,14 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
 
 
 CAPTION = (
-    "Worst probe's waveform error against the reference, and the time of the first answer and of "
-    "the next on the same body. The area of a marker is the peak memory. What has a black edge is "
-    "on the front: nothing is as right and as soon there both times."
+    "Worst probe's waveform error against the reference, over the time of a first response (cold) "
+    "and of a further one on the same body (warm). The area of a marker is the peak memory. A "
+    "black edge marks the Pareto front: no other candidate is as accurate and as fast both times."
 )
 
 
 def sentences(found: Study) -> list[str]:
-    """What the study says, in words."""
+    """Results of the study, in sentences."""
     own = f"{100 * found.self_convergence:.2g} %"
     if found.accepted:
         said = f"The reference, {found.reference.name}, differs from the next coarser by {own}."
@@ -196,8 +198,8 @@ def sentences(found: Study) -> list[str]:
     texts = [said]
     if any(m.candidate.model == "flat-body" for m in found.measured):
         texts.append(
-            "flat-body is exact for an endless body; its difference is that of the meshed body's "
-            "sides, which absorb most of a wave but not all."
+            "flat-body is the analytic solution of a laterally infinite body; it differs from the "
+            "meshed body by reflections at the latter's sides."
         )
     for bar in BARS:
         m = found.cheapest(bar)
@@ -211,7 +213,7 @@ def sentences(found: Study) -> list[str]:
 
 
 def figure(found: Study) -> Figure:
-    """Error against seconds of the first answer and of the next, one colour a model."""
+    """Error against seconds, cold and warm, one colour a model."""
     drawing = Figure(figsize=(10, 5.2), layout="constrained")
     panels = drawing.subplots(1, 2, sharey=True)
     front = found.front()
@@ -230,8 +232,8 @@ def figure(found: Study) -> Figure:
         0.01, 100 * found.self_convergence, "finest two runs differ", fontsize=8, va="bottom",
         color="0.4", transform=panels[0].get_yaxis_transform(),
     )  # fmt: skip
-    panels[0].set(xlabel="first answer, s", ylabel="worst probe's error, %")
-    panels[1].set(xlabel="next answer on the same body, s")
+    panels[0].set(xlabel="first response (cold), s", ylabel="worst probe's error, %")
+    panels[1].set(xlabel="next response on the same body (warm), s")
     legend = panels[1].legend(title="area: peak memory")
     for handle in legend.legend_handles:
         if handle is not None:
@@ -244,7 +246,7 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     """A candidate's response, its first and second time, and the peak memory of its process."""
     import os
 
-    os.environ["SKINWAVE_CACHE"] = ""  # cold means cold
+    os.environ["SKINWAVE_CACHE"] = ""  # a cold run
     started = time.perf_counter()
     if candidate.model == "fem":
         knobs = {"tolerance": candidate.tolerance} if candidate.tolerance else {}

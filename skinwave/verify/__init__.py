@@ -1,1 +1,1 @@
-"""Verification: what finite elements and exact waves must reproduce, from outside this project."""
+"""Verification of finite elements and wavenumber integrals against independent references."""

@@ -1,4 +1,4 @@
-"""Air around a sheet: Lamb's disc, an integral in closed form, and the endless sheet."""
+"""Air around a sheet: Lamb's disc, an integral in closed form, and the infinite sheet."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ LAG = 1.2e-3  # s: a wave of 80 Hz that has crossed the sheet and back is down t
 
 
 def gaussian_and_lambs_shape() -> Case:
-    """The energy of the fluid around two shapes that are on a grid."""
+    """Kinetic energy of the fluid around two mode shapes on a grid."""
     sizes = np.array([0.25, 0.125, 0.0625, 0.03125])  # of the Gaussian's standard deviation
     errors = [abs(_energy(np.exp(-(r**2) / 2), s) / (2 * np.pi**2.5) - 1)
               for r, s in (_radius(6.0, s) for s in sizes)]  # fmt: skip
@@ -47,7 +47,7 @@ def gaussian_and_lambs_shape() -> Case:
 
 
 def lambs_disc() -> Case:
-    """A clamped disc of paper's weight between air, cut from a sheet of elements."""
+    """Clamped disc of paper's weight with air on both sides, cut from a meshed sheet."""
     a, thickness, cells = 0.05, 1e-3, 24
     material = fem.from_young(density=PAPER["mass_per_area"] / thickness, young=4e6, poisson=0.3)
     mesh = _quarter(1.1 * a, thickness, 1.1 * a / cells)
@@ -63,10 +63,10 @@ def lambs_disc() -> Case:
     )
     beta = 2 * LAMBS_FACTOR * AIR_DENSITY * a / PAPER["mass_per_area"]
     return Case(
-        title="Clamped disc between air: its lowest mode",
+        title="Clamped disc with air on both sides: its lowest mode",
         source=f"{LAMB}: f / f_vacuum = 1 / sqrt(1 + beta), beta = 0.669 rho_f a / rho_p h on each "
         "side, by an assumed shape of the mode",
-        mesh=described(mesh, "a quarter of a square, of which the disc is free to move"),
+        mesh=described(mesh, "a quarter of a square, fixed outside the disc"),
         checks=(
             relative("frequency in air / in vacuum", air / vacuum, 1 / np.sqrt(1 + beta), 0.01),
         ),
@@ -74,7 +74,7 @@ def lambs_disc() -> Case:
 
 
 def focus_on_a_sheet_in_air() -> Case:
-    """A focus in vibration on a large and lossy sheet, beside the endless one."""
+    """Vibrating focus on a large and lossy sheet against the infinite sheet."""
     half, thickness = 0.2, 1e-3
     young = 12 * PAPER["bending_stiffness"] * (1 - 0.3**2) / thickness**3
     solid = fem.Material(
@@ -100,18 +100,18 @@ def focus_on_a_sheet_in_air() -> Case:
         for f, ours, theirs in zip(hz, found, air, strict=True)
     ]
     return Case(
-        title="Focus on a large and lossy sheet in air: finite elements beside the endless sheet",
-        source=f"2 rho / k of each wavenumber: {JUNGER}; integrated by the exact waves that the "
+        title="Focus on a large and lossy sheet in air: finite elements against the infinite sheet",
+        source=f"2 rho / k of each wavenumber: {JUNGER}; by the wavenumber integral that the "
         "case on flat-body verifies",
-        mesh=described(mesh, "a quarter; edges held at 200 mm; loss factor 0.6 at 80 Hz, so "
-                       "that little returns from them"),
+        mesh=described(mesh, "a quarter; edges clamped at 200 mm; loss factor 0.6 at 80 Hz, so "
+                       "that they reflect little"),
         checks=tuple(checks),
         plot=Plot(
             x="frequency, Hz", y="amplitude at the focus, um at 1 Pa",
             lines={"finite elements": (hz, np.abs(found[:, 0])),
-                   "endless, in air": (hz, np.abs(air[:, 0])),
-                   "endless, in vacuum": (hz, np.abs(vacuum[:, 0]))},
-            drawn=("endless, in air", "endless, in vacuum"),
+                   "infinite, in air": (hz, np.abs(air[:, 0])),
+                   "infinite, in vacuum": (hz, np.abs(vacuum[:, 0]))},
+            drawn=("infinite, in air", "infinite, in vacuum"),
         ),
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""One verification case, what it is decided by, and its place in the suite."""
+"""Verification case, the checks that decide it, and its place in the suite."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is a number within the bar."""
+        """Whether the error is a number within the tolerance."""
         return bool(self.error <= self.bar)
 
 
@@ -40,7 +40,7 @@ class Plot:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """A case with its checks; `source` is outside this project, `said` what a refusal said."""
+    """A case with its checks; `source` is outside this project, `said` the message of a refusal."""
 
     title: str
     source: str
@@ -57,7 +57,7 @@ class Case:
 
     @property
     def worst(self) -> Check:
-        """The check that is nearest to its bar, or farthest beyond."""
+        """The check that is nearest to its tolerance, or farthest beyond."""
         return max(self.checks, key=lambda c: np.inf if not c.passed else c.error / (c.bar or 1))
 
 
@@ -132,5 +132,5 @@ def slope(sizes: ArrayLike, errors: ArrayLike) -> float:
 
 def described(mesh: TetMesh, rest: str = "") -> str:
     """A mesh in words."""
-    text = f"{len(mesh.tets):,} ten-node tetrahedra, {mesh.n_dofs:,} unknowns"
+    text = f"{len(mesh.tets):,} ten-node tetrahedra, {mesh.n_dofs:,} dofs"
     return f"{text}; {rest}" if rest else text

@@ -1,4 +1,4 @@
-"""What an element must do exactly, whatever its shape, and what it must refuse."""
+"""Element tests: patch tests on distorted meshes, and input that must be refused."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -73,7 +73,7 @@ def patch() -> Case:
 
 
 def quadratic_patch() -> Case:
-    """A quadratic field with its body force, which ten nodes hold."""
+    """A quadratic field with its body force, which ten nodes represent exactly."""
     mesh, mu, lam = distorted_cube(), 1.0, 1.5
     x = mesh.points
     field = np.stack([x[:, 0] ** 2 + x[:, 1] * x[:, 2], x[:, 1] ** 2, x[:, 0] * x[:, 2]], axis=1)
@@ -131,7 +131,7 @@ def inverted() -> Case:
 
 
 def incompressible() -> Case:
-    """Poisson's ratio 1/2, which displacements alone cannot answer."""
+    """Poisson's ratio 1/2, beyond a pure displacement formulation."""
     return refused(
         "Expected invalid: Poisson's ratio 0.5 is refused with the limit",
         "Hughes, The Finite Element Method (1987), chapter 4: lambda is infinite",
@@ -166,7 +166,7 @@ def _followed(mesh: TetMesh, poisson: float, bar: float, where: str = "") -> Che
 
 
 def held_outside(mesh: TetMesh, poisson: float, field: Floats, force: Floats) -> Floats:
-    """Displacement (3 n,) where the outside moves as the field says and the inside follows."""
+    """Displacement (3 n,) of the mesh with the field prescribed on its boundary."""
     fixed = np.zeros(mesh.points.shape, bool)
     fixed[np.unique(meshes.boundary_facets(mesh.tets))] = True
     K = fem.assemble(mesh, unit(poisson), fixed=np.zeros(mesh.points.shape, bool)).K

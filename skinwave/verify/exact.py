@@ -1,4 +1,4 @@
-"""Exact waves of endless bodies against closed forms, and finite elements against exact waves."""
+"""Wavenumber integrals against closed forms, and finite elements against wavenumber integrals."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -27,7 +27,7 @@ HANKEL = "Hankel's integral on the real axis: Sneddon, Fourier Transforms (1951)
 
 
 def exact_half_space() -> Case:
-    """A focus at rest and in vibration."""
+    """A half-space under a focus at rest and in vibration."""
     poissons = (0.0, 0.3, 0.49, 0.5)
     rest = [
         abs(point_response(half_space(**FOREARM, poisson=nu), RADII, [0.0], WIDTH)[0])
@@ -41,7 +41,7 @@ def exact_half_space() -> Case:
     found = point_response(half_space(**FOREARM, poisson=0.5), RADII, w, WIDTH)
     exact = np.array([_half_space(hz, RADII) for hz in FREQUENCIES])
     return Case(
-        title="Exact waves (flat-body): a focus on a half-space",
+        title="Wavenumber integral (flat-body): a focus on a half-space",
         source=f"Boussinesq's and Lamb's kernels; {HANKEL}; Gradshteyn and Ryzhik, 6.618.1",
         mesh="none",
         checks=(
@@ -54,14 +54,14 @@ def exact_half_space() -> Case:
 
 
 def exact_sheet() -> Case:
-    """A focus on endless paper, with the air that moves along."""
+    """A focus on an infinite paper sheet, with the added mass of air."""
     w = 2 * np.pi * FREQUENCIES[1:]
     found = point_response(thin_sheet(**PAPER, loss_factor=0.03), RADII, w, WIDTH)
     exact = np.array(
         [references.gaussian_response(_paper(hz), RADII, width=WIDTH) for hz in FREQUENCIES[1:]]
     )
     return Case(
-        title="Exact waves (flat-body): a focus on paper with air",
+        title="Wavenumber integral (flat-body): a focus on paper with air",
         source=f"Cremer, Heckl and Petersson, Structure-Borne Sound (2005); {HANKEL}",
         mesh="none",
         checks=(
@@ -95,7 +95,7 @@ def exact_slab() -> Case:
     quarter = np.sqrt(2 * 25e3 / 1000) / 4 / 0.02
     checks.append(relative("thickness resonance, c_p / 4 H", hz[np.argmax(g)], quarter, 1e-3, "Hz"))
     return Case(
-        title="Exact waves (flat-body): a layer bonded to a rigid base",
+        title="Wavenumber integral (flat-body): a layer bonded to a rigid base",
         source="Vorovich, Aleksandrov and Babeshko (1974); Lamb (1904); quarter-wave resonance: "
         "Kramer, Geotechnical Earthquake Engineering (1996), chapter 7",
         mesh="none",
@@ -128,7 +128,7 @@ def exact_circles() -> Case:
             centre = np.abs(np.array(lines)[:, 1]).max() / np.abs(found).max()
             checks.append(below(f"{where}: centre / path, which is 0", centre, 1e-6))
     return Case(
-        title="Exact waves (flat-body): harmonics of a circling focus",
+        title="Wavenumber integral (flat-body): harmonics of a circling focus",
         source="Graf's addition theorem, Abramowitz and Stegun 9.1.79: J_n(k R) J_n(k r)",
         mesh="none",
         checks=tuple(checks),
@@ -143,10 +143,10 @@ def circling_on_skin(law: Mapping[str, float] = FOREARM, name: str = "skin") -> 
     solid = fem.Material(**law, poisson=0.49)
     load = circling(0.02, 12.0, am=140.0)
     return _beside_exact_waves(
-        f"Circling focus on {name}: finite elements beside exact waves",
+        f"Circling focus on {name}: finite elements against the wavenumber integral",
         "Bonded layer: Ewing, Jardetzky and Press, Elastic Waves in Layered Media (1957), chapter "
         "4; verified by the cases on flat-body",
-        "sides held at 70 mm, where the response is below a hundredth of that at the focus",
+        "sides fixed at 70 mm, where the response is below a hundredth of that at the focus",
         mesh, solid, {"right": "xyz", "back": "xyz", "bottom": "xyz"},
         slab(**law, poisson=0.49, depth=depth), load, 0.02,
     )  # fmt: skip
@@ -165,10 +165,10 @@ def circling_on_paper() -> Case:
     across = meshes.graded_axis(0.25, 0.002, grading)
     mesh = meshes.extrude(across, across, [-thickness, 0])
     return _beside_exact_waves(
-        "Circling focus on a lossy sheet: finite elements beside exact waves",
+        "Circling focus on a lossy sheet: finite elements against the wavenumber integral",
         "Thin plate in vacuum: Cremer, Heckl and Petersson (2005); verified by the cases on "
         "flat-body",
-        "free edges at 250 mm; loss factor 0.7 at 190 Hz, so that nothing returns from them",
+        "free edges at 250 mm; loss factor 0.7 at 190 Hz, so that they reflect nothing",
         mesh, solid, {},
         thin_sheet(**PAPER, viscous_lag=lag, air_density=0.0), circling(0.02, 12.0), 0.02,
     )  # fmt: skip
@@ -212,11 +212,11 @@ def _beside_exact_waves(
     lines = {}
     for p in (2, 4):
         lines[f"fem at {1e3 * probes[p, 0]:g} mm"] = (f[chosen][order], 1e6 * abs(found[order, p]))
-        lines[f"exact at {1e3 * probes[p, 0]:g} mm"] = (
+        lines[f"analytic at {1e3 * probes[p, 0]:g} mm"] = (
             f[chosen][order],
             1e6 * abs(exact[order, p]),
         )
-    drawn = tuple(name for name in lines if name.startswith("exact"))
+    drawn = tuple(name for name in lines if name.startswith("analytic"))
     return Case(
         title=title, source=source, mesh=described(mesh, f"a quarter; {sides}"),
         checks=tuple(checks),
@@ -230,8 +230,8 @@ def _line(
 ) -> Complex:  # fmt: skip
     """One line's complex amplitude (p,) in metre from a quarter of the body.
 
-    Harmonic n of the circling spot is f(r) exp(-i n angle); a probe on the x axis answers its
-    cosine part only, which is even in y and, as n is, even or odd in x.
+    Harmonic n of the circling focal spot is f(r) exp(-i n angle); a probe on the x axis responds
+    to its cosine part only, which is even in y and, as n is, even or odd in x.
     """
     lines = load_lines(load)
     mine = np.flatnonzero(np.abs(lines.frequencies - hz) < 1e-6)

@@ -27,7 +27,7 @@ def _prepared() -> Prepared:
 
 @cache
 def _static(pressure: MovingPressure, ring: int) -> tuple[float, ...]:
-    """Displacement of the probes at rest under the mean of so many spots along the path."""
+    """Displacement of the probes at rest under the mean of so many focal spots along the path."""
     made = build(BODY, H)
     ops = operators(made)
     points = fem.facet_points(made.mesh)[:, :2]
@@ -71,14 +71,14 @@ def focus_speeds() -> Case:
         )
     return Case(
         title="A focus from 0.01 to 100 m/s (Mach 0.002 to 20)",
-        source=LIMITS + ": a slow load acts as at rest, a fast one by its mean",
+        source=LIMITS + ": a slow load is quasi-static, a fast one acts by its mean",
         mesh=_mesh(),
         checks=tuple(checks),
     )
 
 
 def modulation_frequencies() -> Case:
-    """AM at 1 Hz is a sequence of rests; at 1 kHz the steady state is that of one factorisation."""
+    """AM at 1 Hz is quasi-static; at 1 kHz the steady state is that of one harmonic solve."""
     slow = _answered(4.0, am=1.0)
     rest = _static(MovingPressure(tacton=Tacton(), drive="linear"), 1)
     checks = [
@@ -101,7 +101,7 @@ def modulation_frequencies() -> Case:
     checks.append(relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m"))
     return Case(
         title="Amplitude modulation from 1 Hz to 1 kHz",
-        source=LIMITS + ": a slow load acts as at rest, a fast one by its steady state",
+        source=LIMITS + ": a slow load is quasi-static, a fast one is in its steady state",
         mesh=_mesh(),
         checks=tuple(checks),
     )
@@ -117,7 +117,7 @@ def narrow_focus() -> Case:
         exact = load(grid, 0.0).sum() * (fine[1] - fine[0]) ** 2
         places = [np.array([x, x / 2]) for x in (0.0, 0.6e-3, 1.2e-3, 1.8e-3, 2.4e-3)]
         worst = max(abs(_total_force(load, h, place) / exact - 1) for place in places)
-        width = f"spot of {1e3 * spot_width(height):.1f} mm, elements of {1e3 * h:g} mm"
+        width = f"focal spot of {1e3 * spot_width(height):.1f} mm, elements of {1e3 * h:g} mm"
         checks.append(below(f"{width}: force, worst of 5 places", worst, 0.01))
     return Case(
         title="A focus down to a third of the size of an element keeps its force",
@@ -126,12 +126,12 @@ def narrow_focus() -> Case:
         mesh="10-node tetrahedra, 60 x 60 x 15 mm",
         checks=tuple(checks),
         note="The displacement under such a focus is another matter: the plan warns of elements "
-        "wider than twice the standard deviation of the spot.",
+        "wider than twice the standard deviation of the focal spot.",
     )
 
 
 def _total_force(load: MovingPressure, h: float, place: Floats) -> float:
-    """What pushes down, in N, with the focus at a place (2,) of a body that ends at its rim."""
+    """Downward force in N with the focus at a place (2,) of a body that ends at its rim."""
     mesh = build(replace(BODY, sides="free"), h).mesh
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
     pressure = load.spot(points, place) * float(load.gain(np.zeros(1))[0])
@@ -196,4 +196,4 @@ def sampling() -> Case:
 
 
 def _mesh() -> str:
-    return f"{_prepared().effort.dofs:,} unknowns, skin, 60 x 60 x 15 mm, elements of 5 mm"
+    return f"{_prepared().effort.dofs:,} dofs, skin, 60 x 60 x 15 mm, elements of 5 mm"

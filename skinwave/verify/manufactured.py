@@ -1,4 +1,4 @@
-"""Manufactured solutions: how fast ten-node tetrahedra converge, up to nu = 0.4999."""
+"""Manufactured solutions: convergence orders of ten-node tetrahedra up to nu = 0.4999."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

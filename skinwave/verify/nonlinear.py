@@ -27,7 +27,7 @@ AM = 140.0  # Hz
 
 
 def elastica() -> Case:
-    """A thin strip bent by a force at its tip that keeps its direction."""
+    """A thin strip bent by a dead load at its tip."""
     length, width, thickness = 1.0, 0.05, 0.02
     material = fem.from_young(density=1, young=1e9, poisson=0.0)
     mesh = meshes.extrude(np.linspace(0, length, 21), [0, width], [-thickness, 0])
@@ -213,8 +213,8 @@ def free_energy() -> Case:
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
     return Case(
         title="Free oscillation of a sheet from three thicknesses, 2000 steps",
-        source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration keeps "
-        "the energy of a linear body; of a nonlinear one to second order in the step",
+        source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration "
+        "conserves the energy of a linear body; of a nonlinear one to second order in the step",
         mesh=described(mesh, f"4 by 4 by 1 cells, no loss; steps of {1e3 * dt:g} ms"),
         checks=(
             relative("released from, w / h", (S @ u)[0] / PAPER.depth, 3.0, 0.05),
@@ -257,7 +257,7 @@ def too_much() -> Case:
 
 
 def reduced_against_full() -> Case:
-    """The bending modes against all unknowns on the same mesh, through 0.06 s of a Tacton."""
+    """The bending modes against all dofs on the same mesh, through 0.06 s of a Tacton."""
     scene, h = _scene(PAPER, 1.0, 0.06), 0.1 / 12
     modes, full = (compute(scene, m, h=h) for m in ("fem-nonlinear", "fem-nonlinear-transient"))
     swing = full.displacement - full.displacement.mean(axis=0)
@@ -268,15 +268,15 @@ def reduced_against_full() -> Case:
     ]
     shown = 1e6 * full.displacement[:, 0], 1e6 * modes.displacement[:, 0]
     return Case(
-        title="A sheet in its bending modes against all of its unknowns",
+        title="A sheet in its bending modes against all of its dofs",
         source="the same equations without reduction; Hollkamp and Gordon, J Sound Vib 318:1139 "
         "(2008): implicit condensation",
-        mesh=f"12 by 12 by 1 cells, {full.effort.dofs:,} unknowns, {modes.effort.reduced_dofs} "
+        mesh=f"12 by 12 by 1 cells, {full.effort.dofs:,} dofs, {modes.effort.reduced_dofs} "
         f"modes; {full.effort.steps} steps",
         checks=tuple(checks),
         plot=Plot(
-            x="time, ms", y="displacement of the centre, um", drawn=("all unknowns",),
-            lines={"all unknowns": (1e3 * full.times, shown[0]), "modes":
+            x="time, ms", y="displacement of the centre, um", drawn=("all dofs",),
+            lines={"all dofs": (1e3 * full.times, shown[0]), "modes":
                    (1e3 * modes.times[::10], shown[1][::10])},
         ),
     )  # fmt: skip

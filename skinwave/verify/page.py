@@ -14,16 +14,18 @@ from skinwave.effort import versions
 from skinwave.pictures.figures import SPARE, png
 from skinwave.verify.case import Check, Entry, Plot, Result
 
-HEADER = ("value", "reference", "error", "bar")
+HEADER = ("value", "reference", "error", "tolerance")
 COLOURS = ("#0072B2", "#D55E00", *SPARE, "#000000")
 SCOPE = (
-    "Verification asks whether the equations are solved right: every reference is a closed form, a "
-    "series or an integral from the literature, computed without this program's solvers; only the "
-    "two cases that put finite elements beside exact waves take those from the program, where the "
-    "cases on flat-body check them. Whether these are the right equations for a hand is another "
-    "question, which only measurements answer. Errors are relative unless they are called "
-    "absolute. A case passes if each of its errors is within its bar; the summary shows the one "
-    "nearest to its bar."
+    "Verification asks whether the equations are solved right. Most references are closed forms, "
+    "series or integrals from the literature, computed without this program's solvers. Other cases "
+    "compare two of its models (finite elements with wavenumber integrals, an absorbing layer with "
+    "a wider slab, a sheet in modes with all of its dofs, a nonlinear with a linear sheet), or one "
+    "model with its own limits or in other units; the cases on flat-body check the wavenumber "
+    "integrals. Whether these are the right equations for a hand is another question, which only "
+    "measurements on hands can decide. Errors are relative unless they are called absolute. A case "
+    "passes if each of its errors is within its tolerance; the summary shows the one nearest to "
+    "its tolerance."
 )
 
 
@@ -53,10 +55,10 @@ def page(results: list[Result], planned: Sequence[Entry], left_out: int) -> str:
 def summary_table(results: list[Result]) -> str:
     """A line per case, and how many passed."""
     width = max(len(r.case.title) for r in results)
-    rows = [f"{'case':<{width}}  {'value':>10}  {'reference':>10}  {'error':>8}  {'bar':>8}"]
+    rows = [f"{'case':<{width}}  {'value':>10}  {'reference':>10}  {'error':>8}  {'tolerance':>9}"]
     for r in results:
         c = r.case.worst
-        numbers = f"{c.value:>10.4g}  {c.reference:>10.4g}  {c.error:>8.1e}  {c.bar:>8.1e}"
+        numbers = f"{c.value:>10.4g}  {c.reference:>10.4g}  {c.error:>8.1e}  {c.bar:>9.1e}"
         rows.append(f"{r.case.title:<{width}}  {numbers}  {_word(r.case.passed)}")
     failed = sum(not r.case.passed for r in results)
     return "\n".join([*rows, f"{len(results) - failed} passed, {failed} failed"])
@@ -77,7 +79,7 @@ def _summary(results: list[Result]) -> str:
         ]
         for r in results
     ]
-    return document.table(["case, and its check nearest to the bar", *HEADER, "", "s"], rows)
+    return document.table(["case, and its check nearest to the tolerance", *HEADER, "", "s"], rows)
 
 
 def _shown(result: Result) -> str:
@@ -138,7 +140,7 @@ def _quantity(check: Check) -> str:
 
 
 def _numbers(check: Check) -> list[str]:
-    """Value, reference, error and bar; a question of yes or no has no bar."""
+    """Value, reference, error and tolerance; a yes-or-no check has no tolerance."""
     if check.bar == 0 and check.reference == 1:
         return ["yes" if check.passed else "no", "yes", "", ""]
     error = f"{check.error:.2g}" if math.isfinite(check.error) else "not a number"

@@ -24,7 +24,7 @@ NAVIER = f"Rayleigh-Lamb roots at k = pi hypot(m / a, n / b): {ACHENBACH}"
 
 
 def clamped_sheet() -> Case:
-    """A quarter of a thin square with all edges held."""
+    """A quarter of a thin square with all edges clamped."""
     a, thickness = 0.1, 1e-3
     material = fem.from_young(density=80, young=4e6, poisson=0.3)
     half = np.linspace(0, a / 2, 23)

@@ -204,7 +204,7 @@ def circling_force_on_plate(
 def layered_column(
     w: Floats, lengths: list[float], densities: list[float], moduli: list[Complex]
 ) -> Complex:
-    """Top displacement per top stress of a column of layers, from the base, which is held.
+    """Top displacement per top stress of a column of layers, from the fixed base.
 
     Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7: tan(k L) / (k M) of
     one layer, joined by the addition theorem of the tangent; M complex with loss.

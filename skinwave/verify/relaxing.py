@@ -19,11 +19,11 @@ ZENER = "standard linear solid: Zener, Elasticity and Anelasticity of Metals (19
 SKIN = {
     "density": 1000.0, "shear_modulus": 7.86e3, "relaxing_modulus": 10e3, "relaxation_time": 1e-3,
 }  # fmt: skip
-MODULUS, TIME = 0.8, 0.7  # of the oscillator's spring that relaxes, and its relaxation
+MODULUS, TIME = 0.8, 0.7  # of the oscillator's Maxwell branch: stiffness and relaxation time
 
 
 def column_that_relaxes() -> Case:
-    """Steady motion of a column: from relaxed at once to never."""
+    """Steady motion of a column, from very short to very long relaxation times."""
     length, mu, relaxing = 0.05, 25e3, 10e3
     hz = np.array([20.0, 60.0, 120.0, 200.0])
     mesh, w = layered_column_mesh([length], 24), 2 * np.pi * hz
@@ -39,7 +39,7 @@ def column_that_relaxes() -> Case:
         exact = references.layered_column(w, [length], [1000.0], [modulus])
         checks.append(largest(f"relaxation time {time:g} s", 1e6 * found, 1e6 * exact, 0.005, "um"))
     return Case(
-        title="Column that relaxes, held at its base and pushed at its top, 20 to 200 Hz",
+        title="Standard linear solid: column fixed at its base and pushed at its top, 20 to 200 Hz",
         source=f"Meirovitch (1997), chapter 7: tan(k L) / (k E), complex E (nu = 0) of the {ZENER}",
         mesh="24 cells high, one across",
         checks=tuple(checks),
@@ -48,7 +48,7 @@ def column_that_relaxes() -> Case:
 
 
 def oscillator_that_relaxes() -> Case:
-    """Time stepping with a spring that relaxes: its order, and its energy."""
+    """Time stepping with a Maxwell branch: its order, and its energy balance."""
     steps = [200, 400, 800, 1600]
     sizes, checks = 1 / np.array(steps), list[Check]()
     for radius in (0.0, 0.8, 1.0):
@@ -57,19 +57,19 @@ def oscillator_that_relaxes() -> Case:
         name = f"error after 2 s, smallest step, spectral radius {radius:g}"
         checks.append(below(name, errors[-1], 1e-5))
     for dt in (0.01, 30.0):
-        name = f"energy that is missing after 300 steps of {dt:g} s, of all that went round"
+        name = f"relative energy imbalance after 300 steps of {dt:g} s"
         checks.append(below(name, _imbalance(dt), 1e-10))
     return Case(
-        title="A spring that relaxes, step by step",
+        title="Time stepping of an oscillator with a Maxwell branch",
         source="partial fractions of the transform: Flugge, Viscoelasticity (1975), chapter 3; "
         "order: Chung and Hulbert (1993)",
-        mesh="one unknown of unit mass and stiffness",
+        mesh="one degree of freedom of unit mass and stiffness",
         checks=tuple(checks),
     )
 
 
 def half_space_that_relaxes() -> Case:
-    """Exact waves of a half-space, a focus in vibration."""
+    """Wavenumber integral of a half-space under a vibrating focus."""
     hz = np.array([20.0, 80.0, 140.0, 210.0])
     w = 2 * np.pi * hz
     found = point_response(half_space(**SKIN, poisson=0.5), RADII, w, WIDTH)
@@ -83,7 +83,7 @@ def half_space_that_relaxes() -> Case:
         for a, mu in zip(w, moduli, strict=True)
     ]  # fmt: skip
     return Case(
-        title="Exact waves (flat-body): a focus on a half-space that relaxes",
+        title="Wavenumber integral (flat-body): a focus on a half-space of standard linear solid",
         source=f"Lamb's kernel with the complex modulus of the {ZENER}; Hankel's integral on the "
         "real axis",
         mesh="none",
@@ -94,7 +94,7 @@ def half_space_that_relaxes() -> Case:
 
 def circling_on_skin_that_relaxes() -> Case:
     """AM and circling focus on a bonded layer."""
-    return circling_on_skin(SKIN, "skin that relaxes")
+    return circling_on_skin(SKIN, "skin as a standard linear solid")
 
 
 def _springs() -> fem.Operators:

@@ -1,4 +1,4 @@
-"""What the sides of a body that stands for an endless one send back."""
+"""Reflections from the absorbing sides of a body that stands for a laterally infinite one."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ H, SLAB = 2.5e-3, Body(width=0.05, height=0.05)
 
 
 def layer_around_a_slab() -> Case:
-    """A plane slab on a rigid base, whose waves are longest at its cut-on of 83 Hz."""
+    """Absorbing layer around a plane slab on a rigid base, whose first mode cuts on at 83 Hz."""
     endless = _motion(replace(SLAB, width=1.6), layer=True)
     found = {name: _motion(SLAB, layer=name == "layer") for name in ("layer", "dashpots alone")}
     errors = {
@@ -25,8 +25,8 @@ def layer_around_a_slab() -> Case:
         for name, u in found.items()
     }
     return Case(
-        title="A layer around a slab takes its waves away",
-        source="a body so wide that nothing comes back; dashpots: Lysmer and Kuhlemeyer (1969)",
+        title="An absorbing layer around a slab suppresses reflections",
+        source="a body so wide that no reflections arrive; dashpots: Lysmer and Kuhlemeyer (1969)",
         mesh="plane slab 50 mm wide and 15 mm deep, cells of 2.5 mm, the layer 105 mm wide",
         checks=(
             below("largest error at any line, over the motion at the focus",
@@ -35,7 +35,7 @@ def layer_around_a_slab() -> Case:
         ),
         plot=Plot(x="frequency, Hz", y="error over the motion at the focus", log=True,
                   lines={name: (HERTZ, error) for name, error in errors.items()}),
-        note=f"With dashpots alone up to {100 * errors['dashpots alone'].max():.0f} % come back.",
+        note=f"With dashpots alone the error reaches {100 * errors['dashpots alone'].max():.0f} %.",
     )  # fmt: skip
 
 

@@ -126,7 +126,7 @@ def focus_at_rest_on_a_layer() -> Case:
     return Case(
         title="Gaussian focus on a bonded layer of 15 mm, Poisson's ratio 0 to 0.49999",
         source="Vorovich, Aleksandrov and Babeshko (1974): kernel of a bonded layer",
-        mesh=described(mesh, "a quarter; 3 mm, sides held at 100 mm"),
+        mesh=described(mesh, "a quarter; 3 mm, sides fixed at 100 mm"),
         checks=tuple(checks),
         plot=Plot(
             x="1 / (1 - 2 nu)",
@@ -138,7 +138,7 @@ def focus_at_rest_on_a_layer() -> Case:
 
 
 def column_of_two_layers() -> Case:
-    """A layer a million times softer than the one that carries it, at rest and in motion."""
+    """A layer a million times softer than the one below it, at rest and in motion."""
     lengths, mus, rho, lag = [0.01, 0.02], [1e9, 1e3], 1000.0, 1e-4
     mesh = layered_column_mesh(lengths, 20)
     solids = {
@@ -200,7 +200,7 @@ def _curve(poisson: float) -> tuple[Floats, Floats]:
 
 
 def _pressure_errors(mesh: TetMesh, u: Floats, material: fem.Material) -> tuple[float, float]:
-    """Element means of pressure near the focus: error in L2, and of it what cells average out."""
+    """Element means of pressure near the focus: error in L2, and its share within cells."""
     corners = mesh.points[mesh.tets[:, :4]]
     middle = corners.mean(axis=1)
     near = np.flatnonzero(np.linalg.norm(middle, axis=1) < 0.012)
@@ -222,7 +222,7 @@ def _pressure_errors(mesh: TetMesh, u: Floats, material: fem.Material) -> tuple[
 def _element_pressures(
     mesh: TetMesh, u: Floats, material: fem.Material, chosen: Ints
 ) -> tuple[Floats, Floats]:
-    """Mean pressures of elements, most of it from the projected dilatation, and their volumes."""
+    """Mean pressures of elements, most of it from the projected divergence, and their volumes."""
     corners = mesh.points[mesh.tets[:, :4]]
     edges = corners[:, 1:] - corners[:, :1]
     # The gradient of a quadratic field is linear: its mean is its value in the middle.
@@ -240,7 +240,7 @@ def _element_pressures(
 
 
 def _cells(mesh: TetMesh, chosen: Ints) -> Ints:
-    """Which grid cell each tetrahedron lies in, numbered from 0."""
+    """Number, from 0, of the grid cell that each tetrahedron lies in."""
     corners = mesh.points[mesh.tets[chosen, :4]]
     _, cell = np.unique(corners.min(axis=1).round(9), axis=0, return_inverse=True)
     return cell.ravel()

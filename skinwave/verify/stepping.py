@@ -19,7 +19,7 @@ SKIN = {"density": 1000.0, "shear_modulus": 25e3, "poisson": 0.4999}
 
 
 def oscillator(damping: float = 0.0) -> fem.Operators:
-    """One unknown of unit mass and stiffness."""
+    """One degree of freedom of unit mass and stiffness."""
     K, C, M, R = (sparse.csr_array([[value]]) for value in (1.0, damping, 1.0, 0.0))
     return fem.Operators(K=K, C=C, M=M, R=R, free=np.array([0]), n_dofs=1)
 
@@ -39,7 +39,7 @@ def order_in_time() -> Case:
         title="Time stepping has order two",
         source="driven oscillator: Meirovitch (1997), sections 3.1 and 3.2; order: Chung and "
         "Hulbert (1993)",
-        mesh="one unknown; 100, 200, 400 and 800 steps",
+        mesh="one degree of freedom; 100, 200, 400 and 800 steps",
         checks=tuple(checks),
         plot=Plot(x="1 / steps", y="error", log=True, drawn=("slope 2",), lines=lines),
     )
@@ -71,13 +71,13 @@ def numerical_damping() -> Case:
     return Case(
         title="Numerical damping and period error of generalized-alpha",
         source=CHUNG,
-        mesh="one unknown, one step from each unit state",
+        mesh="one degree of freedom, one step from each unit state",
         checks=tuple(checks),
     )
 
 
 def energy_kept() -> Case:
-    """Average acceleration keeps the energy of free vibration."""
+    """Average acceleration conserves the energy of free vibration."""
     mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
     ops = fem.assemble(mesh, fem.Material(**SKIN))
     _, shapes = fem.modes(ops, 3)
@@ -87,7 +87,7 @@ def energy_kept() -> Case:
     states = islice(fem.transient(ops, lambda t: zero, 1e-4, initial=start), 10_001)
     energies = np.array([_energy(ops, state) for state in states])
     return Case(
-        title="Free vibration keeps its energy, 10,000 steps",
+        title="Free vibration conserves energy, 10,000 steps",
         source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration",
         mesh="block of 2 by 2 by 1 cells, nu = 0.4999",
         checks=(below("largest relative drift", np.abs(energies / energies[0] - 1).max(), 1e-10),),
@@ -143,7 +143,7 @@ def columns() -> Case:
                     1e6 * found, 1e6 * exact, 0.005, "um")
         )  # fmt: skip
     return Case(
-        title="Kelvin-Voigt column, held at its base and pushed at its top, 20 to 120 Hz",
+        title="Kelvin-Voigt column, fixed at its base and pushed at its top, 20 to 120 Hz",
         source="Meirovitch (1997), chapter 7: tan(k L) / (k E), complex E (nu = 0)",
         mesh="24 cells high, one across; 0.6 to 12 elements a wavelength and more",
         checks=tuple(checks),
@@ -165,12 +165,12 @@ def units() -> Case:
         source="Dimensional analysis: Buckingham, Phys Rev 4:345 (1914)",
         mesh="block of 4 by 4 by 2 cells, dashpots at its sides",
         checks=tuple(checks),
-        note="Static, steady, transient and natural-frequency answers, made dimensionless.",
+        note="Static, steady and transient responses and natural frequencies, made dimensionless.",
     )
 
 
 def _answers(length: float, time: float, mass: float) -> Floats:
-    """Dimensionless answers of one body, given in units that are these times smaller."""
+    """Dimensionless responses of one body, given in units that are these times smaller."""
     pascal = mass / length / time**2
     mesh = meshes.block((0.02 * length, 0.02 * length, 0.01 * length), 0.005 * length)
     solid = fem.Material(

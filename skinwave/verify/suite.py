@@ -1,4 +1,4 @@
-"""The suite: which cases there are, and running them."""
+"""The suite of verification cases, and running it."""
 
 import json
 import math
@@ -50,7 +50,7 @@ def _elements() -> Iterable[Entry]:
     for name, field, cells, nus, ceilings in (
         ("divergence-free", free, (6, 10, 14), (0.49, 0.4999), ((5e-4, 1e-2),) * 2),
         ("balanced", fields.balanced, (6, 10, 14), (0.4999,), ((5e-4, 1e-2),)),
-        # Its pressure is lam times its dilatation, and errors are as much larger.
+        # Its pressure is lam times its divergence, and errors are as much larger.
         ("dilating", fields.dilating, (8, 12, 16), (0.3, 0.49, 0.4999),
          ((5e-4, 1e-2), (2e-3, 0.03), (0.2, 3.0))),
     ):  # fmt: skip
@@ -104,7 +104,7 @@ def _waves() -> Iterable[Entry]:
 
 
 def _exact() -> Iterable[Entry]:
-    topic = "Exact waves"
+    topic = "Wavenumber integrals"
     yield Entry(name="exact-half-space", topic=topic, run=exact.exact_half_space)
     yield Entry(name="exact-sheet", topic=topic, run=exact.exact_sheet)
     yield Entry(name="exact-slab", topic=topic, run=exact.exact_slab)
@@ -182,7 +182,7 @@ def run_suite(
 
 
 def _guarded(entry: Entry) -> Case:
-    """The case; one that breaks off is one that failed."""
+    """The case; one that raises an error is one that failed."""
     try:
         return entry.run()
     except (ValueError, ArithmeticError, MemoryError) as error:

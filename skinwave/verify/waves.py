@@ -1,4 +1,4 @@
-"""Waves: half-space, surface, plate; and the boundary that lets them out."""
+"""Waves: half-space, surface, plate; and the absorbing (viscous) boundary."""
 
 from itertools import islice
 
@@ -32,7 +32,7 @@ def steady_focus(frequency: float, poisson: float) -> Case:
     return Case(
         title=f"Gaussian focus of {frequency:g} Hz on a viscous half-space, nu = {poisson:g}",
         source="Lamb, Phil Trans R Soc A 203:1 (1904); Hankel's integral on the real axis",
-        mesh=described(mesh, "a quarter; 2.5 mm to 20 mm from the focus, sides held at 100 mm"),
+        mesh=described(mesh, "a quarter; 2.5 mm to 20 mm from the focus, sides fixed at 100 mm"),
         checks=(
             relative("amplitude at the focus, 1 Pa", 1e6 * abs(found[0]), 1e6 * abs(reference[0]),
                      0.02, "um"),
@@ -82,7 +82,7 @@ def lamb() -> Case:
             x="c_s t / r, r = 1", y="mu u r / F", drawn=("closed form",),
             lines={"finite elements": (t[::4], found[::4, 0]), "closed form": (t, exact[:, 0])},
         ),
-        note="The outside at r = 3 has dashpots, the base at depth 3 is held.",
+        note="The outside at r = 3 has dashpots, the base at depth 3 is fixed.",
     )  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def absorbed_pulse() -> Case:
     momentum = 1e-6 * 0.001 * np.sqrt(np.pi)
     return Case(
         title="A shear pulse leaves through a viscous boundary",
-        source=f"{LYSMER}: nothing returns at normal incidence",
+        source=f"{LYSMER}: no reflection at normal incidence",
         mesh=described(mesh, "50 cells high"),
         checks=(
             below("later motion of the top / displacement", np.ptp(moved) / moved.mean(), 1e-3),
@@ -215,7 +215,7 @@ def oblique_in_plane() -> Case:
         source=f"{LYSMER}, from the boundary condition",
         mesh="strip of half a trace wavelength, 10 elements a shear wavelength, 3 long",
         checks=tuple(checks),
-        note="Displacement amplitudes; complex differences are judged.",
+        note="Displacement amplitudes; errors are those of complex amplitudes.",
     )
 
 
