@@ -168,7 +168,8 @@ def test_round_off_of_a_thin_strip_is_no_lack_of_convergence():
 def test_a_body_that_has_not_come_to_rest_is_refused(iterations, monkeypatch):
     monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", iterations)
     body, share, stiffness = thin_strip(4)
-    with pytest.raises(fem.Diverged, match="no equilibrium was found at 1.56 % of the load: a residual"):
+    said = "no equilibrium was found at 1.56 % of the load: a residual"
+    with pytest.raises(fem.Diverged, match=said):
         nonlinear.static(body, 100 * stiffness * share.ravel())
 
 
