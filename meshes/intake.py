@@ -1,4 +1,4 @@
-"""From any file to a body under the device."""
+"""Import of a body from a surface or mesh file, placed under the device."""
 
 import os
 from collections.abc import Callable, Sequence

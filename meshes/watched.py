@@ -38,7 +38,7 @@ def _end_with_parent() -> None:
 
 
 def _limit_memory(most: int) -> None:
-    """Of data, not of addresses: VTK maps more than a gigabyte that it never touches."""
+    """Limit data, not address space: VTK maps more than a gigabyte that it never touches."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
