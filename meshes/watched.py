@@ -29,7 +29,7 @@ def _end_with_input() -> None:
 
 
 def _end_with_parent() -> None:
-    """The same by the kernel of Linux, also while compiled code lets no other thread run."""
+    """End with the parent by Linux's kernel, also while compiled code blocks all other threads."""
     if sys.platform == "linux":
         import ctypes
 

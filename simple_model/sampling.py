@@ -1,8 +1,8 @@
 """Sampling of a load without aliasing: nothing of it may fold back to low frequencies.
 
-Samples dt apart show a line at f > 1/(2 dt) at |f - k/dt| instead. A Gaussian spot of standard
-deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2), and so a focus that
-moves further than about s/2 in a sample leaves lines above half the sampling rate.
+Samples dt apart show a line at f > 1/(2 dt) at |f - k/dt| instead. A Gaussian focal spot of
+standard deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2), and so a
+focus that moves further than about s/2 in a sample makes lines above half the sampling rate.
 """
 
 from collections.abc import Callable
