@@ -6,7 +6,7 @@ Those y_p(s) are approximated by Galerkin projection onto the second-order Krylo
 probe vectors about one real expansion point, which costs one real factorisation. The space is built
 by the two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195,
 2016): with proportional damping the plain recurrence loses all accuracy after a few dozen moments.
-The internal variables of Maxwell branches, y / (1 + s tau_j), are further parts of the linearised
+The dashpot stretches of Maxwell branches, y / (1 + s tau_j), are further parts of the linearised
 vectors: their moments lie in the same space, so that the moments matched are those of the exact
 constitutive law.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
@@ -171,7 +171,7 @@ def _moments(
     branches = operators.branches
     lags = [branch.time / (1 + shift * branch.time) for branch in branches]
     scale = shift or SHIFT
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, internal variables):
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
     # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
     taken = np.zeros((2 + len(lags), 0, 0))
     upper = space.extend(factor.solve(seeds))
