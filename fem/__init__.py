@@ -1,8 +1,8 @@
-"""Elastodynamics on tetrahedra: what answers.
+"""Finite-element elastodynamics on tetrahedra.
 
     M u'' + C u' + K u = P q(t),  probes = S u
 
-(`relaxation` has what a standard linear solid adds to K.)
+(`relaxation` has what generalised Maxwell branches add to K.)
 
 Operators are built once, factorised once, and then only solved with. Index letters of every
 einsum in this package: e element, q quadrature point, a b element nodes, i j components,

@@ -1,23 +1,23 @@
-"""The fluid that a flat sheet moves with it: a mass of every place upon every other.
+"""Dense added-mass operator of the fluid that a flat sheet in a baffle moves with it.
 
-Bending waves that are slow beside sound leave the fluid no time to be compressed; it flows from
-where the sheet pushes to where it gives way. In a baffle the acceleration w'' of the sheet meets,
-on both sides together, Rayleigh's integral without its delay, which is the added mass 2 rho / k of
-each wavenumber k told in space (Junger and Feit, Sound, Structures, and Their Interaction (1986),
+To bending waves much slower than sound the fluid is incompressible; it flows from where the sheet
+pushes to where the sheet recedes. In a baffle the acceleration w'' of the sheet meets, on both
+sides together, Rayleigh's integral without its delay, which is the added mass 2 rho / k of each
+wavenumber k written in space (Junger and Feit, Sound, Structures, and Their Interaction (1986),
 sections 4.6 and 5.11):
 
     p(x) = rho/pi int w''(y) / |x - y| dA,   M_ab = rho/pi iint N_a(x) N_b(y) / |x - y| dA dA
 
 M is dense, symmetric and positive, and never formed: on a regular grid of nodes it is a convolution
 with int 1/r dA over a cell at each distance, a closed form that is finite within the cell, by an
-FFT padded with zeros. Nodes s apart make it wrong by -(k s)^2 / 24.
+FFT padded with zeros. With nodes s apart its relative error is -(k s)^2 / 24.
 
-Left out are the fluid that flows around an edge without a baffle, and sound. Sound that is long
-beside the sheet would take as much energy as a loss factor of
+Left out are the flow around an edge without a baffle, and radiation of sound. At wavelengths of
+sound long beside the sheet, radiation would take as much energy as a loss factor of
 
     (rho w / pi c) (int u dA)^2 / int m u^2 dA
 
-of a mode u in which the sheet pushes more to one side than to the other: 0.006 to 0.007 for such
+of a mode u with a net volume displacement: 0.006 to 0.007 for such
 modes of a clamped sheet of office paper, 100 mm wide, below 300 Hz, where paper's own is 0.03.
 """
 
@@ -38,10 +38,10 @@ UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Added:
-    """What moves with a body: `M` (n_free, n_free) in kg, and `rate` in 1/s of the force rate M u'.
+    """Added mass `M` (n_free, n_free) of a fluid in kg, and `rate` in 1/s of the damping rate M u'.
 
-    Rayleigh damping stands for a loss factor at the frequencies of a body of a certain mass; with
-    more of it, what goes with mass must grow as well, or the loss factor would sink.
+    Rayleigh damping is fitted to a loss factor for the mass of the body alone; with added mass its
+    mass-proportional part must grow as well, or the loss factor would fall.
     """
 
     M: LinearOperator
@@ -58,7 +58,7 @@ def added_mass(
     facets: str | Ints = "top",
     rate: float = 0.0,
 ) -> Added:
-    """The fluid on both sides of a sheet in a baffle, without loss of its own.
+    """Added mass of the fluid on both sides of a sheet in a baffle, without loss of its own.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
 
 
 def _equal_steps(x: Floats) -> tuple[Ints, float]:
-    """Which of equally spaced lines (n,) each coordinate (n,) lies on, and their spacing."""
+    """Index (n,) of the equally spaced line that each coordinate (n,) is on, and the spacing."""
     apart = np.diff(np.sort(x))
     step = apart[apart > UNEVEN * np.ptp(x)].min()
     index = np.rint((x - x.min()) / step).astype(np.int64)

@@ -1,17 +1,18 @@
-"""Stiffness, damping and mass of a body.
+"""Assembly of the stiffness, damping and mass matrices of a body.
 
     K_ab,ij = int lam N_a,i N_b,j + mu (N_a,j N_b,i + delta_ij N_a,k N_b,k) dV
     M_ab,ij = delta_ij int rho N_a N_b dV
     C       = (viscosity/mu) K + Rayleigh damping for the loss factor
-              + R, what takes waves out of the body:
+              + R, the damping of the absorbing boundaries and layers:
     R       = int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
                 (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
-              + int drag rho N_a N_b dV in a layer before them
+              + int drag rho N_a N_b dV in an absorbing (sponge) layer before them
     K      += int k delta_ij N_a N_b dA where a surface rests on springs of k per area
-    K_j     = (relaxing modulus/mu) K of the elements that relax in the same time, see `relaxation`
+    K_j     = (relaxing modulus/mu) K of the elements of one relaxation time: the stiffness of a
+              generalised Maxwell branch, see `relaxation`
 
 Where nu > 0.45 most of lam acts on a projection of the dilatation, see `dilatation`; without that
-displacements some wavelengths away come out several per cent too small.
+volumetric locking makes displacements some wavelengths away several per cent too small.
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,8 +32,8 @@ from fem.relaxation import Branch, on_free
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
-LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra need no remedy up to it
-DIRECT = 2.0  # lam / mu that acts directly beyond it; a slab erred least with 1 to 3
+LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra do not lock up to it
+DIRECT = 2.0  # lam / mu of the unprojected part beyond it; a slab's error was least with 1 to 3
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
 
@@ -40,9 +41,10 @@ LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 class Operators:
     """M u'' + C u' + K u = f on the free degrees of freedom.
 
-    `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C that takes waves out
-    of the body; `free` (n_free,) numbers their rows among the 3 n displacement components of the
-    mesh, component fastest. `branches` pull beside K, which is the stiffness after they relaxed.
+    `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C in absorbing boundaries
+    and layers; `free` (n_free,) numbers their rows among the 3 n displacement components of the
+    mesh, component fastest. `branches` are generalised Maxwell branches in parallel with K, the
+    equilibrium (fully relaxed) stiffness.
     """
 
     K: sparse.csr_array
@@ -54,7 +56,7 @@ class Operators:
     branches: tuple[Branch, ...] = ()
 
     def expand(self, values: Floats) -> Floats:
-        """Values (n_free, ...) as (n_dofs, ...), 0 where the body is fixed."""
+        """Values (n_free, ...) on all dofs (n_dofs, ...), 0 where the body is fixed."""
         full = np.zeros((self.n_dofs, *values.shape[1:]), values.dtype)
         full[self.free] = values
         return full
@@ -69,7 +71,7 @@ def assemble(
     drag: Floats | None = None,
     support: Support | None = None,
 ) -> Operators:
-    """Operators of a body.
+    """Assemble the operators of a body.
 
     Parameters
     ----------
@@ -77,9 +79,9 @@ def assemble(
     material : one Material, or region number -> Material
     fixed : the name of a facet set that does not move; or facet set -> the components that do
         not, such as {"bottom": "xyz", "left": "x"}; or an (n, 3) bool array, True where fixed.
-    absorbing : facets that let waves out, by the name of their set or as nodes, or None.
-    drag : (m,) float, 1/s, force per momentum in each element that damps waves on their way out
-    support : springs and dashpots of a surface whose share in them is a function of place, or None
+    absorbing : absorbing facets (dashpots), by the name of their set or as nodes, or None.
+    drag : (m,) float, 1/s, mass-proportional damping of each element in an absorbing layer
+    support : springs and dashpots of a surface as functions of position, or None
 
     Raises
     ------
@@ -120,7 +122,7 @@ def _of(materials: list[Material], name: str) -> Floats:
 def _volume_operators(
     mesh: TetMesh, pattern: Pattern, materials: list[Material], region: Ints
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
-    """K, C, M and what relaxes in each time, on all degrees of freedom."""
+    """K, C, M and a generalised Maxwell branch of each relaxation time, on all dofs."""
     rho, mu, lam = (_of(materials, name) for name in ("density", "shear_modulus", "first_lame"))
     mass_rate, hysteretic_lag = np.array(
         [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
@@ -130,7 +132,7 @@ def _volume_operators(
     projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
 
     def stiffness(share: Floats) -> sparse.csr_array:
-        """K of a share (r,) of each material's."""
+        """K with a share (r,) of each material's moduli."""
         blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
         summed = from_components(pattern, pattern.sum(blocks, 6))
         return sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
@@ -159,7 +161,7 @@ def _volume_operators(
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:
-    """What of lam (r,) acts on the dilatation itself, in Pa; the rest does on its projection."""
+    """Unprojected part (r,) of lam in Pa; the rest acts on the projection of the dilatation."""
     return np.where(lam > LOCKING_FREE * mu, DIRECT * mu, lam)
 
 
@@ -169,8 +171,8 @@ def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
 
 
 def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Which elements, and their stiffness blocks (k, e, a, b) in N/m for the components
-    (i, j) = UPPER[k]. The blocks below the diagonal are these, transposed.
+    """Element stiffness blocks (k, e, a, b) in N/m for the components (i, j) = UPPER[k], each with
+    the slice of its elements. The blocks below the diagonal are these, transposed.
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     for slab in slabs(len(mesh.tets)):
@@ -190,7 +192,7 @@ def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[
 
 
 def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Which elements, and their masses (1, e, a, b) in kg."""
+    """Element mass matrices (1, e, a, b) in kg, each with the slice of its elements."""
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
     NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
@@ -200,12 +202,12 @@ def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]
 
 
 def _mass(mesh: TetMesh, pattern: Pattern, rho: Floats) -> sparse.csr_array:
-    """int rho N_a N_b dV (3 n, 3 n)."""
+    """Consistent mass matrix int rho N_a N_b dV (3 n, 3 n)."""
     return from_nodal(pattern, pattern.sum(element_masses(mesh, rho), 1)[0])
 
 
 def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
-    """The same of a rate (m,) in kg/m3/s that is 0 in most elements."""
+    """Mass-proportional damping matrix of a rate (m,) in kg/m3/s that is 0 in most elements."""
     layer = np.flatnonzero(rate)
     R = _mass(_part(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
     R.eliminate_zeros()
@@ -215,7 +217,7 @@ def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
 def by_region(
     mesh: TetMesh, material: Material | Mapping[int, Material]
 ) -> tuple[list[Material], Ints]:
-    """The materials that there are, and which of them each element (e,) is made of."""
+    """The materials of a mesh, and the index (e,) of each element's."""
     if isinstance(material, Material):
         return [material], np.zeros(len(mesh.tets), np.int64)
     if not isinstance(material, Mapping):

@@ -1,4 +1,4 @@
-"""What holds a body, and what lets waves leave it."""
+"""Boundary conditions: fixed degrees of freedom, elastic supports and absorbing dashpots."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pi
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
-    """What a surface rests on, as a function of place: springs, and dashpots that let waves out.
+    """Elastic and absorbing support of a surface: springs and dashpots as functions of position.
 
-    Where a surface is held by whole facets, the edge of the hold follows the mesh; a stiffness that
-    is smooth in place does not.
+    Where whole facets are fixed, the edge of the constrained area follows the mesh; that of a
+    stiffness smooth in position does not.
 
     Parameters
     ----------
     facets : (k, a) int, boundary facets
     stiffness : (k q,) N/m3, traction per displacement at the points of `facet_points`
-    absorbed : (k q,) 0 to 1, what share of the surface at these points has dashpots
+    absorbed : (k q,) 0 to 1, share of the surface at these points that has dashpots
     """
 
     facets: Ints
@@ -35,7 +35,7 @@ class Support:
 
 
 def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
-    """(3 n,) bool, True where the displacement is held at 0."""
+    """Mask (3 n,) bool of the fixed degrees of freedom, whose displacement is 0."""
     if isinstance(fixed, str):
         fixed = {fixed: "xyz"}
     if not isinstance(fixed, Mapping):
@@ -53,7 +53,7 @@ def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Int
 
 
 def springs(mesh: TetMesh, support: Support) -> sparse.csr_array:
-    """Stiffness (3 n, 3 n) of a support: int k N_a N_b dA in every direction, a Winkler bed."""
+    """Winkler foundation (3 n, 3 n) of a support: int k N_a N_b dA in every direction."""
     held, k = _where(support.facets, support.stiffness)
     return _over_facets(mesh, held, k[:, :, None, None] * np.eye(3))
 

@@ -1,11 +1,12 @@
-"""The remedy against locking: dilatation as a projection sees it.
+"""Macroelement pressure projection (B-bar family) against volumetric locking.
 
-Where a solid is nearly incompressible its stiffness against dilatation acts on the projection of
-div u onto linear functions over clusters of elements, each of which has an edge inside it. The
-middle of that edge can follow the slope of the pressure, which makes it a stable pair with errors
-of the displacement's own orders, 3 in L2 and 2 in the H1 seminorm, at any Poisson's ratio
-(macroelements: Stenberg, Math Comp 42:9, 1984, and Comput Methods Appl Mech Eng 63:261, 1987).
-The pressure is condensed in its cluster: no unknowns are added, and K stays positive definite.
+Where a solid is nearly incompressible its stiffness against dilatation acts on the L2 projection of
+div u onto linear functions over macroelements, each of which has an edge inside it. The mid-side
+node of that edge can follow the slope of the pressure, which makes this a stable mixed u-p pair
+with errors of the displacement's own orders, 3 in L2 and 2 in the H1 seminorm, at any Poisson's
+ratio (macroelements: Stenberg, Math Comp 42:9, 1984, and Comput Methods Appl Mech Eng 63:261,
+1987). The pressure is statically condensed in its macroelement: no degrees of freedom are added,
+and K stays positive definite.
 """
 
 import numpy as np
@@ -19,8 +20,9 @@ from meshes.tetmesh import EDGES, FACES, Floats, Ints, neighbours
 
 
 def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
-    """D (4 c, 3 n) of a mesh of ten-node tetrahedra in c clusters: |D u|^2 is the integral of the
-    squared projection of div u, and D u its coefficients by the `linear_functions`.
+    """Projected-divergence matrix D (4 c, 3 n) of ten-node tetrahedra in c macroelements: |D u|^2
+    is the integral of the squared projection of div u, and D u its coefficients in the
+    `linear_functions`.
     """
     cluster, sloping = clusters(mesh)
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
@@ -37,8 +39,8 @@ def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
 
 
 def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -> Floats:
-    """1, x, y and z made orthonormal over each of the `clusters`, in m^-3/2, at the points of each
-    element for degree 2 (e, q, 4); 1 alone, and else 0, where nothing slopes.
+    """Orthonormal linear pressure functions over each of the `clusters`, in m^-3/2, at the points
+    of each element for degree 2 (e, q, 4); the constant alone, and else 0, where not `sloping`.
     """
     nodes = shape_nodes(mesh)
     volumes = jacobians(nodes, 2, 0)[2]
@@ -57,10 +59,11 @@ def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -
 
 
 def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
-    """Which cluster (e,) each element is in, and whether each cluster (c,) has an edge inside it.
+    """Macroelements: the one (e,) that each element is in, and whether each (c,) has an inner edge.
 
-    A cluster is all elements around an inner edge, the longest ones first: in a box that is split
-    along a diagonal, the box. An element left between joins a neighbour, or stays alone without.
+    A macroelement is all elements around an inner edge, the longest edges first: in a box that is
+    split along a diagonal, the box. An element left between joins a neighbour's or, without one,
+    stays alone.
     """
     middles, ends = mesh.tets[:, 4:], mesh.points[mesh.tets[:, EDGES]]
     lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)

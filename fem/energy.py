@@ -1,12 +1,13 @@
-"""Where the work of a load has gone.
+"""Energy balance: the work of a load and where it has gone.
 
     work = kinetic + elastic + dissipated + radiated
     dissipated + radiated = int v^T C v dt + sum_j int d_j^T K_j d_j dt / tau_j
 
-C holds the loss in the material as well as R, what absorbing ends take out of the body; springs
-that relax, stretched by d_j, hold elastic energy and lose it in their dashpots. Average
-acceleration keeps this balance to round-off (Hughes, The Finite Element Method, 1987, chapter
-9), whatever the time step, so that an imbalance is a mistake in the solution and not in the step.
+C contains the loss in the material as well as R, the damping of absorbing boundaries; the springs
+of generalised Maxwell branches, stretched by d_j, store elastic energy that their dashpots
+dissipate. Average acceleration satisfies this balance to round-off (Hughes, The Finite Element
+Method, 1987, chapter 9), whatever the time step, so that an imbalance is an error of the solution
+and not of the step.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,13 +21,13 @@ from fem.relaxation import Branch
 from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
-ROUND_OFF = 1e-6  # of the power that goes to and fro
+ROUND_OFF = 1e-6  # of the reactive power
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spent:
-    """Work of a load in J (or its mean power in W), what of it was lost in the material, and what
-    left through absorbing ends; and for mean powers what only went to and fro.
+    """Energy balance of a load in J (or its mean power in W): its work, what the material
+    dissipated, what absorbing boundaries took; and for mean powers the apparent power exchanged.
     """
 
     work: float = 0.0
@@ -44,15 +45,15 @@ class Spent:
 
     @property
     def lost(self) -> float:
-        """What is no longer in the body."""
+        """Energy that has left the body, as heat or through absorbing boundaries."""
         return self.dissipated + self.radiated
 
 
 def audited(
     operators: Operators, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, Spent]]:
-    """States from rest, each with what was spent so far, for a product with C, R and each branch
-    a step.
+    """States from rest, each with the energy balance so far, at the cost of a product with C, R and
+    each Maxwell branch a step.
 
     Parameters
     ----------
@@ -81,8 +82,8 @@ def accounted(
     free: Ints,
     lost: Callable[[State, State], Spent],
 ) -> Iterator[tuple[State, Spent]]:
-    """States, each with what was spent since the first, of any body: `lost` says what of it between
-    two states.
+    """States of any body, each with the energy balance since the first: `lost` gives the losses
+    between two states.
     """
     before, spent = next(states), Spent()
     f = force(before.time)[free]
@@ -104,9 +105,9 @@ def stored(operators: Operators, state: State) -> float:
 
 
 def imbalance(spent: Spent, stored: float = 0.0) -> float:
-    """Energy that is missing or too much, relative to all that went round; `stored` in J since.
+    """Relative error of the energy balance; `stored` in J since its start.
 
-    Where nothing is lost, round-off of what goes to and fro is no imbalance.
+    Where nothing is lost, round-off of the reactive power is no imbalance.
     """
     size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
     return abs(spent.work - stored - spent.lost) / size if size > 0 else 0.0
@@ -120,14 +121,14 @@ def mean_power(
     frequencies: Floats,
     branches: Sequence[Branch] = (),
 ) -> Spent:
-    """What lines put in and what becomes of it, in W.
+    """Mean power balance of a load's spectral lines, in W.
 
     Parameters
     ----------
-    C, R : (n, n) damping, and the part of it in absorbing ends, dense or sparse
+    C, R : (n, n) damping, and the part of it in absorbing boundaries, dense or sparse
     forces, motion : (f, n) complex amplitudes of the load in N and of the displacement in metre
     frequencies : (f,) float, Hz
-    branches : what relaxes, of (n, n) each
+    branches : generalised Maxwell branches, of (n, n) each
     """
     w = 2 * np.pi * frequencies
     apparent = w * (forces * motion.conj()).sum(axis=1) / 2

@@ -1,13 +1,13 @@
-"""Large displacement of tetrahedra, and of a membrane stretched among their nodes.
+"""Total Lagrangian finite strain: tetrahedra, and a membrane stretched among their nodes.
 
     F_ki = T_ki + G_ka u_ai,  E = (F F^T - 1) / 2,  S = lam tr(E) 1 + 2 mu E
     f_ai = int G_ka S_kl F_li dV,  W = int (lam tr(E)^2 / 2 + mu E : E) dV
 
-Total Lagrangian with St. Venant and Kirchhoff's material: Bonet and Wood, Nonlinear Continuum
-Mechanics for Finite Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at
-rest, of which a solid has three and a horizontal membrane two, T being the first rows of the unit
-matrix; the same lines serve both. G holds shape gradients at four points of a tetrahedron and three
-of a triangle, as in the linear `assembly`, whose K is the tangent at rest.
+The material is St. Venant-Kirchhoff: Bonet and Wood, Nonlinear Continuum Mechanics for Finite
+Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at rest, of which a solid
+has three and a horizontal membrane two, T being the first rows of the unit matrix; the same code
+serves both. G contains shape gradients at four points of a tetrahedron and three of a triangle, as
+in the linear `assembly`, whose K is the tangent at rest.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,7 +30,7 @@ LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, whi
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Elastic:
-    """A body that answers a large displacement u (n_free,) in metre of its free components.
+    """Hyperelastic body: its forces at a large displacement u (n_free,) in metre of its free dofs.
 
     `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, `viscous(u, v)`
     (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in J; `operators`
@@ -46,7 +46,7 @@ class Elastic:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Membrane:
-    """A horizontal sheet that stretches but neither bends nor weighs anything.
+    """A horizontal membrane without bending stiffness and without mass.
 
     Parameters
     ----------
@@ -93,10 +93,10 @@ def finite_strain(
     fixed: str | Mapping[str, str] | ArrayLike = "clamped",
     membrane: Membrane | None = None,
 ) -> Elastic:
-    """A body that may be displaced far, of tetrahedra and a membrane if there is one.
+    """Hyperelastic body at large displacement, of tetrahedra and a membrane if there is one.
 
-    Mass and damping of the tetrahedra are those of `assemble`, linear and constant, which is right
-    while they turn by little. In a membrane the viscous stress follows the rate of E.
+    Mass and damping of the tetrahedra are those of `assemble`, linear and constant, which holds for
+    small rotations. In a membrane the viscous stress follows the rate of E.
 
     Parameters
     ----------
@@ -106,14 +106,14 @@ def finite_strain(
     ------
     ValueError
         If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock, or a
-        material relaxes; else as `assemble`.
+        material has a relaxing modulus; else as `assemble`.
     """
     n = len(mesh.points)
     solid, operators = solid_part(mesh, material), assemble(mesh, material, fixed=fixed)
     if operators.branches:
         raise ValueError(
-            "a relaxing_modulus above 0 has no answer at large displacement; leave it out, or use "
-            "one of the linear models"
+            "a relaxing_modulus above 0 is not implemented at large displacement; leave it out, or "
+            "use one of the linear models"
         )
     free = operators.free
 
@@ -190,26 +190,28 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
 
 
 def internal_force(part: Part, u: Floats) -> Floats:
-    """Nodal forces (n, 3) in N that hold a part at the displacement u (n, 3) in metre."""
+    """Internal nodal forces (n, 3) in N of a part at the displacement u (n, 3) in metre."""
     F, E = deformation(part, u)
     return spread_stress(part, stress(part, E) @ F)
 
 
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
-    """Nodal forces (n, 3) in N/s of the stress that the rate of E at velocity v (n, 3) makes."""
+    """Rate (n, 3) in N/s of nodal forces: those of the stress of the rate of E at v (n, 3)."""
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
     return spread_stress(part, stress(part, (rate + rate.swapaxes(2, 3)) / 2) @ F)
 
 
 def stored_energy(part: Part, u: Floats) -> float:
-    """Energy in J of a part at the displacement u (n, 3) in metre."""
+    """Strain energy in J of a part at the displacement u (n, 3) in metre."""
     E = deformation(part, u)[1]
     return float((part.volume[..., None, None] * stress(part, E) * E).sum() / 2)
 
 
 def deformation(part: Part, u: Floats) -> tuple[Floats, Floats]:
-    """F (e, q, k, i) and Green and Lagrange's strain E (e, q, k, l), exact for small u, too."""
+    """Deformation gradient F (e, q, k, i) and Green-Lagrange strain E (e, q, k, l), without
+    cancellation at small u.
+    """
     H = (part.D @ u).reshape(*part.G.shape[:3], 3)
     k = H.shape[2]
     E = quadratic_strain(H, H)
@@ -218,13 +220,13 @@ def deformation(part: Part, u: Floats) -> tuple[Floats, Floats]:
 
 
 def quadratic_strain(H: Floats, other: Floats) -> Floats:
-    """sym(H other^T) / 2 (e, q, k, l): what the strain has in addition to its linear part."""
+    """Quadratic part sym(H other^T) / 2 (e, q, k, l) of the Green-Lagrange strain."""
     product = H @ other.swapaxes(2, 3)
     return (product + product.swapaxes(2, 3)) / 4
 
 
 def stress(part: Part, E: Floats) -> Floats:
-    """Second Piola and Kirchhoff's stress (e, q, k, l) in Pa."""
+    """Second Piola-Kirchhoff stress (e, q, k, l) in Pa."""
     S = 2 * part.mu[:, None, None, None] * E
     pressure = part.lam[:, None] * np.trace(E, axis1=2, axis2=3)
     for k in range(E.shape[2]):
@@ -238,7 +240,7 @@ def spread_stress(part: Part, P: Floats) -> Floats:
 
 
 def tangent(part: Part, u: Floats) -> sparse.csr_array:
-    """d internal_force / d u (3 n, 3 n) in N/m, consistent and symmetric.
+    """Consistent tangent d internal_force / d u (3 n, 3 n) in N/m, symmetric.
 
     K_ab,ij = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_li F_lj) + delta_ij G_ka S_kl G_lb,
     A_ai = G_ka F_ki

@@ -1,5 +1,5 @@
-"""Steady state at given frequencies: (K* + i w C - w^2 M) u = f, time exp(+i w t); K* = K and what
-relaxing branches add to it.
+"""Steady state at given frequencies: (K* + i w C - w^2 M) u = f, time exp(+i w t); K* is K with the
+complex stiffness of the generalised Maxwell branches.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from meshes.tetmesh import Floats
 def harmonic(
     operators: Operators, force: Floats, frequencies: ArrayLike, *, solver: str = "auto"
 ) -> NDArray[np.complex128]:
-    """Complex displacement (f, 3 n) in metre; one factorisation per frequency.
+    """Frequency response: complex displacement (f, 3 n) in metre, one factorisation per frequency.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The one door to sparse direct solvers: `factorise(A).solve(b)`.
+"""Sparse direct solvers behind one interface: `factorise(A).solve(b)`.
 
 All of them factorise symmetric matrices, real or complex. MKL PARDISO and CHOLMOD are used if
 they are installed; SciPy's SuperLU with a nested-dissection ordering needs nothing.
@@ -79,7 +79,7 @@ def _by_parts(solve: Callable[[Array], Array]) -> Callable[[Array], Array]:
 def _singular(detail: object) -> ValueError:
     return ValueError(
         f"the matrix is singular or not positive definite ({detail}); "
-        "is the body held anywhere, and are all its stiffnesses above 0?"
+        "is the body constrained anywhere, and are all its stiffnesses above 0?"
     )
 
 
@@ -106,8 +106,8 @@ def dissect(A: sparse.csr_array) -> NDArray[np.int64]:
 
     METIS orders it where pymetis is installed; else halves are split off along the middle
     level of a breadth-first search from a peripheral vertex (George and Liu, SIAM J Numer Anal
-    15:1053, 1978). Unknowns with the same neighbours, as the components of one node, are ordered
-    as one.
+    15:1053, 1978). Degrees of freedom with the same neighbours, as the components of one node, are
+    ordered as one.
     """
     n = A.shape[0]
     marks = np.random.default_rng(0).random(n)
@@ -145,7 +145,7 @@ def _dissect_by_levels(graph: sparse.csr_array) -> NDArray[np.int64]:
 def _split(
     graph: sparse.csr_array,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]] | None:
-    """Two halves of a graph that only touch through the third part, or None."""
+    """Two halves of a graph and the vertex separator between them, or None."""
     start = 0
     for _ in range(3):  # each search starts from the vertex that was farthest from the last
         level: Array = csgraph.dijkstra(graph, indices=start, unweighted=True)
@@ -213,7 +213,7 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
             b.ctypes.data_as(pointer), x.ctypes.data_as(pointer), ctypes.byref(error),
         )  # fmt: skip
         if error.value == -2:
-            raise MemoryError(f"not enough memory to factorise {n} unknowns; coarsen the mesh")
+            raise MemoryError(f"not enough memory to factorise {n} dofs; coarsen the mesh")
         if error.value:
             raise _singular(f"PARDISO error {error.value} in phase {phase}")
         return x

@@ -4,10 +4,10 @@ The complex shear modulus (time exp(+i w t)) is
 
     mu(w) = mu (1 + i loss_factor) + i w viscosity + relaxing_modulus i w tau / (1 + i w tau)
 
-With viscosity alone that is Kelvin's and Voigt's law, with a relaxing part alone the standard
-linear solid (C. Zener, Elasticity and Anelasticity of Metals, 1948): mu when slow and
-mu + relaxing_modulus when fast. Poisson's ratio stays what it is, so that the whole stiffness
-scales with mu.
+With viscosity alone that is the Kelvin-Voigt model, with a relaxing modulus alone the standard
+linear solid, one Maxwell branch (Prony term) in parallel with a spring (C. Zener, Elasticity and
+Anelasticity of Metals, 1948): mu in slow and mu + relaxing_modulus in fast motion. Poisson's ratio
+is constant, so that the whole stiffness scales with mu.
 """
 
 from dataclasses import dataclass
@@ -24,18 +24,18 @@ class Material:
     Parameters
     ----------
     density : float, kg/m3
-    shear_modulus : float, Pa, at rest: after all that relaxes has relaxed
+    shear_modulus : float, Pa, at equilibrium: fully relaxed
     poisson : float, -1 < poisson < 0.5
     viscosity : float, Pa s, Kelvin-Voigt: shear stress per shear rate
     loss_factor : float, hysteretic loss, the same at every frequency
-    relaxing_modulus : float, Pa, standard linear solid: what fast motion meets beside the shear
-        modulus
-    relaxation_time : float, s, tau, in which that part is given up to 1/e
+    relaxing_modulus : float, Pa, of the Maxwell branch of a standard linear solid: fast motion
+        meets it in addition to the shear modulus
+    relaxation_time : float, s, tau, in which the branch's stress falls to 1/e
 
     Raises
     ------
     ValueError
-        If a value is not finite or outside these limits, or a relaxing part has no time.
+        If a value is not finite or outside these limits, or a relaxing modulus has no time.
     """
 
     density: float
@@ -58,7 +58,7 @@ class Material:
         if self.relaxing_modulus > 0 and self.relaxation_time == 0:
             raise ValueError(
                 f"relaxing_modulus = {self.relaxing_modulus:g} Pa has relaxation_time = 0 s, which "
-                "must be above 0; give the time, or leave out the relaxing part"
+                "must be above 0; give the time, or leave out the relaxing modulus"
             )
         if not -1 < self.poisson < 0.5:
             raise ValueError(
@@ -68,7 +68,7 @@ class Material:
 
     @property
     def has_loss(self) -> bool:
-        """Whether waves lose anything in it."""
+        """Whether the material dissipates energy."""
         return self.viscosity + self.loss_factor + self.relaxing_modulus > 0
 
     @property
@@ -82,7 +82,7 @@ class Material:
         return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
 
     def complex_modulus(self, w: float) -> complex:
-        """Shear modulus in Pa of steady motion exp(+i w t), w in rad/s."""
+        """Complex shear modulus in Pa of steady motion exp(+i w t), w in rad/s."""
         lasting = self.shear_modulus * (1 + 1j * self.loss_factor) + 1j * w * self.viscosity
         turned = 1j * w * self.relaxation_time
         return lasting + self.relaxing_modulus * turned / (1 + turned)
@@ -109,12 +109,12 @@ class Material:
 
 
 def from_young(*, young: float, poisson: float, **rest: float) -> Material:
-    """A material by its Young's modulus in Pa; the rest as in `Material`."""
+    """Material by its Young's modulus in Pa; the rest as in `Material`."""
     return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
 
 
 def _tissue(young: float) -> Material:
-    """Soft tissue that loses as much of a wave as the palm does."""
+    """Soft tissue with the viscosity-to-modulus ratio of the palm."""
     shear = young / (2 * (1 + 0.4999))
     return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=2e-4 * shear)
 
@@ -134,7 +134,7 @@ def rayleigh_damping(loss_factor: float, band: tuple[float, float]) -> tuple[flo
 
 PRESETS = {
     # Effective homogeneous soft tissue: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
-    # palms bracket the 5-8 m/s at which a moving focus is felt most.
+    # palms bracket the 5-8 m/s at which a moving focus is perceived as strongest.
     "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
     "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
     "palm-stiff": Material(density=1000, shear_modulus=50e3, poisson=0.4999, viscosity=10.0),

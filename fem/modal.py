@@ -1,4 +1,4 @@
-"""A reduced model in its own coordinates, and its motion under moving loads.
+"""Modal (pole-residue) form of a reduced-order model, and its motion under moving loads.
 
     z' = pole z + inputs f(t),  probes = 2 Re(outputs z)
 
@@ -25,7 +25,7 @@ MOST_RATES = 8192  # summed at a time, to bound memory
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Poles:
-    """The model in its own coordinates: z' = pole z + inputs f, probes = 2 Re(outputs z).
+    """Pole-residue form of a model: z' = pole z + inputs f, probes = 2 Re(outputs z).
 
     `values` (m,) in 1/s with imaginary part >= 0, `inputs` (m, r), `outputs` (p, m).
     """
@@ -36,13 +36,14 @@ class Poles:
 
 
 def poles(model: ReducedModel, outputs: Floats | None = None) -> Poles:
-    """Diagonalise the model in first-order form, once; one of each conjugate pair is kept.
+    """Diagonalise the model in first-order form, once; one of each conjugate pair is returned.
 
-    What has relaxed is part of that form: z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
+    Internal variables of Maxwell branches are part of that form:
+    z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
 
     Parameters
     ----------
-    outputs : (p, r), what is read off the reduced coordinates: the model's probes if not given
+    outputs : (p, r), output matrix of the reduced coordinates: that of the probes if not given
     """
     r = len(model.K)
     fast = model.K + sum(branch.K for branch in model.branches)
@@ -62,7 +63,7 @@ def poles(model: ReducedModel, outputs: Floats | None = None) -> Poles:
 
 
 def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[Complex, Complex]:
-    """What a load Re sum_f forces exp(2 pi i f t), switched on at t = 0, makes of the probes.
+    """Steady state and free vibration under a load Re sum_f forces exp(2 pi i f t) from t = 0 on.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
     Returns
     -------
     lines : (f, p) complex amplitudes in metre of the steady state
-    start : (m, p) complex amplitudes of exp(pole t), which bring it to rest at t = 0
+    start : (m, p) complex amplitudes of exp(pole t), the free vibration from rest at t = 0
     """
     iw, values = 2j * np.pi * frequencies[:, None], poles.values
     forwards = (forces @ poles.inputs.T) / (iw - values)  # (f, m)
@@ -82,9 +83,10 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
 
 
 def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
-    """Re sum_j amplitudes (j, p) exp(rates (j,) t) at equally spaced times (t,) from 0: (t, p).
+    """Exponential sum (t, p): Re sum_j amplitudes (j, p) exp(rates (j,) t) at equally spaced times
+    (t,) from 0.
 
-    Exponentials are taken within one chunk of times and at the start of each, and multiplied.
+    Exponentials are computed within one chunk of times and at the start of each, and multiplied.
     """
     j, p = amplitudes.shape
     if j > MOST_RATES:
@@ -109,7 +111,7 @@ def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt
     Parameters
     ----------
     footprints : (k, r) reduced forces at k positions of the focus, N kg^-1/2 per Pa
-    position : (t,) float, where the focus is, in 0..k-1; between two positions linear
+    position : (t,) float, position of the focus, in 0..k-1; between two positions linear
     gain : (t,) float, Pa, pressure at the focus
     dt : float, s
     """
@@ -132,7 +134,7 @@ def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt
 
 
 def _step_weights(x: complex) -> tuple[complex, complex, complex]:
-    """exp(x), and the weights of the load at the end and at the start of a step.
+    """Exponential-integrator weights: exp(x), and those of the load at a step's end and start.
 
     z(t + dt) = exp(x) z + dt int_0^1 exp(x (1 - s)) [(1 - s) g_0 + s g_1] ds
     """

@@ -1,15 +1,15 @@
-"""Large displacement at rest and in time: M u'' + f_int(u, u') = f(t, u).
+"""Nonlinear statics and dynamics at large displacement: M u'' + f_int(u, u') = f(t, u).
 
-At rest by Newton's method with a line search, the load in steps if need be. In time by the
+Statics by Newton's method with a line search, in load steps if need be. Dynamics by the
 generalized-alpha method of `transient` with the internal force weighted between the ends of a step,
 
     M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
 
 (Chung and Hulbert, J Appl Mech 60:371 (1993); Newton in time: Belytschko, Liu and Moran, Nonlinear
 Finite Elements for Continua and Structures (2000), chapter 6). One factorisation serves as many
-steps as it goes on to converge for. Average acceleration keeps energy to second order in the step,
-not to round-off as in the linear case. Momentum is kept by the balance of forces, which is solved
-to the tolerance.
+steps as Newton's method converges with it (modified Newton). Average acceleration conserves energy
+to second order in the step, not to round-off as in the linear case. Momentum is conserved to the
+tolerance that the balance of forces is solved to.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,12 +28,12 @@ from meshes.tetmesh import Floats
 MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step
 SLOW = 0.3  # of a correction, beyond which the next one calls for another tangent
-ROUND_OFF = 1e-5  # of the load: a residual below it is judged by the correction that it calls for
-STANDSTILL = 1e-6  # of the displacement: a step below it is as good as none
+ROUND_OFF = 1e-5  # of the load: a residual below it is assessed by the correction it calls for
+STANDSTILL = 1e-6  # of the displacement: a step below it counts as none
 
 
 class _Stuck(ArithmeticError):
-    """Newton's method did not converge; the relative residual it was left with."""
+    """Newton's method did not converge; its argument is the relative residual."""
 
 
 def static(
@@ -44,12 +44,12 @@ def static(
     tolerance: float = 1e-8,
     solver: str = "auto",
 ) -> Floats:
-    """Displacement (3 n,) in metre at rest under a force that is put on in as few steps as it can.
+    """Static displacement (3 n,) in metre under a force applied in as few load steps as converge.
 
     Parameters
     ----------
     force : (3 n,) in N; or displacement (3 n,) -> such forces, for those that follow the body
-    start : (3 n,) in metre, where to look first; at rest without load if not given
+    start : (3 n,) in metre, initial guess; undeformed if not given
     tolerance : residual relative to the force; or, of a residual below `ROUND_OFF`, the
         correction that it calls for, relative to the displacement
 
@@ -76,7 +76,7 @@ def static(
             part /= 2
             if part < 0.5**MOST_HALVINGS:
                 raise Diverged(
-                    f"the body found no rest at {100 * target:.3g} % of its load: a residual of "
+                    f"no equilibrium was found at {100 * target:.3g} % of the load: a residual of "
                     f"{stuck.args[0]:.2g} of it is left, above {tolerance:g}, after load steps of "
                     f"1/{2**MOST_HALVINGS}; lower the load, or refine the mesh where it bends most"
                 ) from None
@@ -104,7 +104,7 @@ def _newton(
             step = factorise(body.tangent(u), backend=solver).solve(r)
         except ValueError:  # no longer positive definite: too far from the solution
             break
-        # What thin bodies are left with is round-off of forces that cancel: it moves nothing.
+        # The residual of thin bodies ends as round-off of forces that cancel: it moves nothing.
         size = float(np.linalg.norm(u))
         if left <= ROUND_OFF and float(np.linalg.norm(step)) <= tolerance * size:
             return u + step
@@ -115,7 +115,7 @@ def _newton(
 def _line_search(
     unbalanced: Callable[[Floats], tuple[Floats, float]], u: Floats, step: Floats
 ) -> float:
-    """How much of a step to take: until the residual does no more work along it."""
+    """Line search: the fraction of a step at which the residual does no more work along it."""
 
     def work(part: float) -> float:
         return float(step @ unbalanced(u + part * step)[0])
@@ -148,7 +148,7 @@ def dynamic(
     tolerance: float = 1e-3,
     solver: str = "auto",
 ) -> Iterator[State]:
-    """States at 0, dt, 2 dt, ... without end: take what you need.
+    """States at 0, dt, 2 dt, ... by generalized-alpha and Newton's method, without end.
 
     A step for which Newton's method does not converge is made of two halves, and so on.
 
@@ -156,7 +156,7 @@ def dynamic(
     ----------
     force : time in s and displacement (3 n,) in metre -> nodal forces (3 n,) in N
     dt : float, s
-    spectral_radius : 0 to 1, amplitude kept per step by motion far beyond the time step
+    spectral_radius : 0 to 1, factor per step on the amplitude of motion far above 1/dt
     initial : displacement and velocity to start from; at rest at time 0 if not given
     tolerance : the last correction of a step's displacement, relative to that displacement
 
@@ -191,7 +191,7 @@ def dynamic(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _March:
-    """What stays the same from step to step."""
+    """Body, load, scheme, tolerance and solver of a time integration, the same in every step."""
 
     body: Elastic
     force: Callable[[float, Floats], Floats]
@@ -216,7 +216,9 @@ def _advance(
 def _step(
     march: _March, now: _Now, until: float, factors: dict[float, Factor], halvings: int
 ) -> _Now:
-    """One step by Newton's method, with the factorisation kept for `halvings` if it converges."""
+    """One step by Newton's method, with the factorisation cached by `halvings` while it
+    converges.
+    """
     body, (a_m, a_f, beta, gamma) = march.body, march.scheme
     C, M, free = body.operators.C, body.operators.M, body.operators.free
     dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
@@ -272,7 +274,7 @@ def total_energy(body: Elastic, state: State) -> float:
 def audited(
     body: Elastic, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, Spent]]:
-    """States, each with what was spent since the first, as `fem.audited` of a linear body.
+    """States, each with the energy balance since the first, as `fem.audited` of a linear body.
 
     Parameters
     ----------

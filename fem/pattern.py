@@ -1,4 +1,4 @@
-"""Where the values of elements are summed into sparse matrices."""
+"""Sparsity pattern of a mesh, and the assembly of element matrices into sparse ones."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and ab
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pattern:
-    """Where each pair of element nodes is summed: CSR pattern on nodes and a slot per pair."""
+    """CSR sparsity pattern on nodes, with the slot that each pair of element nodes is summed in."""
 
     indptr: Ints
     indices: Ints
@@ -43,7 +43,7 @@ class Pattern:
         return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
 
     def sum(self, slabs: Iterable[tuple[slice, Floats]], parts: int) -> Floats:
-        """Values (parts, e, a, b) of some elements at a time summed into slots (parts, slots)."""
+        """Assemble element matrices (parts, e, a, b), some at a time, into slots (parts, slots)."""
         summed = np.zeros((parts, len(self.indices)))
         for slab, values in slabs:
             slots = self.slot[slab].ravel()
@@ -52,7 +52,7 @@ class Pattern:
         return summed
 
     def mirrored(self) -> Ints:
-        """The slot (slots,) of each pair taken the other way round."""
+        """The slot (slots,) of each transposed pair."""
         n = len(self.indptr) - 1
         slots = sparse.csr_array(
             (np.arange(len(self.indices)), self.indices, self.indptr), shape=(n, n)
@@ -60,7 +60,7 @@ class Pattern:
         return slots.tocsc().data
 
     def rows(self) -> tuple[Callable[[int], Ints], Ints]:
-        """Where slots are if each node has three rows: places (slots,) in the row of a component,
+        """Row layout with three components per node: positions (slots,) in the row of a component,
         and the rows' indptr (3 n + 1,).
         """
         lengths = np.diff(self.indptr)
@@ -96,7 +96,7 @@ def from_nodal(pattern: Pattern, summed: Floats) -> sparse.csr_array:
 
 
 def slabs(count: int) -> list[slice]:
-    """Elements a few at a time."""
+    """Slices of elements, `SLAB` at a time."""
     return [slice(start, start + SLAB) for start in range(0, count, SLAB)]
 
 

@@ -1,21 +1,22 @@
-"""A small model that answers like the large one at the probes, for any load on the surface.
+"""Reduced-order model of the probes' response to any surface load, by Krylov moment matching.
 
 By reciprocity the response of probe p to a load f is f^T y_p with (K + s C + s^2 M) y_p = s_p,
-where K stands for K + sum_j s tau_j / (1 + s tau_j) K_j if some of the stiffness relaxes.
+where K stands for K + sum_j s tau_j / (1 + s tau_j) K_j if there are generalised Maxwell branches.
 Those y_p(s) are approximated by Galerkin projection onto the second-order Krylov space of the
-probe vectors at one real shift, which costs one real factorisation. The space is built by the
-two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016):
-with proportional damping the plain recurrence loses all accuracy after a few dozen moments.
-What has relaxed of y, y / (1 + s tau_j), is a further part of the linearised vectors: its moments
-lie in the same space, so that these are the moments of the exact law.
+probe vectors about one real expansion point, which costs one real factorisation. The space is built
+by the two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195,
+2016): with proportional damping the plain recurrence loses all accuracy after a few dozen moments.
+The dashpot stretches of Maxwell branches, y / (1 + s tau_j), are further parts of the linearised
+vectors: their moments lie in the same space, so that the moments matched are those of the exact
+constitutive law.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
-Mass that moves along with a body, as air does, is dense and can only be applied: with it the shift
-is 0, where no mass is factorised.
+Added mass of a fluid is dense and can only be applied: with it the expansion point is 0, where no
+mass is factorised.
 
-The error estimate needs no solution of the full system: it is the residual of the model answered
-in the space of some more moments, where Galerkin's method makes the two answers' difference solve
-the residual equation. Those moments are then dropped: a model of theirs would have an error that
-nobody knows, because convergence may at any moment become steep or stall.
+The error estimate needs no solution of the full system: it is the difference from the response of
+the model with some more moments, which by Galerkin orthogonality solves the residual equation in
+the larger space. Those further moments are then dropped: the error of the larger model would be
+unknown, because convergence may become steep or stall at any moment.
 """
 
 from collections.abc import Callable, Iterator
@@ -34,28 +35,28 @@ from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
 
-SHIFT = 2 * np.pi * 200.0  # rad/s: best between 200 and 400 Hz for a band of 1 to 2 kHz
-# Of the band, if stiffness relaxes: fast waves lose little then, and many of them count. Best
-# between 0.8 and 1.6; the shift above takes nearly twice as many moments.
+SHIFT = 2 * np.pi * 200.0  # expansion point, rad/s: best at 200 to 400 Hz for a band of 1 to 2 kHz
+# Expansion point over the band with Maxwell branches: waves of high frequency lose little then, and
+# many of them count. Best between 0.8 and 1.6; the one above takes nearly twice as many moments.
 RELAXING_SHIFT = 1.0
-# Moments between two looks at the error: at least so many, which tell it to a factor of 4, and
-# this share of all, because a look at a large model costs more than its moments.
+# Moments between two error estimates: at least so many, which give it to a factor of 4, and this
+# share of all, because estimating the error of a large model costs more than its moments.
 AHEAD = 3
 SHARE_AHEAD = 1 / 16
 MOST_MOMENTS = 200
 SMALLEST = np.finfo(np.float64).tiny
-DISTINCT = 1e-6  # of the strongest: what less of probes is not told apart
-ROUND_OFF = 1e-12  # of a direction, of which what is left after orthogonalisation says nothing
+DISTINCT = 1e-6  # of the largest singular value: probes that differ by less count as dependent
+ROUND_OFF = 1e-12  # of a direction: what orthogonalisation leaves of it is round-off
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedModel:
-    """u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
+    """Reduced-order model u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
 
-    `basis` (3 n, r) in kg^-1/2, `K`, `C` and `R` (r, r), `outputs` (p, r), `branches` beside K of
-    (r, r) each; `estimate` is the relative change of the probes' response by some more moments,
-    `moments` how many there are.
+    `basis` (3 n, r) in kg^-1/2, `K`, `C` and `R` (r, r), `outputs` (p, r), Maxwell `branches` in
+    parallel with K of (r, r) each; `estimate` is the relative change of the probes' response by
+    some more moments, `moments` how many there are.
     """
 
     basis: Floats
@@ -80,18 +81,18 @@ def reduce(
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
-    """Reduce a body to the motion of its probes.
+    """Reduced-order model of the motion of a body's probes.
 
     Parameters
     ----------
     operators : Operators
     probes : (p, 3 n) sparse, from `probe_operator`; for whole fields the rows of a
         `load_subspace` as well, without `loads`
-    band : float, Hz, highest frequency that must be right
+    band : float, Hz, highest frequency at which the tolerance must be met
     tolerance : float, relative error of the probes' displacement at any frequency of the band
-    loads : (3 n, k), typical nodal forces by which the error is judged; without any it is judged
-        by the probes' adjoint fields in the whole body, which asks for far more moments
-    added : what moves with the body, as `added_mass` gives it; something must hold the body then
+    loads : (3 n, k), typical nodal forces that the error is estimated for; without any it is
+        that of the probes' adjoint fields in the whole body, which takes far more moments
+    added : added mass of a fluid, as `added_mass` gives it; the body must be constrained then
     progress : called with the fraction done, as the error estimate approaches the tolerance
 
     Raises
@@ -102,8 +103,8 @@ def reduce(
     free, branches = operators.free, operators.branches
     seeds = probes[:, free].toarray().T
     if not seeds.any():
-        raise ValueError("no probe can move, all lie where the body is held; move one inwards")
-    # Probes on a clamped edge stay where they are, those in one element know of each other.
+        raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
+    # Probes on a clamped edge do not move; those in one element may be linearly dependent.
     directions, strengths, _ = np.linalg.svd(seeds, full_matrices=False)
     moving = directions[:, strengths > DISTINCT * strengths[0]]
     shift = 2 * np.pi * RELAXING_SHIFT * band if branches else SHIFT
@@ -158,7 +159,7 @@ def reduce(
 
 
 def _with_added(operators: Operators, added: Added) -> Operators:
-    """The operators of a body with what moves along, of which C and M can only be applied."""
+    """Operators of a body with an added mass, of which C and M can only be applied."""
     C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
     return replace(operators, C=C + added.rate * added.M, M=M + added.M)
 
@@ -166,11 +167,11 @@ def _with_added(operators: Operators, added: Added) -> Operators:
 def _moments(
     space: "_Space", operators: Operators, shift: float, factor: Factor, seeds: Floats
 ) -> Iterator[None]:
-    """Adds the next moment of seeds (n, p) to the space at each turn."""
+    """Extend the Krylov space by the next moment of start vectors (n, p) at each turn."""
     branches = operators.branches
     lags = [branch.time / (1 + shift * branch.time) for branch in branches]
     scale = shift or SHIFT
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, what has relaxed):
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
     # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
     taken = np.zeros((2 + len(lags), 0, 0))
     upper = space.extend(factor.solve(seeds))
@@ -193,7 +194,7 @@ def _moments(
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
-    """Orthonormal columns (3 n, s) that span loads (3 n, k) to a relative error in the 2-norm.
+    """Proper orthogonal basis (3 n, s) of loads (3 n, k), to a relative error in the 2-norm.
 
     A circling focus needs about twenty at 1e-3, however many positions it is given at.
     """
@@ -204,15 +205,17 @@ def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
 
 
 def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Complex:
-    """Probe displacement (f, p, k) in metre per unit of the reduced forces (r, k) at each Hz."""
+    """Transfer function: probe displacement (f, p, k) in metre per unit of the reduced forces
+    (r, k), at frequencies (f,) in Hz.
+    """
     w = 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))
     Z = _impedance(model.K, model.C, model.branches, w)
     return model.outputs @ np.linalg.solve(Z, np.broadcast_to(forces, (len(w), *forces.shape)))
 
 
 class _Space:
-    """A growing mass-orthonormal basis (n, size), and its `images` under M and other matrices,
-    which all later products with them come from; memory is touched only as far as it is used.
+    """Mass-orthonormal Krylov basis (n, size) that grows, and its `images`, the products of M and
+    other matrices with it, each formed once; memory is touched only as far as it is used.
     """
 
     def __init__(self, matrices: list[sparse.csr_array], most: int) -> None:
@@ -230,7 +233,7 @@ class _Space:
         return [columns[:, : self.size] for columns in self._columns[1:]]
 
     def extend(self, block: Floats) -> Floats:
-        """Add the directions of a block (n, k) that are new; its coordinates (size, k)."""
+        """Add the linearly independent directions of a block (n, k); its coordinates (size, k)."""
         M, *others = self._matrices
         Q, MQ = self.basis, self.images[0]
         scale = _norms(block, M @ block)
@@ -241,7 +244,7 @@ class _Space:
             overlap = overlap + coordinates
         image = M @ block
         left = _norms(block, image)
-        fresh = left > ROUND_OFF  # of 1: in a space that holds all of a body there is nothing new
+        fresh = left > ROUND_OFF  # of 1: a space of all of a body's dofs has no new direction
         block, image = (np.where(fresh, x / left, 0.0) for x in (block, image))
         squares, directions = np.linalg.eigh(block.T @ image)
         new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
@@ -271,7 +274,7 @@ def _padded(coordinates: Floats, size: int) -> Floats:
 
 
 def _append(taken: Floats, newest: Floats) -> tuple[Floats, Floats]:
-    """Those taken (l, size, k) with the newest made orthonormal to them; and those alone."""
+    """The previous vectors (l, size, k) with the newest orthonormalised to them; and the newest."""
     parts, size, width = newest.shape
     grown = np.zeros((parts, size, taken.shape[2]))
     grown[:, : taken.shape[1]] = taken
@@ -284,7 +287,7 @@ def _append(taken: Floats, newest: Floats) -> tuple[Floats, Floats]:
 
 
 def _bordered(small: Floats, columns: Floats) -> Floats:
-    """A symmetric matrix grown by its last columns (r, k)."""
+    """Symmetric matrix bordered by its last columns (r, k) and rows."""
     r, k = columns.shape
     grown = np.empty((r, r))
     grown[: r - k, : r - k] = small
@@ -294,7 +297,7 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
 
 
 def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[Branch, ...]:
-    """The large model's branches with the small model's stiffness."""
+    """The full model's Maxwell branches with the reduced stiffness."""
     return tuple(Branch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
 
 
@@ -312,7 +315,7 @@ def _probe_response(
     band: float,
 ) -> Complex:
     """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
-    # Nearly from rest: at rest itself a body that nothing holds has no answer.
+    # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
     w = 2 * np.pi * np.linspace(1e-3 * band, band, 41)
     # One by one: all at once would be as large as the body's own factors.
     fields = (np.linalg.solve(_impedance(K, C, branches, at)[0], seeds) for at in w[:, None])

@@ -1,15 +1,15 @@
-"""A flat sheet of large deflection in the coordinates z of its bending modes.
+"""Nonlinear reduced-order model of a flat sheet: large deflection in its bending modes z.
 
     w = shapes z,  M = 1,  energy = z^T K z / 2 + sum_k y_k^2 / 2,  y_k = z^T H_k z / 2
 
-What bending stretches, e(w, w) = grad w grad w^T / 2, the sheet evens out within its plane at
-once, its waves there being some hundred times faster. The strain that is left is compatible with
-no motion in the plane; it is expanded in states of stress s_k that are orthonormal in energy and in
-balance by themselves, and H_k is the stiffness that the stress s_k adds to bending. They are found
-from the finite elements: pairs of modes are enforced, the plane is solved for, and what is left is
-decomposed, the most energetic states first (implicit condensation: Hollkamp and Gordon, J Sound Vib
-318:1139 (2008); the equations are von Karman's with Airy's function, Thomas and Bilbao, J Sound
-Vib 315:569 (2008)).
+The in-plane motion follows the stretching of bending, e(w, w) = grad w grad w^T / 2, quasi-
+statically, because in-plane waves are some hundred times faster. The strain that is left is
+compatible with no in-plane motion; it is expanded in self-equilibrated states of stress s_k that
+are orthonormal in energy, and H_k is the geometric stiffness that the stress s_k adds to bending.
+They are found from the finite elements: pairs of modes are enforced, the in-plane problem is
+solved, and the incompatible strains are decomposed, the most energetic states first (implicit
+condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); the equations are von Karman's with
+Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
 """
 
 from collections.abc import Callable
@@ -39,16 +39,17 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
 
 PAIRS = 200  # of modes that are enforced
-RESONANT = 2 * np.pi * 200.0  # rad/s below which modes are taken to move equally far
+RESONANT = 2 * np.pi * 200.0  # rad/s below which modes are taken to have equal amplitudes
 SMALLEST_STATE = 1e-2  # of the energy norm of the largest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StretchingModes:
-    """A sheet in modal coordinates z (r,) in kg^1/2 m.
+    """Modal model of a sheet in coordinates z (r,) in kg^1/2 m.
 
-    `basis` (3 n, r) in kg^-1/2, `hz` (r,) natural frequencies, `H` (k, r, r), the share `left_out`
-    of the states of stress, and `elastic` for `nonlinear.static` and `nonlinear.dynamic`.
+    `basis` (3 n, r) in kg^-1/2, `hz` (r,) natural frequencies, `H` (k, r, r), the truncated share
+    `left_out` of the states of stress, and `elastic` for `nonlinear.static` and
+    `nonlinear.dynamic`.
     """
 
     basis: Floats
@@ -73,9 +74,9 @@ def stretching_modes(
     Parameters
     ----------
     operators : the sheet's linear operators, from `assemble`
-    membrane : all that resists stretching, among the nodes of the mesh
-    added : what moves with the sheet, as `added_mass` gives it; the modes with it are made of the
-        n lowest without
+    membrane : the whole membrane stiffness, among the nodes of the mesh
+    added : added mass of a fluid, as `added_mass` gives it; the modes with it are combinations of
+        the n lowest without
     """
     hz, shapes = modes(operators, n, solver=solver)
     damping: Any = 0.0
@@ -108,7 +109,7 @@ def stretching_modes(
 def _with_added(
     operators: Operators, added: Added, hz: Floats, shapes: Floats
 ) -> tuple[Floats, Floats]:
-    """Modes with a further mass, by Rayleigh and Ritz from those without."""
+    """Modes with an added mass, by the Rayleigh-Ritz method from those without."""
     mass = np.eye(len(hz)) + _projected(added.M, shapes[operators.free])
     squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
     return np.sqrt(squares) / (2 * np.pi), shapes @ turn
@@ -151,7 +152,7 @@ def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
 def _states_of_stress(
     part: Part, fixed: NDArray[np.bool_], slopes: Floats, hz: Floats, solver: str
 ) -> tuple[Floats, float]:
-    """Strains (k, e, q, k, l) of states of stress, orthonormal in energy; what is left out."""
+    """Strains (k, e, q, k, l) of states of stress, orthonormal in energy; the truncated share."""
     reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
     i, j = _strongest_pairs(reach)
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2)
@@ -177,7 +178,7 @@ def _strongest_pairs(reach: Floats) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Plane:
-    """Motion within the plane of a membrane."""
+    """In-plane elastostatics of a membrane."""
 
     part: Part
     moving: Ints  # of the 3 n components
@@ -193,7 +194,9 @@ class _Plane:
         return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
 
     def incompatible(self, e: Floats) -> Floats:
-        """A strain (e, q, k, l) less that of the motion which evens it out."""
+        """Incompatible part of a strain (e, q, k, l): less that of the in-plane displacement which
+        relieves it.
+        """
         f = np.zeros((self.part.D.shape[1], 3))
         f[:, :2] = spread_stress(self.part, stress(self.part, e))
         v = np.zeros(f.size)

@@ -1,9 +1,10 @@
-"""Stiffness that relaxes: springs that each stand in series with a dashpot (Maxwell's branches).
+"""Generalised Maxwell branches (Prony terms): springs in series with dashpots.
 
     f = K_j d,  d' = u' - d / tau,  at time exp(s t):  f = s tau / (1 + s tau) K_j u
 
-One branch beside the lasting K is the standard linear solid, or Zener's: C. Zener, Elasticity and
-Anelasticity of Metals (1948); Simo and Hughes, Computational Inelasticity (1998), chapter 10.
+The internal variable d is the stretch of the spring. One branch in parallel with the equilibrium K
+is the standard linear (Zener) solid: C. Zener, Elasticity and Anelasticity of Metals (1948); Simo
+and Hughes, Computational Inelasticity (1998), chapter 10.
 """
 
 from collections.abc import Sequence
@@ -18,31 +19,38 @@ from meshes.tetmesh import Floats
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Branch:
-    """`K` (n, n), N/m: stiffness of the springs, sparse or dense; `time` in s: of relaxation."""
+    """Generalised Maxwell branch: stiffness `K` (n, n) of its springs, N/m, sparse or dense, and
+    relaxation `time` in s.
+    """
 
     K: Any
     time: float
 
     def share(self, s: Any) -> Any:
-        """What of K is felt at the complex frequency s in rad/s, of any shape: 0 slow, 1 fast."""
+        """Fraction s tau / (1 + s tau) of K at complex frequencies s in rad/s, of any shape: 0 in
+        slow, 1 in fast motion.
+        """
         return s * self.time / (1 + s * self.time)
 
 
 def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:
-    """What branches add to K at the complex frequency s in rad/s; 0 if there are none."""
+    """Complex stiffness that branches add to K at the complex frequency s in rad/s; 0 if there are
+    none.
+    """
     return sum(branch.share(s) * branch.K for branch in branches)
 
 
 def pull(branches: Sequence[Branch], stretch: Floats) -> Any:
-    """Forces (n,) in N of springs that are stretched by (j, n) metre; 0 if there are none."""
+    """Branch forces (n,) in N at internal variables (j, n) in metre; 0 if there are none."""
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
 
 
 def factors(branch: Branch) -> tuple[Floats, float]:
-    """L (n, k) with K = L L^T, as many columns as K has rank, and the time in s.
+    """Low-rank factor L (n, k) of a branch, K = L L^T, as many columns as K has rank; and its time
+    in s.
 
-    With z = L^T (u - d) the branch is z' = (L^T u - z) / tau and pulls by L (L^T u - z): where a
-    spring is missing there is nothing to follow.
+    With z = L^T (u - d) the branch is z' = (L^T u - z) / tau with the force L (L^T u - z): it has
+    an internal variable only where it has a spring.
     """
     squares, vectors = np.linalg.eigh(branch.K)
     kept = squares > 1e-12 * squares.max()
@@ -50,7 +58,7 @@ def factors(branch: Branch) -> tuple[Floats, float]:
 
 
 def on_free(branches: Sequence[Branch], free: Any) -> tuple[Branch, ...]:
-    """The same on some of the degrees of freedom only."""
+    """Branches restricted to some of the degrees of freedom."""
     return tuple(
         Branch(K=sparse.csr_array(branch.K)[free][:, free], time=branch.time) for branch in branches
     )

@@ -1,4 +1,4 @@
-"""Rest and free vibration: K u = f, and K u = w^2 M u."""
+"""Statics and natural modes: K u = f, and K u = w^2 M u."""
 
 from collections.abc import Iterator
 
@@ -11,20 +11,20 @@ from fem.transient import Diverged
 from meshes.tetmesh import Floats
 
 FLOATING = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency: shifts of free bodies
-RIGID = 1e-14  # of it: a motion below is rigid
+RIGID = 1e-14  # of it: a mode below is a rigid-body mode
 MOST_RESTARTS = 40  # of Lanczos' method
 
 
 def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floats:
-    """Displacement (3 n,) or (3 n, k) in metre under nodal forces (3 n,) or (3 n, k) in N.
+    """Static displacement (3 n,) or (3 n, k) in metre under nodal forces (3 n,) or (3 n, k) in N.
 
-    One step of iterative refinement: thin sheets are conditioned so badly that a direct
-    solution alone leaves residuals near 1e-5.
+    One step of iterative refinement: thin sheets are so ill-conditioned that a direct solution
+    alone leaves residuals near 1e-5.
 
     Raises
     ------
     ValueError
-        If the body can move freely.
+        If the body is unconstrained.
     """
     factor = factorise(operators.K, backend=solver)
     f = force[operators.free]
@@ -33,9 +33,9 @@ def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floa
 
 
 def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats, Floats]:
-    """The n lowest natural frequencies (n,) in Hz and mass-normalised shapes (3 n, n).
+    """Natural modes: the n lowest frequencies (n,) in Hz and mass-normalised shapes (3 n, n).
 
-    Rigid motions of a free body come out near 0 Hz. Damping is left out.
+    Rigid-body modes of a free body are found near 0 Hz. Damping is left out.
 
     Raises
     ------
@@ -54,14 +54,14 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
         return frequencies, operators.expand(shapes[:, order])
     raise Diverged(
         f"the {n} lowest modes did not converge in {MOST_RESTARTS} restarts: the body is so thin "
-        "that round-off hides them; hold it, ask for more modes, or mesh a thicker equivalent"
+        "that round-off hides them; constrain it, ask for more modes, or mesh a thicker equivalent"
     )
 
 
 def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor]]:
-    """Shifts s and factorised K + s M: 0 where the body is held; where it floats, smaller and
-    smaller parts of the square of the mesh's highest frequency, which only a solid body's first
-    modes are above.
+    """Shifts s and factorised K + s M: 0 for a constrained body; for a free one, smaller and
+    smaller fractions of the square of the mesh's highest frequency, above which only a solid
+    body's first modes lie.
     """
     K, M = operators.K, operators.M
     scale = K.trace() / M.trace()
@@ -70,7 +70,7 @@ def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor
     except ValueError:
         held = False
     else:
-        # An inverse iteration ends near a rigid motion if there is one, whose K is round-off.
+        # An inverse iteration ends near a rigid-body mode if there is one, whose K is round-off.
         u = factor.solve(M @ np.random.default_rng(0).standard_normal(len(operators.free)))
         held = bool(u @ (K @ u) > RIGID * scale * (u @ (M @ u)))
     if held:

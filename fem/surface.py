@@ -1,4 +1,4 @@
-"""The surface of a body: what pushes it, and what reads it.
+"""Load and probe operators on the surface of a body.
 
 nodal forces = P q at the facets' quadrature points,  displacement into the body = S u
 """
@@ -13,11 +13,11 @@ from fem.elements import shape_derivatives, shape_functions, triangle_rule
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
-BESIDE = 1e-9  # barycentric: how far beside a facet a point still counts as on it
+BESIDE = 1e-9  # barycentric: how far outside a facet a point still counts as on it
 
 
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
-    """P (3 n, k q): nodal forces in N of pressures in Pa at the points of `facet_points`.
+    """Load operator P (3 n, k q): nodal forces in N of pressures in Pa at `facet_points`.
 
     Pressure pushes into the body, against the outward normal.
     """
@@ -34,11 +34,12 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
 def pressure_force(
     mesh: TetMesh, facets: str | Ints = "top", *, kind: str = "dead"
 ) -> Callable[[Floats, Floats], Floats]:
-    """Nodal forces (3 n,) in N of pressures (k q,) in Pa at a displacement (3 n,) in metre.
+    """Dead or follower load: a function that gives nodal forces (3 n,) in N of pressures (k q,) in
+    Pa at a displacement (3 n,) in metre.
 
-    A "dead" pressure keeps the direction and the area of the body at rest, as `load_operator`; a
-    "follower" pushes against the displaced surface: f_ai = -int N_a q (x_,1 x x_,2)_i (Belytschko,
-    Liu and Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6).
+    A "dead" pressure has the direction and the area of the body at rest, as `load_operator`; a
+    "follower" acts on the displaced surface: f_ai = -int N_a q (x_,1 x x_,2)_i (Belytschko, Liu and
+    Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6).
 
     Raises
     ------
@@ -77,17 +78,17 @@ def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
 def probe_operator(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> sparse.csr_array:
-    """S (p, 3 n): displacement into the body, in metre, at surface points (p, 2 or 3).
+    """Probe operator S (p, 3 n): displacement into the body, metre, at surface points (p, 2 or 3).
 
-    A point is carried along z onto the facets; positive is the way a pressure pushes, against the
-    normal of the facet; or, with a `patch` in metre, against the mean normal of the surface,
+    A point is projected along z onto the facets; positive is the direction of a pressure, against
+    the normal of the facet; or, with a `patch` in metre, against the mean normal of the surface,
     weighted by a Gaussian of that standard deviation about the point. Next to a crease the facet
     itself depends on the mesh.
 
     Raises
     ------
     ValueError
-        If a point lies beside the facets, or has no finite coordinates.
+        If a point lies outside the facets, or has no finite coordinates.
     """
     nodes = facet_set(mesh, facets)
     points = np.atleast_2d(np.asarray(points, np.float64))
@@ -119,7 +120,7 @@ def probe_operator(
 
 
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
-    """Normals (p, 3) of facets (k, a) about places (p, 3), weighted by area and distance."""
+    """Mean normals (p, 3) of facets (k, a) about places (p, 3), weighted by area and distance."""
     at = facet_points(mesh, nodes)
     squared = ((places[:, None] - at) ** 2).sum(axis=2)
     nearest = squared.min(axis=1, keepdims=True)  # of facets larger than the patch one is left
@@ -149,9 +150,10 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
 
 
 def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:
-    """Where (p, 3) curved facets (p, a, 2), seen along z, pass over points (p, 2): Newton's method.
+    """Barycentric coordinates (p, 3) of points (p, 2) on curved facets (p, a, 2) seen along z, by
+    Newton's method.
 
-    A point next to the edge of a bowed facet may lie a little beyond it, which is as good.
+    A point next to the edge of a bowed facet may lie a little beyond it, which does no harm.
     """
     for _ in range(4):
         N = shape_functions(barycentric, facets.shape[1])
@@ -171,8 +173,8 @@ def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> NDA
 
 
 def _nearest(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
-    """Which triangle (p,) of (k, 3, 2) each point (p, 2) lies in, or the least beside, and its
-    barycentric coordinates (p, 3) there.
+    """Index (p,) of the triangle (k, 3, 2) that each point (p, 2) lies in, or the least outside,
+    and its barycentric coordinates (p, 3) there.
     """
     origin, edges = triangles[:, 0], triangles[:, 1:] - triangles[:, :1]
     area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]

@@ -1,11 +1,11 @@
-"""M u'' + C u' + K u + sum_j K_j d_j = f(t), d_j' = u' - d_j / tau_j, from rest by the
-generalized-alpha method.
+"""Generalized-alpha time integration from rest of M u'' + C u' + K u + sum_j K_j d_j = f(t),
+d_j' = u' - d_j / tau_j.
 
 Chung and Hulbert, J Appl Mech 60:371 (1993), doi 10.1115/1.2900803. Spectral radius 1 is
 average acceleration (Newmark 1/4, 1/2), which conserves energy; 0 annihilates what the time
-step cannot resolve. Second order and unconditionally stable throughout. Springs that relax are
-stretched by d_j, which follows u by the trapezoidal rule: with average acceleration it loses what
-it should to round-off.
+step cannot resolve. Second order and unconditionally stable throughout. The internal variables d_j
+of generalised Maxwell branches are integrated by the trapezoidal rule: with average acceleration
+their dissipation is exact to round-off.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,13 +21,13 @@ from meshes.tetmesh import Floats
 
 
 class Diverged(ArithmeticError):
-    """A run whose numbers grew beyond all bounds."""
+    """A computation that diverged or did not converge."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """Time in s; displacement, velocity and acceleration (3 n,) in m, m/s and m/s2; `stretch`
-    (3 n,) in m of each of the operators' branches, none if all have relaxed.
+    """State at a time in s: displacement, velocity and acceleration (3 n,) in m, m/s and m/s2, and
+    the internal variables `stretch` (3 n,) in m of the Maxwell branches, none if all are relaxed.
     """
 
     time: float
@@ -46,14 +46,14 @@ def transient(
     initial: State | None = None,
     solver: str = "auto",
 ) -> Iterator[State]:
-    """States at 0, dt, 2 dt, ... without end: take what you need.
+    """States at 0, dt, 2 dt, ... by the generalized-alpha method, without end.
 
     Parameters
     ----------
     force : time in s -> nodal forces (3 n,) in N
     dt : float, s
-    spectral_radius : 0 to 1, amplitude kept per step by motion far beyond the time step
-    initial : where to start; at rest at time 0 if not given
+    spectral_radius : 0 to 1, factor per step on the amplitude of motion far above 1/dt
+    initial : state to start from; at rest at time 0 if not given
 
     Raises
     ------
@@ -65,7 +65,7 @@ def transient(
     a_m, a_f, beta, gamma = weights(dt, spectral_radius)
     K, C, M, free = operators.K, operators.C, operators.M, operators.free
     branches = operators.branches
-    stiff = K + relaxing_stiffness(branches, 2 / dt)  # the trapezoidal rule's place of s
+    stiff = K + relaxing_stiffness(branches, 2 / dt)  # s of the trapezoidal rule
     system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * stiff)
     factor = factorise(system, backend=solver)
     felt = np.array([[branch.share(2 / dt)] for branch in branches]).reshape(-1, 1)
@@ -104,7 +104,7 @@ def transient(
 
 
 def weights(dt: float, spectral_radius: float) -> tuple[float, float, float, float]:
-    """a_m, a_f, beta and gamma of the method of Chung and Hulbert (1993).
+    """Generalized-alpha parameters a_m, a_f, beta and gamma (Chung and Hulbert 1993).
 
     Raises
     ------
@@ -121,13 +121,15 @@ def weights(dt: float, spectral_radius: float) -> tuple[float, float, float, flo
 
 
 def at_rest(n_dofs: int) -> State:
-    """The state at time 0 of a body that has not been touched."""
+    """State of rest at time 0: no displacement, velocity or acceleration."""
     zero = np.zeros(n_dofs)
     return State(time=0.0, displacement=zero, velocity=zero, acceleration=zero)
 
 
 def acceleration(operators: Operators, unbalanced: Floats) -> Floats:
-    """M^-1 r by conjugate gradients: a consistent mass matrix scaled by its diagonal is benign."""
+    """Acceleration M^-1 r by conjugate gradients: a consistent mass matrix scaled by its diagonal
+    is well-conditioned.
+    """
     if not unbalanced.any():
         return np.zeros_like(unbalanced)
     scale = 1 / np.sqrt(operators.M.diagonal())

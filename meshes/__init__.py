@@ -1,4 +1,4 @@
-"""Tetrahedral bodies: what the moving pressure drives."""
+"""Tetrahedral meshes of bodies: structured, from files, and of a parametric palm."""
 
 from meshes.curved import curved
 from meshes.facets import named, seen_from_above

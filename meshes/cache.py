@@ -1,10 +1,11 @@
-"""Meshes and prepared bodies on disk, so that each is made once per machine.
+"""Disk cache of meshes and reduced bodies, so that each is computed once per machine.
 
-One file an entry, named by a hash of everything that it depends on. Entries are written aside
-and renamed, so that two processes cannot spoil each other's. Each holds a digest of its name and
-contents: an entry that cannot be read, was altered or bears another's name is a miss, and rebuilt.
-Above `LIMIT` the entries that were used longest ago are removed; a file with a name that is none of
-ours never is. `SKINWAVE_CACHE` names another folder, or nothing at all to keep none.
+One file an entry, named by a hash of everything that it depends on. Entries are written to a
+temporary file and renamed, so that two processes cannot corrupt each other's. Each contains a
+digest of its name and contents: an entry that cannot be read, was altered or has another's name is
+a cache miss, and rebuilt. Above `LIMIT` the least recently used entries are removed; a file whose
+name is not of the cache never is. `SKINWAVE_CACHE` names another folder; empty, it turns the cache
+off.
 """
 
 import contextlib
@@ -31,7 +32,7 @@ ABANDONED = 86_400.0  # s after which what was being written no longer is
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """How many entries there are in a folder, and their size in bytes."""
+    """Number of entries in a folder, and their size in bytes."""
 
     folder: Path
     entries: int
@@ -39,7 +40,7 @@ class Contents:
 
 
 def folder() -> Path | None:
-    """Where entries are kept; None if they are not."""
+    """Folder of the cache; None if the cache is off."""
     if (named := os.environ.get("SKINWAVE_CACHE")) is not None:
         return Path(named) if named else None
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
@@ -50,7 +51,7 @@ def folder() -> Path | None:
 
 
 def key(*parts: object) -> str:
-    """A name for everything that an entry depends on; arrays count by type, shape and bytes."""
+    """Cache key of everything that an entry depends on; arrays count by type, shape and bytes."""
     return digest(*parts)[:32]
 
 
@@ -68,7 +69,7 @@ def digest(*parts: object) -> str:
 
 
 def load(name: str) -> dict[str, Any] | None:
-    """The arrays of an entry, `meta` as what was stored; None if there is no sound one."""
+    """Arrays of an entry, and `meta` as it was stored; None on a cache miss."""
     home = folder()
     if home is None:
         return None
@@ -88,7 +89,7 @@ def load(name: str) -> dict[str, Any] | None:
 
 
 def store(name: str, meta: Mapping[str, Any], **arrays: np.ndarray) -> None:
-    """Keep an entry; a folder that cannot be written is no error, only slower next time."""
+    """Store an entry; a folder that cannot be written is no error, only a miss next time."""
     home = folder()
     if home is None or not all(np.isfinite(array).all() for array in arrays.values()):
         return
@@ -108,7 +109,7 @@ def store(name: str, meta: Mapping[str, Any], **arrays: np.ndarray) -> None:
 
 
 def contents() -> Contents | None:
-    """What is kept, and where; None if nothing is.
+    """Contents of the cache, and its folder; None if the cache is off.
 
     Raises
     ------
@@ -120,7 +121,7 @@ def contents() -> Contents | None:
 
 
 def clear() -> Contents | None:
-    """Remove all entries; which there were.
+    """Remove all entries; the contents that there were.
 
     Raises
     ------
@@ -142,7 +143,7 @@ def clear() -> Contents | None:
 
 
 def _keep_within(limit: int, home: Path, newest: str) -> None:
-    """Remove what was used longest ago until the rest is within a limit; the newest stays."""
+    """Evict the least recently used entries until the rest is within a limit; the newest stays."""
     found = sorted(_statuses(home), key=lambda each: each[1].st_mtime_ns)
     size = sum(status.st_size for _, status in found)
     for path, status in found:
@@ -180,6 +181,6 @@ def _summed(home: Path, found: Mapping[Path, os.stat_result]) -> Contents:
 
 
 def _contents(name: str, meta: object, arrays: Mapping[str, np.ndarray]) -> str:
-    """Digest of an entry: its name, what goes with it, and its arrays by name."""
+    """Digest of an entry: its name, its `meta`, and its arrays by name."""
     named = (part for field in sorted(arrays) for part in (field, arrays[field]))
     return digest(name, json.dumps(meta, sort_keys=True), *named)

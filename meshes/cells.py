@@ -1,4 +1,4 @@
-"""What cell arrays of mesh files mean: regions, facet sets, the order of an element's nodes.
+"""Cell arrays of mesh files: regions, facet sets, the order of an element's nodes.
 
 `raw` is a mesh as meshio reads it, `kind` one of its cell types.
 """
@@ -100,7 +100,7 @@ def outward(tets: Ints, sets: dict[str, Ints]) -> dict[str, Ints]:
 
 
 def node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
-    """Which column of each element is which node: mid-side nodes are told by where they are."""
+    """Node order: the column of each node; mid-side nodes are identified by their positions."""
     nodes = points[tets]
     middles = nodes[:, EDGES].mean(axis=2)
     length = np.linalg.norm(nodes[:, EDGES[:, 1]] - nodes[:, EDGES[:, 0]], axis=2)

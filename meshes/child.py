@@ -1,4 +1,4 @@
-"""Work that may crash or never end, in a process of its own."""
+"""Subprocesses with limits of time and memory, for work that may crash or never end."""
 
 import math
 import os
@@ -17,7 +17,7 @@ REFUSED = 3  # code of a script that said what is wrong with a file
 
 
 class Refused(MeshError):
-    """What a script said of a file that it refused, and ended with `REFUSED`."""
+    """Refusal of a file by a script that ended with `REFUSED`, with its message."""
 
 
 def read(script: str, path: Path, *arguments: object, folder: str | os.PathLike[str]) -> None:

@@ -1,4 +1,4 @@
-"""Where a triangulated surface crosses itself.
+"""Self-intersection of a triangulated surface.
 
 Two triangles cross if a side of one pierces the other, or if they overlap in one plane.
 Candidates are triangles whose bounding boxes share a cell of a grid.
@@ -15,7 +15,7 @@ CHUNK = 200_000  # pairs tested at once
 
 
 def self_crossings(surface: Surface) -> Ints:
-    """Pairs (m, 2) of triangles that cross or overlap; touching at what they share is none."""
+    """Pairs (m, 2) of triangles that intersect or overlap; contact at shared corners is neither."""
     corners = surface.points[surface.triangles] - surface.points.mean(axis=0)
     pairs = _candidates(corners)
     found = [
@@ -63,7 +63,7 @@ def _same_cell(cells: Ints, owner: Ints) -> Ints:
 
 
 def _cross(corners: Floats, triangles: Ints, pairs: Ints) -> np.ndarray:
-    """Which pairs (m,) cross."""
+    """Mask (m,) of the pairs that cross."""
     p, q = corners[pairs[:, 0]], corners[pairs[:, 1]]
     shared = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
     common = shared.sum(axis=(1, 2))
@@ -73,7 +73,7 @@ def _cross(corners: Floats, triangles: Ints, pairs: Ints) -> np.ndarray:
     crossing = np.zeros(len(pairs), bool)
     for j in range(3):
         k = (j + 1) % 3
-        # A side that starts or ends at a shared corner touches there, and is not asked.
+        # A side that starts or ends at a shared corner touches there, and is not tested.
         free_p = ~shared[:, [j, k]].any(axis=(1, 2))
         free_q = ~shared[:, :, [j, k]].any(axis=(1, 2))
         crossing |= free_p & _pierces(p[:, j], p[:, k], p_to_q[:, j], p_to_q[:, k], q, scale)

@@ -39,9 +39,9 @@ def named(mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.nda
 
 
 def seen_from_above(mesh: TetMesh) -> np.ndarray:
-    """Which boundary facets (k,) look upwards, and have nothing of the body above them.
+    """Mask (k,) of the boundary facets that face upwards and have nothing of the body above them.
 
-    In the order of `boundary_facets`; of each facet the centroid is asked.
+    In the order of `boundary_facets`; each facet is tested at its centroid.
     """
     from scipy.spatial import cKDTree
 

@@ -1,4 +1,4 @@
-"""Meshes in files: the only place that knows meshio.
+"""Mesh files, read and written with meshio.
 
 A mesh is written with its regions and facet sets, and is read as it was. In `.vtu`, the cell array
 `region` numbers the tetrahedra, and each facet set is a block of triangles for which the cell array
@@ -70,7 +70,7 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
 
 
 def read_here(path: Path, scale: float) -> TetMesh:
-    """What `read` does, in this process: only for `mesh_child.py`, which has limits."""
+    """Read a mesh in this process: only for `mesh_child.py`, which has limits."""
     raw = _meshio_read(path)
     try:
         return _mesh(path, raw, scale)
@@ -81,7 +81,7 @@ def read_here(path: Path, scale: float) -> TetMesh:
 
 
 def _mesh(path: Path, raw: Any, scale: float) -> TetMesh:
-    """The mesh in what meshio has read."""
+    """The mesh of what meshio has read."""
     blocks = {"tetra": 4, "tetra10": 10}
     kinds = [block.type for block in raw.cells]
     found = sorted({kind for kind in kinds if kind in blocks})
@@ -174,7 +174,7 @@ def existing(path: str | os.PathLike[str], formats: tuple[str, ...]) -> Path:
 
 
 def scale_of(unit: str) -> float:
-    """Metre of a unit's name.
+    """Size in metre of a unit, by its name.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def _umask() -> int:
 
 
 def _meshio_read(path: Path) -> Any:
-    """What meshio makes of a file; it prints, warns, and ends the process on what it cannot."""
+    """Read a file with meshio, which prints, warns, and ends the process on what it cannot read."""
     import meshio
 
     kind = {".vtu": "vtu", ".msh": "gmsh", ".inp": "abaqus"}[path.suffix.lower()]

@@ -1,4 +1,4 @@
-"""From any file to a body under the device."""
+"""Import of a body from a surface or mesh file, placed under the device."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ from meshes.surface import Surface, check, repaired, volume
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
 from meshes.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
 
-FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; cells; of h
+FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h
 SMALLEST, LARGEST = 5e-3, 2.0  # m: diagonal of what can be a hand, or part of one
 
 Say = Callable[[str], None]

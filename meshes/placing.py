@@ -1,4 +1,4 @@
-"""From a surface anywhere in space to one under the device: turned, centred, cut."""
+"""Alignment of a surface with the device: turned, centred, clipped."""
 
 from collections.abc import Sequence
 
@@ -88,7 +88,7 @@ def height_at(surface: Surface, x: float, y: float) -> float:
 def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
     """The closed part of a closed surface within a box, and sentences on what was cut.
 
-    Of several pieces the one with the origin below its top is kept.
+    Of several pieces the one with the origin below its top is returned.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How good tetrahedra are: angles, sizes, and how far curved sides distort them."""
+"""Element quality of tetrahedra: angles, sizes, and distortion by curved sides."""
 
 from itertools import combinations
 

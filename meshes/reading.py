@@ -1,4 +1,4 @@
-"""The door for files of users: regular files of a limited size, whatever their contents claim."""
+"""Safe reading of users' files: regular files of a limited size, whatever their contents claim."""
 
 import json
 import os
@@ -89,12 +89,12 @@ def arrays(path: PathLike) -> dict[str, NDArray[Any]]:
 
 
 def parsed(path: PathLike) -> Any:
-    """What a JSON file holds.
+    """Parsed content of a JSON file.
 
     Raises
     ------
     ValueError
-        If it holds none.
+        If it is no JSON.
     """
     found = text(path)
     try:

@@ -1,4 +1,4 @@
-"""Ready-made meshes, so that nothing ordinary needs the mesher, which differs from run to run.
+"""Built-in meshes, so that nothing ordinary needs the mesher, which differs from run to run.
 
 `python -m meshes.remake FOLDER` makes them anew, with their checksums.
 """
@@ -19,7 +19,7 @@ CHECKSUMS = "SHA256SUMS"
 
 
 def ready(name: str) -> TetMesh:
-    """A mesh of 10-node tetrahedra that comes with the package.
+    """Built-in mesh of 10-node tetrahedra, which comes with the package.
 
     `palm` and `flat-palm` (elements of 5 mm) have the facet sets of `palm_mesh`; `slab` (60 x 60 x
     15 mm, elements of 4 mm) has `top`, `bottom`, `sides` and `surface`.
@@ -33,11 +33,11 @@ def ready(name: str) -> TetMesh:
     sums = {file: checksum for checksum, file in map(str.split, lines)}
     if f"{name}.npz" not in sums:
         known = ", ".join(sorted(Path(file).stem for file in sums))
-        raise MeshError(f"there is no ready mesh '{name}'; there are: {known}")
+        raise MeshError(f"there is no built-in mesh '{name}'; there are: {known}")
     content = (HOME / f"{name}.npz").read_bytes()
     if hashlib.sha256(content).hexdigest() != sums[f"{name}.npz"]:
         raise MeshError(
-            f"the ready mesh '{name}' is not what its checksum says; install the package again"
+            f"the built-in mesh '{name}' is not what its checksum says; install the package again"
         )
     with np.load(io.BytesIO(content)) as stored:
         mesh = TetMesh(points=stored["points"], tets=stored["tets"])

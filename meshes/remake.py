@@ -1,4 +1,4 @@
-"""Makes the meshes that come with the package: `python -m meshes.remake FOLDER`.
+"""Build the meshes that come with the package: `python -m meshes.remake FOLDER`.
 
 They differ from run to run, by what the mesher finds.
 """

@@ -1,4 +1,4 @@
-"""Tetrahedra made more even without changing which nodes they join.
+"""Smoothing of tetrahedral meshes without change of their connectivity.
 
 Each inner node goes to the mean of the centroids of its elements, weighted by how large they are
 compared to what is asked for: the centroidal patches of Chen and Holst, Comput Methods Appl Mech

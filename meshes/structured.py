@@ -1,4 +1,4 @@
-"""Structured bodies: triangulated rectangles extruded downwards, three tetrahedra a prism.
+"""Structured meshes: triangulated rectangles extruded downwards, three tetrahedra a prism.
 
 The driven surface is the plane z = 0 with the body below it, centred on the origin.
 Ordering the nodes of each triangle by the parity of their grid position before it is extruded
@@ -25,17 +25,17 @@ from meshes.tetmesh import (
     quadratic,
 )
 
-CLOSEST = 0.4  # of a cell: a grid line nearer to a plane gives way to it
+CLOSEST = 0.4  # of a cell: a grid line nearer to a plane is replaced by it
 MOST_UNKNOWNS = 3_000_000  # of a mesh: beyond it no factorisation fits in a workstation
 
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
-    """Fine where the focus travels, coarser away from it.
+    """Grading of cell sizes: fine where the focus travels, coarser away from it.
 
     Parameters
     ----------
-    radius : float, metre, half width of the square that keeps the fine size.
+    radius : float, metre, half width of the square of fine cells.
     growth : float, ratio of one cell to its neighbour outside the square and downwards.
     coarsest : float, metre, largest cell.
 
@@ -285,7 +285,7 @@ def check_size(cells: Iterable[float], order: int = 2) -> None:
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
     if not unknowns <= MOST_UNKNOWNS:
         raise MeshError(
-            f"the mesh would have {unknowns:.2g} unknowns or more, the limit is "
+            f"the mesh would have {unknowns:.2g} degrees of freedom or more, the limit is "
             f"{MOST_UNKNOWNS:,}; take larger elements or a smaller body"
         )
 

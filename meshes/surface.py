@@ -56,7 +56,7 @@ class Surface:
 
     @property
     def diagonal(self) -> float:
-        """Of the bounding box, metre."""
+        """Diagonal of the bounding box, metre."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
@@ -78,7 +78,7 @@ def thinnest(surface: Surface) -> float:
 
 
 def check(surface: Surface) -> None:
-    """That a surface is one closed manifold, seen from outside, that does not cross itself.
+    """Check that a surface is one closed manifold, seen from outside, without self-intersection.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def compact(points: Floats, triangles: Ints) -> Surface:
 
 
 def pieces(surface: Surface) -> Ints:
-    """Which connected piece (k,) each triangle belongs to."""
+    """Index (k,) of the connected piece that each triangle belongs to."""
     from scipy import sparse
 
     ends = surface.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T
@@ -169,7 +169,7 @@ def pieces(surface: Surface) -> Ints:
 
 
 def n_pieces(surface: Surface) -> int:
-    """How many connected pieces the surface is made of."""
+    """Number of connected pieces of the surface."""
     return int(pieces(surface).max()) + 1
 
 
@@ -217,7 +217,7 @@ def _paired_edges(surface: Surface) -> Ints:
 
 
 def _turned(surface: Surface) -> np.ndarray:
-    """Which triangles (k,) must be turned round so that all of each piece look outwards."""
+    """Mask (k,) of the triangles to turn round so that all of each piece face outwards."""
     from scipy import sparse
 
     pairs, n = _paired_edges(surface), len(surface.triangles)
@@ -242,7 +242,7 @@ def _turned(surface: Surface) -> np.ndarray:
 
 
 def _check_fans(surface: Surface, pairs: Ints) -> None:
-    """That the triangles around each point are one fan."""
+    """Check that the triangles around each point are one fan."""
     from scipy import sparse
 
     n = surface.triangles.size
@@ -274,7 +274,7 @@ def _same_points(surface: Surface) -> Ints:
 
 
 def _at(surface: Surface, side: int) -> str:
-    """Where a side of a triangle is."""
+    """Position of a side of a triangle, as text."""
     triangle, corner = divmod(int(side), 3)
     ends = surface.triangles[triangle, [corner, (corner + 1) % 3]]
     return _place(surface.points[ends].mean(axis=0))

@@ -1,4 +1,4 @@
-"""Surfaces in files, read with VTK in a process of its own."""
+"""Surface files, read with VTK in a process of its own."""
 
 import os
 import tempfile

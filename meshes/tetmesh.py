@@ -1,4 +1,4 @@
-"""The one mesh record, and the few questions that are asked of it.
+"""Tetrahedral mesh with regions and facet sets, and the queries on it.
 
 Local numbering is VTK's: corners 0 1 2 3, then the mid-side nodes of the edges
 01 12 02 03 13 23. Facets are numbered corners first, mid-side nodes after, and
@@ -40,7 +40,7 @@ class TetMesh:
     points : (n, 3) float, metre
     tets : (m, 4) or (m, 10) int, node numbers in VTK order. Tetrahedra with negative
         volume are turned round; how many is logged.
-    region : (m,) int, which material each tetrahedron is made of; all 0 if not given.
+    region : (m,) int, number of the material of each tetrahedron; all 0 if not given.
     facets : name -> (k, 3) or (k, 6) int, boundary facets seen from outside.
 
     Raises

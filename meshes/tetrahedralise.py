@@ -1,9 +1,10 @@
-"""Tetrahedra within any closed surface, by fTetWild (Hu et al. 2020, doi 10.1145/3386569.3392385).
+"""Tetrahedral meshing of any closed surface, by fTetWild (Hu et al. 2020, doi
+10.1145/3386569.3392385).
 
 The mesher differs from run to run, crashes on what it cannot read, never ends on some sizes, and
 returns nothing for bodies thinner than its envelope. So its input is checked, it runs in a process
-and a folder of its own with a time limit, its result is checked, and kept on disk: the same body is
-meshed once per machine.
+and a folder of its own with a time limit, its result is checked, and cached on disk: the same body
+is meshed once per machine.
 """
 
 import logging
@@ -33,7 +34,7 @@ MOST_TETRAHEDRA = 1_000_000
 SHARPEST = 5.0  # degrees: least dihedral angle of a mesh that is accepted
 VOLUME_ERROR = 0.005
 LOST_SHELL = 0.3  # of the shell between surface and envelope: what chords of curves may cut off
-GRID_CELLS = 32  # along the longest side of the grid that carries the sizes
+GRID_CELLS = 32  # along the longest side of the background grid of sizes
 
 
 def tetrahedralise(
@@ -119,7 +120,7 @@ def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:
-    """That an edge length in metre is one that the body can be meshed with.
+    """Check that a body can be meshed with an edge length in metre.
 
     Raises
     ------
@@ -135,7 +136,7 @@ def check_size(surface: Surface, name: str, length: float) -> None:
 
 
 def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, np.ndarray]:
-    """Tetrahedra around the body with the edge length (n,) aimed at by each of their points."""
+    """Background mesh around the body, with the edge length (n,) aimed at by each of its points."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     pad = 0.05 * (high - low).max()
     cells = np.maximum(2, np.ceil(GRID_CELLS * (high - low) / (high - low).max())).astype(int)
@@ -163,7 +164,7 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
 
 
 def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndarray]:
-    """What the mesher makes of its input, in a process and a folder of its own."""
+    """Run the mesher on its input, in a process and a folder of its own."""
     if find_spec("pytetwild") is None:
         raise MeshError(
             "tetrahedra need the package pytetwild, which is not installed and has no wheel for "

@@ -29,7 +29,7 @@ def _end_with_input() -> None:
 
 
 def _end_with_parent() -> None:
-    """The same by the kernel of Linux, also while compiled code lets no other thread run."""
+    """End with the parent by Linux's kernel, also while compiled code blocks all other threads."""
     if sys.platform == "linux":
         import ctypes
 
@@ -38,7 +38,7 @@ def _end_with_parent() -> None:
 
 
 def _limit_memory(most: int) -> None:
-    """Of data, not of addresses: VTK maps more than a gigabyte that it never touches."""
+    """Limit data, not address space: VTK maps more than a gigabyte that it never touches."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 

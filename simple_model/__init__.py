@@ -1,4 +1,4 @@
-"""What is commanded, and every answer that needs no mesh."""
+"""Tactons, the load that they put on the skin, and all models without a mesh."""
 
 from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import array_field, focal_spot, relative_intensity

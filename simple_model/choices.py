@@ -1,4 +1,4 @@
-"""One sentence for a word that is not among those that are known."""
+"""Error message for an unknown name, with the nearest known one."""
 
 import difflib
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ SHORTEST, LONGEST = 3, 60  # letters: of a part of a word that is near, and that
 
 
 def choose(what: str, value: str, known: Iterable[str]) -> str:
-    """The value, if it is known.
+    """Return the value, if it is among those known.
 
     Raises
     ------
@@ -24,7 +24,7 @@ def choose(what: str, value: str, known: Iterable[str]) -> str:
 
 
 def meant(value: object, known: Iterable[str]) -> str:
-    """The end of a sentence that suggests the nearest word, or nothing if none is near."""
+    """Suggestion of the nearest word, to end a sentence; empty if none is near."""
     words, said = {word.lower(): word for word in known}, str(value)[:LONGEST].lower()
     near = difflib.get_close_matches(said, words, 1, NEAR)
     if not near and len(said) >= SHORTEST:

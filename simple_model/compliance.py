@@ -1,4 +1,4 @@
-"""How far a pressure pushes in the surface of an endless body: u = G q at each wavenumber.
+"""Surface compliance (Green's function) of laterally infinite bodies: u = G q at each wavenumber.
 
 Frequencies w are complex, in rad/s; time goes as exp(+i w t).
 """
@@ -15,9 +15,10 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Compliance:
-    """G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f, 1) in rad/s.
+    """Compliance G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w
+    (f, 1) in rad/s.
 
-    At frequencies w (f,) no wave has its wavenumber between the real axis and `clearance`, 1/m,
+    At frequencies w (f,) no pole (wave) lies between the real axis of k and `clearance`, 1/m,
     above it.
     """
 
@@ -25,20 +26,22 @@ class Compliance:
     clearance: Callable[[Complex], float] = lambda w: inf
 
     def __call__(self, k: Complex, w: Complex) -> Complex:
-        """G at each k and w."""
+        """Compliance G at each k and w."""
         return self.answer(k, w)
 
 
 AIR_DENSITY = 1.2  # kg/m3
-LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for rest in a slab
-BACKWARD = 0.5  # of a layer's second resonance: where some of its waves begin to run backwards
+LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for 0 in a slab
+BACKWARD = 0.5  # of a layer's second resonance: where some of its modes become backward waves
 
 
 def half_space(
     *, density: float, shear_modulus: float, poisson: float, viscosity: float = 0.0,
     loss_factor: float = 0.0, relaxing_modulus: float = 0.0, relaxation_time: float = 0.0,
 ) -> Compliance:  # fmt: skip
-    """G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s; 0 <= poisson <= 0.5."""
+    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s; poisson from 0
+    to 0.5.
+    """
     law = {
         "viscosity": viscosity, "loss_factor": loss_factor,
         "relaxing_modulus": relaxing_modulus, "relaxation_time": relaxation_time,
@@ -61,7 +64,7 @@ def slab(
     viscosity: float = 0.0, loss_factor: float = 0.0, relaxing_modulus: float = 0.0,
     relaxation_time: float = 0.0,
 ) -> Compliance:  # fmt: skip
-    """A layer of `depth` metre bonded to a rigid base; poisson < 0.5.
+    """Laterally infinite layer of `depth` metre bonded to a rigid base; poisson < 0.5.
 
     Potentials phi = A e^{bp z} + B e^{-bp (z + H)} and psi likewise meet zero displacement at
     the base and unit pressure without shear at the top: four equations for each k and w, whose
@@ -92,10 +95,10 @@ def slab(
         return (p * (a - b * ep) - k * (c + d * es)) / mu
 
     def clearance(w: Complex) -> float:
-        """Where waves of a layer run backwards, from somewhat below its second resonance, their
-        wavenumbers lie above the real axis by more than a shear wave's decay, as they carry energy
-        more slowly (Tolstoy and Usdin, J Acoust Soc Am 29:37 (1957)). Those that do not run at
-        all lie above 1 / depth.
+        """Height above the real axis below which there is no pole. Backward waves, which occur from
+        somewhat below the layer's second resonance, have theirs above it by more than a shear
+        wave's decay, as they carry energy more slowly (Tolstoy and Usdin, J Acoust Soc Am 29:37
+        (1957)). Evanescent waves have theirs above 1 / depth.
         """
         ks2, kp2 = _squared_wavenumbers(
             density, complex_modulus(w, shear_modulus, **law), poisson, w
@@ -112,12 +115,12 @@ def thin_sheet(
     viscous_lag: float = 0.0, relaxing_share: float = 0.0, relaxation_time: float = 0.0,
     air_density: float = AIR_DENSITY,
 ) -> Compliance:  # fmt: skip
-    """G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
+    """Infinite thin sheet: G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
 
     D* = D (1 + i eta + i w lag + share i w tau / (1 + i w tau)).
 
-    Under a steady push an endless sheet gives way without bound: its motion is told about a mean
-    that is left out, G = 0 at rest.
+    The deflection of an infinite sheet under a static load has no bound: motion is given about a
+    mean that is left out, G = 0 at w = 0.
     """
 
     def bending(w: Complex) -> Complex:
@@ -131,9 +134,9 @@ def thin_sheet(
         return np.where(w == 0, 0, 1 / (bending(w) * k**4 - inertia))
 
     def clearance(w: Complex) -> float:
-        """Where what does not run is found: D* k^5 - m w^2 k - 2 rho_air w^2 = 0 in the first
-        quadrant, at 90 degrees for a real w, but at 45 in vacuum and 36 in air for one that only
-        decays.
+        """Height above the real axis of the evanescent pole: D* k^5 - m w^2 k - 2 rho_air w^2 = 0
+        in the first quadrant, at 90 degrees for a real w, but at 45 in vacuum and 36 in air for a w
+        that is purely imaginary.
         """
         companion = np.zeros((len(w), 5, 5), np.complex128)
         companion[:, range(1, 5), range(4)] = 1
@@ -150,7 +153,7 @@ def complex_modulus(
     w: Complex, modulus: float, *, viscosity: float, loss_factor: float, relaxing_modulus: float,
     relaxation_time: float,
 ) -> Complex:  # fmt: skip
-    """Kelvin and Voigt's law, a hysteretic loss and the standard linear solid's, at w in rad/s."""
+    """Complex modulus of a hysteretic Kelvin-Voigt solid with a Maxwell branch, at w in rad/s."""
     # Frequencies are never below 0 here, so that a hysteretic loss has one sign.
     turned = 1j * w * relaxation_time
     relaxing = relaxing_modulus * turned / (1 + turned)
@@ -160,6 +163,6 @@ def complex_modulus(
 def _squared_wavenumbers(
     density: float, mu: Complex, poisson: float, w: Complex
 ) -> tuple[Complex, Complex]:
-    """k_s^2 and k_p^2."""
+    """Squared wavenumbers k_s^2 and k_p^2 of shear and pressure waves."""
     ks2 = density * w**2 / mu
     return ks2, ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)

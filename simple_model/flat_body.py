@@ -1,7 +1,8 @@
-"""Exact waves without a mesh: a half-space, a slab on a rigid base, or a thin sheet, endless.
+"""Wavenumber-integral solution, without a mesh, for a half-space, an infinite slab on a rigid base
+or an infinite thin sheet.
 
-A pressure q pushes the surface by u = G q at each wavenumber k and complex frequency w (time
-exp(+i w t)). A spot S of unit pressure at the focus moves a point at distance r by
+A pressure q displaces the surface by u = G q at each wavenumber k and complex frequency w (time
+exp(+i w t)). A focal spot S of unit pressure at the focus displaces a point at distance r by
 
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
@@ -10,12 +11,12 @@ and a focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe
     u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(|x_p - X(a)|, w) exp(-2 pi i n a) da
 
 where Q is the transform of the pressure at the focus. A recorded path may be long and run through
-once; with splines B_j(r) that carry g(r, w) = sum_j g_j(w) B_j(r), it moves the probe by
+once; with splines B_j(r) that interpolate g(r, w) = sum_j g_j(w) B_j(r), it moves the probe by
 
     u(w) = sum_j g_j(w) int q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
 
-The path of integration over k runs above the real axis, away from the poles of waves, which lie
-below it for any loss; and below those of waves that run backwards, which lie above it.
+The path of integration over k runs above the real axis, away from the poles of forward waves, which
+lie below it for any loss; and below those of backward waves, which lie above it.
 """
 
 import time
@@ -48,7 +49,7 @@ WRAPPED = 1e-5
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
 AT_ONCE = 2**19  # pairs of frequency and wavenumber: some hundred megabytes
-FEW_DISTANCES = 40  # are answered one by one, without a spline
+FEW_DISTANCES = 40  # are integrated one by one, without a spline
 UNRESOLVED = "the wavenumber integral does not converge; add some loss"
 CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
@@ -63,14 +64,15 @@ def point_response(
     *,
     negligible: float = 0.0,
 ) -> Complex:
-    """g(r, w) (f, r) in m/Pa: a Gaussian spot of 1 Pa and standard deviation `width` metre.
+    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa and standard deviation
+    `width` metre.
 
     Parameters
     ----------
     distances : (r,) float, metre
     frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
     negligible : a batch of frequencies that stays below this fraction of the largest response so
-        far is the last one answered; for frequencies that rise
+        far is the last one computed; for frequencies that rise
 
     Raises
     ------
@@ -97,9 +99,9 @@ def point_response(
 def steady_lines(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz >= 0 and complex amplitudes (f, p) in metre of the steady state.
+    """Steady-state lines: frequencies (f,) in Hz >= 0 and complex amplitudes (f, p) in metre.
 
-    Only the lines that the load contains above `threshold` of its strongest are answered.
+    Only the lines that the load contains above `threshold` of its strongest are computed.
     Amplitude a stands for Re a exp(2 pi i f t). Probes may be a whole map.
 
     Raises
@@ -126,10 +128,10 @@ def steady_lines(
 def steady_state(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Motion of probes (p, 2) in metre at equally spaced times (t,) in s, as if the load had
+    """Steady state of probes (p, 2) in metre at equally spaced times (t,) in s, as if the load had
     always been there: all its lines below half the sampling rate.
 
-    That is `flat_body` without what its start leaves ringing, for a twentieth of the time.
+    That is `flat_body` without its initial transient, for a twentieth of the time.
 
     Raises
     ------
@@ -151,9 +153,9 @@ def flat_body(
 ) -> Response:
     """Motion of probes (p, 2) in metre from rest, at equally spaced times (t,) in s.
 
-    By FFT over twice the duration with exponential damping, which takes what wraps round to
-    1e-5. What is above half the sampling rate is left out. The rest position is that before the
-    load: a pressure that never stops pushes an infinite sheet ever further.
+    By FFT over twice the duration with exponential damping, which reduces the wrap-around to 1e-5.
+    Lines above half the sampling rate are left out. The rest position is that before the load: the
+    deflection of an infinite sheet under a load with non-zero mean grows without bound.
 
     Raises
     ------
@@ -179,7 +181,7 @@ def flat_body(
 def _timed(
     model: str, started: float, times: Floats, probes: Floats, displacement: Floats, **effort: int
 ) -> Response:
-    """The response, with the seconds since it was started on."""
+    """The response, with the seconds since its computation started."""
     seconds = {"evaluate": time.perf_counter() - started}
     return Response(
         model=model,
@@ -259,7 +261,7 @@ def _recorded(
 
 
 def _table(furthest: float, width: float) -> Floats:
-    """Distances (j,) in metre that carry every other: g is as smooth as the spot."""
+    """Distances (j,) in metre to interpolate between: g is as smooth as the focal spot."""
     return np.linspace(0, furthest, max(8, int(np.ceil(furthest / width * 6))))
 
 
@@ -272,11 +274,11 @@ def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpli
 def _check(pressure: MovingPressure) -> None:
     check_lines(pressure)
     if pressure.focus != "gaussian":
-        raise ValueError(f"focus '{pressure.focus}' has no flat-body answer; use 'gaussian'")
+        raise ValueError(f"focus '{pressure.focus}' has no flat-body solution; use 'gaussian'")
 
 
 def _lift(compliance: Compliance, r: Floats, w: Complex, width: float) -> float:
-    """How far above the real axis, 1/m, the path of integration runs."""
+    """Height above the real axis, 1/m, of the path of integration."""
     highest = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
     lift = min(highest, compliance.clearance(w))
     if not lift > 0:
@@ -328,7 +330,7 @@ def _on_path(
     w: ArrayLike,
     negligible: float = 0.0,
 ) -> Complex:
-    """g (f, p, k) from knots of the path to the probes."""
+    """Point response g (f, p, k) from knots of the path to the probes."""
     distance = _distances(pressure, probes)
     return _response_at(compliance, pressure, distance, w, negligible)(distance)
 
@@ -340,7 +342,9 @@ def _response_at(
     w: ArrayLike,
     negligible: float = 0.0,
 ) -> Callable[[Floats], Complex]:
-    """g (f, ...) at any of these distances in metre: itself at few, splined between for many."""
+    """Point response g (f, ...) at any of these distances in metre: computed at each of few,
+    interpolated by a spline between many.
+    """
     width = spot_width(pressure.height)
     unique = np.unique(distance)
     if len(unique) <= FEW_DISTANCES:

@@ -1,4 +1,4 @@
-"""The focal spot, and the phased array that it comes from.
+"""Focal spot (pressure profile about the focus), and the phased array that makes it.
 
 A 16 x 16 array of circular pistons (pitch 10.3 mm, 40 kHz, as Ultraleap's STRATOS Explore):
 
@@ -27,7 +27,7 @@ NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
 
 # Force on a disc of radius 10 mm about the focus by height, relative to 200 mm: `array_field`.
-# This is what a scale under the array reads, and it alone has its maximum at 200 mm.
+# A balance measures this force, and it alone has its maximum at 200 mm.
 _HEIGHTS = np.array([20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600])
 _FORCES = np.array(
     [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
@@ -70,7 +70,7 @@ def relative_intensity(height: float) -> float:
 
 
 def lobe_width(height: float) -> float:
-    """D0 in metre, distance from the focus to the first zero, at a height in metre."""
+    """Main-lobe radius D0 in metre, from the focus to the first zero, at a height in metre."""
     above = height - NOMINAL_HEIGHT
     return 11.6e-3 + 46.5e-3 * above + 25e-3 * above**2
 
@@ -78,7 +78,7 @@ def lobe_width(height: float) -> float:
 def focal_spot(
     offsets: ArrayLike, height: float = NOMINAL_HEIGHT, focus: str = "main_lobe"
 ) -> Floats:
-    """S: intensity relative to the focus (...) at offsets (..., 2) in metre from it.
+    """Focal spot S: intensity relative to the focus (...) at offsets (..., 2) in metre from it.
 
     Parameters
     ----------
@@ -93,22 +93,22 @@ def focal_spot(
 
 
 def moved_spot(points: Floats, centres: Floats, height: float, focus: str) -> Floats:
-    """S (..., n) at points (n, 2) for the focus at centres (..., 2), in metre."""
+    """Focal spot S (..., n) at points (n, 2) for the focus at centres (..., 2), in metre."""
     if focus == "array":
         return focal_spot(points - centres[..., None, :], height, focus)
-    # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way to have it.
+    # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way.
     x, c = points / _scale(height, focus), centres / _scale(height, focus)
     left = np.stack([*np.moveaxis(-2 * c, -1, 0), (c**2).sum(axis=-1), np.ones(c.shape[:-1])], -1)
     return _round_spot(left @ np.stack([*x.T, np.ones(len(x)), (x**2).sum(axis=1)]), focus)
 
 
 def _scale(height: float, focus: str) -> float:
-    """The length in metre in which a round spot is exp(-D^2) or (sin D / D)^2."""
+    """Length in metre in which an axisymmetric focal spot is exp(-D^2) or (sin D / D)^2."""
     return np.sqrt(2) * spot_width(height) if focus == "gaussian" else lobe_width(height) / np.pi
 
 
 def _round_spot(squared: Floats, focus: str) -> Floats:
-    """The spot at squared distances (...), which it overwrites."""
+    """Axisymmetric focal spot at squared distances (...), which it overwrites."""
     if focus == "gaussian":
         return np.exp(np.negative(squared, out=squared), out=squared)
     angle = np.sqrt(np.maximum(squared, 1e-18, out=squared), out=squared)  # 1 to the last digit
@@ -118,28 +118,28 @@ def _round_spot(squared: Floats, focus: str) -> Floats:
 
 
 def spot_width(height: float) -> float:
-    """Standard deviation in metre of the Gaussian spot at a height in metre."""
+    """Standard deviation in metre of the Gaussian focal spot at a height in metre."""
     return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
 
 
 def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
     """Relative intensity (...) on the axis at an offset (...) in metre above or below the focus.
 
-    A Gaussian whose half width goes with the square of the spot's, as diffraction has it: that of
-    `array_field` to 4 % from 100 to 300 mm, whose maximum lies up to 8 % of the height lower.
+    A Gaussian whose half width goes with the square of the focal spot's, as by diffraction: within
+    4 % of that of `array_field` from 100 to 300 mm, whose maximum is up to 8 % of the height lower.
     """
     half_width = HALF_DEPTH * (lobe_width(height) / lobe_width(NOMINAL_HEIGHT)) ** 2
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 
 def spot_reach(height: float, focus: str) -> float:
-    """Distance in metre beyond which a spot is below 1e-7; only a Gaussian ends."""
+    """Radius in metre beyond which a focal spot is below 1e-7; infinite unless Gaussian."""
     return 5.7 * spot_width(height) if focus == "gaussian" else np.inf
 
 
 @cache
 def _array_spot(height: float) -> RegularGridInterpolator:
-    """|p|^2 relative to the focus in one quadrant; the array is symmetric about both axes."""
+    """Intensity |p|^2 relative to the focus in one quadrant, as both axes are of symmetry."""
     line = np.linspace(0, 60e-3, 121)
     x, y = np.meshgrid(line, line, indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)])

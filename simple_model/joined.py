@@ -1,7 +1,8 @@
-"""Foci on paths of their own: one period of each path after the other is a path that they share.
+"""Several foci on paths of their own, as one recorded path that they share.
 
-n paths, each drawn in T, make a recording of period n T. Foci at phases j/n of it are at every
-time one on each path; as all push alike, which of them is where makes no difference.
+One period of each path follows the other: n paths, each drawn in T, make a recording of period n T.
+Foci at phases j/n of it are at every time one on each path; as all have the same pressure, which of
+them is where makes no difference.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ CORNERS = {"point": 1, "line": 2, "triangle": 3, "square": 4}
 
 
 def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
-    """The recording that holds one period of each path; give it `evenly(len(paths))` as foci.
+    """Recorded path of one period of each path; give it `evenly(len(paths))` as foci.
 
     Straight sides are exact. A circle of diameter d becomes a polygon on it, which is nowhere
     further from it than d/2 (1 - cos(pi / 132)): 0.009 mm of one of 60 mm.

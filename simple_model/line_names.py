@@ -1,4 +1,4 @@
-"""Names of the lines of a load, derived from its own spectrum.
+"""Names of the spectral lines of a load, derived from its own spectrum.
 
 Every line of a load lies at |n f_d + p f_AM + q f_AM2 + r f_e + u f_s + v f_r|, whole multiples of
 the path's drawing frequency, of the three sinusoids, and of one over the periods of a signal and a
@@ -73,7 +73,7 @@ def line_names(
 
     Parameters
     ----------
-    most : the strongest of them that are kept
+    most : how many of them are listed, the strongest
     candidates : names of lines that are listed whether or not they are in the load, as far as the
         Tacton has their tones and they do not coincide with one that is
 
@@ -83,7 +83,7 @@ def line_names(
     return _line_names(pressure, threshold, most, tuple(candidates))
 
 
-@lru_cache(maxsize=128)  # several models answer each load
+@lru_cache(maxsize=128)  # several models take each load
 def _line_names(
     pressure: MovingPressure, threshold: float, most: int, candidates: tuple[str, ...]
 ) -> LineNames:
@@ -201,7 +201,7 @@ def _at_factors(pressure: MovingPressure, factors: Sequence[float]) -> tuple[Ord
 
 
 def level_factor(pressure: MovingPressure, level: Floats) -> Floats:
-    """What a level (k,) of the amplitude multiplies the pressure by."""
+    """Factor (k,) on the pressure of a level (k,) of the amplitude."""
     one = np.ones(1)
     full = DRIVES[pressure.drive](1.0, one, pressure.depth_of_modulation)
     return np.asarray(DRIVES[pressure.drive](level, one, pressure.depth_of_modulation) / full)

@@ -1,4 +1,4 @@
-"""The lines of a response: those of its load by name, and all else that its spectrum shows."""
+"""Line table of a response: the lines of its load by name, and all other peaks of its spectrum."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ QUIET = 1e-3  # of the strongest probe: where all lines are weaker, peaks are no
 ROUND_OFF = 1e-9  # of the largest motion
 MOST_SEEN = 50  # peaks
 WINDOW, LOBE = "blackmanharris", 4  # bins to the first zero
-DECAYED = 0.9  # second half over first: what is below is a free vibration
+DECAYED = 0.9  # second half over first: a peak below it is a free vibration
 FREE, UNRESOLVED, UNNAMED = "free vibration", "unresolved", "unnamed"
 
 
@@ -106,9 +106,9 @@ def resolved_lines(
     highest: float = np.inf,
     settle: float = SETTLE,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Names and frequencies in Hz, up to `highest`, of the lines of a load above -60 dB, and of
+    """Resolved lines by name, Hz, up to `highest`: those of a load above -60 dB, and of the
     `candidates`, that a response is long enough to resolve, so that `lines` can be asked for them;
-    and of those that it is not.
+    and the unresolved ones.
     """
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, candidates=candidates), highest)
@@ -129,8 +129,8 @@ def _floored(found: LineNames) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Fit:
-    """Which lines (f,) are resolved and which are fitted, if only as the strongest of those that
-    are not; their amplitudes (f, p), and the rest (t, p) of the response.
+    """Fit of lines (f,): masks of those resolved and of those fitted, if only as the strongest of
+    the unresolved; their amplitudes (f, p), and the rest (t, p) of the response.
     """
 
     resolved: Mask
@@ -155,7 +155,7 @@ def _fit(found: LineNames, response: Response, settle: float) -> _Fit:
 
 
 def _peaks(response: Response, fit: _Fit, highest: float, settle: float) -> list[Unnamed]:
-    """Peaks of what the fitted lines leave in the spectrum of the whole response."""
+    """Peaks in the spectrum of the whole response less the fitted lines."""
     dt, begun = step(response.times), round(settle * len(fit.rest))
     amplitude = _windowed(fit.rest)
     round_off = ROUND_OFF * float(np.abs(response.displacement).max(initial=0.0))

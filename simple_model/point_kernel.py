@@ -1,7 +1,7 @@
 """Point-kernel model of Lim, Seifi and Park (CHI EA '24), equation 2 with U(t) = 1: the pressure
 of the focus, weighted by distance.
 
-Nothing propagates: a skin point feels the moving pressure where it is, when it is there. As
+Nothing propagates: the stimulation at a skin point is the moving pressure there at that time. As
 published, the load is the commanded signal itself (drive law "linear") in a focal spot without side
 lobes ("main_lobe"); under any other load it is the same model.
 """
@@ -20,7 +20,7 @@ from simple_model.trajectory import Floats
 
 
 def published(pressure: MovingPressure) -> MovingPressure:
-    """The same Tacton at the same height as the paper has it: linear drive, main lobe, no mean."""
+    """The same Tacton and height under the paper's load: linear drive, main lobe, no mean."""
     return replace(pressure, drive="linear", focus="main_lobe")
 
 

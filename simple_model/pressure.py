@@ -1,4 +1,4 @@
-"""The one load that every model receives:
+"""Moving radiation pressure, the load of every model:
 
 q(x, t) = p0 I(h)/n sum_j drive(A, M(t)) S(x - x_j(t))
 
@@ -26,8 +26,8 @@ IN_CACHE = 2**15  # samples worked on at a time
 class MovingPressure:
     """Pressure of a Tacton on a surface near the plane z = 0 that its focus moves in.
 
-    Points may have a height: above or below the plane the focus is weaker. What a slope makes of
-    the pressure is the surface's own (`cos^2` of the incidence), and not part of it.
+    Points may have a height: above or below the plane the focus is weaker. The effect of a slope on
+    the pressure (`cos^2` of the incidence) belongs to the surface and is not part of it.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class MovingPressure:
         return pressure.reshape(*t.shape, len(points))
 
     def weight(self, phase: ArrayLike) -> Floats:
-        """What the path's level makes of the pressure (...) at fractions (...) of the period."""
+        """Factor (...) of the path's level on the pressure at fractions (...) of the period."""
         one = np.ones(1)
         full = DRIVES[self.drive](1.0, one, self.depth_of_modulation)
         levels = self.tacton.trajectory.level_at_phase(phase)
@@ -111,7 +111,7 @@ class MovingPressure:
         return full / len(self.tacton.foci) * driven
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
-        """Relative pressure (..., n) at points (n, 2 or 3) with the focus at centres (..., 2)."""
+        """Focal spot (..., n) at points (n, 2 or 3), relative, the focus at centres (..., 2)."""
         points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
         spot = moved_spot(points[:, :2], centre, self.height, self.focus)
         if points.shape[1] == 3 and points[:, 2].any():
@@ -123,8 +123,8 @@ EVALUATED = ("__call__", "weight", "gain", "driven", "spot")
 
 
 def check_lines(pressure: MovingPressure) -> None:
-    """Refuse a load that a model of its lines would not honour, which takes the formulas of
-    `MovingPressure` apart and never calls it.
+    """Refuse a load that models of its lines would not honour: they use the formulas of
+    `MovingPressure` and never call it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What every model returns, and its spectral lines."""
+"""Response of the probes, as every model returns it, and its spectral lines."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,26 +9,26 @@ from numpy.typing import ArrayLike, NDArray
 from simple_model.trajectory import Floats
 from simple_model.windows import kaiser, named
 
-# Side lobes of the Kaiser window below -140 dB: lines as weak as that stay apart from strong ones.
-LINE_BETA, LINE_BINS = 19.0, 2.5  # it keeps lines apart that are so many bins apart
+# Side lobes of the Kaiser window below -140 dB resolve lines as weak as that from strong ones.
+LINE_BETA, LINE_BINS = 19.0, 2.5  # it resolves lines that are so many bins apart
 SETTLE = 0.25  # of a response, before which no line is fitted
-ALIKE = 1e-3  # of what can be told apart: lines as close as that are one, and its amplitude is
-MINOR = 0.05  # of a line: what others that it is not resolved from may have together
-FAINT = 0.02  # of the strongest line: what is weaker may be wrong by more of itself
+ALIKE = 1e-3  # of the frequency resolution: lines as close as that are one, with one amplitude
+MINOR = 0.05  # of a line: most that others that it is not resolved from may have together
+FAINT = 0.02  # of the strongest line: weaker ones may have a larger relative error
 UNITS = ("m", "Pa")
 UNEVEN = 1e-6  # of a sampling interval
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """What an answer cost, and how it was found.
+    """Cost of a response, and how it was computed.
 
     `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
     process in bytes; element size `h` in metre and time step `dt` in s, 0 where there are none;
     SHA-256 of the `mesh`; `solver` used; `estimate` of the relative error of the reduction;
-    `energy_imbalance`, relative, between the work of the load and what has become of it, and the
-    share that was `radiated` through absorbing ends of all that was lost;
-    `versions` of what computed it; `warnings`, sentences on what is less than was asked for.
+    `energy_imbalance`, relative error of the energy balance, and the share of the losses that was
+    `radiated` through absorbing boundaries;
+    `versions` of the software; `warnings`, sentences on where it falls short of what was asked for.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -52,15 +52,15 @@ class Effort:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
-    """Motion of the probes.
+    """Response of a model: motion of the probes.
 
     Parameters
     ----------
-    model : str, which model answered
+    model : str, name of the model
     times : (t,) float, s, equally spaced
     probes : (p, 2) float, metre
     displacement : (t, p) float, metre, normal to the surface, positive the way a pressure
-        pushes. The point kernel has no body to displace: in its response this holds the
+        pushes. The point kernel has no body to displace: in its response this is the
         stimulation it predicts instead, in Pa, and `unit` says so.
     unit : "m" or "Pa"
     effort : Effort
@@ -124,7 +124,7 @@ def _check_spacing(times: Floats) -> None:
 
 
 def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
-    """Frequencies (f,) in Hz and amplitudes (f, p) in the unit of the response.
+    """Amplitude spectrum: frequencies (f,) in Hz and amplitudes (f, p) in the response's unit.
 
     A sinusoid of amplitude a on a bin shows as a, whatever the window (any name that
     `scipy.signal.get_window` knows).
@@ -138,21 +138,21 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Amplitudes (f, p) at exactly these frequencies (f,) in Hz: the moduli of `phasors`."""
+    """Line amplitudes (f, p) at exactly these frequencies (f,) in Hz: the moduli of `phasors`."""
     return np.abs(phasors(response, frequencies, settle=settle))
 
 
 def phasors(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> NDArray[np.complex128]:
-    """Complex amplitudes a (f, p) of Re a exp(2 pi i f t) at exactly these frequencies (f,) in Hz,
-    by weighted least squares.
+    """Phasors: complex amplitudes a (f, p) of Re a exp(2 pi i f t) at exactly these frequencies
+    (f,) in Hz, by weighted least squares.
 
     All lines and the mean are fitted together after the first part `settle` of the response,
     under a Kaiser window, so that neither the position of a line between two bins nor a line
     left out nor a dying transient leaks into another; a lower window, as far as needed, where
     lines lie closer than 2.5 over the fitted time. Lines closer than one over the fitted
-    time cannot be told apart and share one amplitude: see `told_apart`. 0 Hz gives the mean.
+    time are unresolved and share one amplitude: see `told_apart`. 0 Hz gives the mean.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def phasors(
 
 
 def resolution(response: Response, *, settle: float = SETTLE) -> float:
-    """One over the fitted time, in Hz: how far apart lines must be to be told apart."""
+    """Frequency resolution in Hz, one over the fitted time: lines further apart are resolved."""
     return 1 / float((1 - settle) * np.ptp(response.times))
 
 
@@ -174,11 +174,11 @@ def told_apart(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> NDArray[np.bool_]:
-    """Whether `lines` tells each of these frequencies (f,) in Hz from 0 Hz and from the others.
+    """Whether `lines` resolves each of these frequencies (f,) in Hz from 0 Hz and from the others.
 
-    Frequencies that are the same, or as good as, are one line and need not be told apart; nor does
-    a line from others that have, by their `strengths` (f,) if given, at most 5 % of it together.
-    Nor may those that are not told apart, and so not fitted, show as more than 5 % of it.
+    Frequencies that differ by at most `ALIKE` of the resolution are one line and need not be
+    resolved; nor does a line from others that have, by their `strengths` (f,) if given, at most 5 %
+    of it together. Unresolved lines, which are not fitted, must not leak more than 5 % into it.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)
@@ -256,7 +256,7 @@ def _closest(frequencies: Floats, span: float) -> float:
 
 
 def _beta(bins: float) -> float:
-    """Of the window for lines that are so many bins apart, whose main lobe is in proportion."""
+    """Kaiser beta of the window for lines so many bins apart, its main lobe in proportion."""
     lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
     return float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
 
@@ -267,7 +267,7 @@ def step(times: Floats) -> float:
 
 
 def _distinct(frequencies: Floats, resolution: float) -> tuple[Floats, np.ndarray]:
-    """0 Hz and the frequencies further apart than the resolution; which of them each one is."""
+    """Resolved frequencies: 0 Hz and those further apart than the resolution; the index of each."""
     distinct, which = [0.0], np.zeros(len(frequencies), int)
     for k in np.argsort(frequencies, kind="stable"):
         if frequencies[k] > 0 and frequencies[k] - distinct[-1] >= resolution:

@@ -1,4 +1,4 @@
-"""What turns a Tacton's amplitude up and down in time: pulses, and sampled signals."""
+"""Rhythms (pulses) and sampled signals, which modulate a Tacton's amplitude in time."""
 
 from dataclasses import dataclass
 from functools import cached_property

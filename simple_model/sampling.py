@@ -1,8 +1,8 @@
-"""How finely a load must be sampled, so that nothing of it folds back to low frequencies.
+"""Sampling of a load without aliasing: nothing of it may fold back to low frequencies.
 
-Samples dt apart show a line at f > 1/(2 dt) at |f - k/dt| instead. A Gaussian spot of standard
-deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2), and so a focus that
-moves further than about s/2 in a sample leaves lines above half the sampling rate.
+Samples dt apart show a line at f > 1/(2 dt) at |f - k/dt| instead. A Gaussian focal spot of
+standard deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2), and so a
+focus that moves further than about s/2 in a sample makes lines above half the sampling rate.
 """
 
 from collections.abc import Callable
@@ -17,8 +17,8 @@ from simple_model.response import step
 from simple_model.tacton import Tacton, tones
 from simple_model.trajectory import Floats
 
-PASSED = 5.7 / (2 * np.pi)  # f s / v, at which the spectrum of a spot that passes is 1e-7
-PER_PERIOD = 8  # samples of the highest frequency, so that its start is right, too
+PASSED = 5.7 / (2 * np.pi)  # f s / v, at which a passing focal spot's spectrum is 1e-7
+PER_PERIOD = 8  # samples of the highest frequency, so that its start is accurate, too
 BRIEF = 0.01  # of a recording's time, for which it may move faster: a jump has no highest line
 REACH = 128  # samples on either side that a low pass weighs: it ends within 2 % of half the rate
 STOP_BAND = ("kaiser", 10.0)  # 100 dB down
@@ -27,7 +27,7 @@ Complex = NDArray[np.complex128]
 
 
 def highest(pressure: MovingPressure, passing: float) -> float:
-    """Hz of the highest line of a load whose focus, by moving, makes lines up to `passing` Hz.
+    """Highest line in Hz of a load whose focus, by moving, makes lines up to `passing` Hz.
 
     Pulses have no highest line; they are averaged over a sample. A signal has half its own rate.
     """
@@ -40,35 +40,36 @@ def highest(pressure: MovingPressure, passing: float) -> float:
 
 
 def highest_passing(pressure: MovingPressure) -> float:
-    """Hz of the highest line, above 1e-7 of all, that the moving focus makes at a place."""
+    """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place."""
     return PASSED * _speed(pressure.tacton) / spot_width(pressure.height)
 
 
 def reached(pressure: MovingPressure) -> float:
-    """Hz of the highest line of a load, wherever it is felt; 0 for unknown of a foreign one."""
+    """Highest line in Hz of a load at any place; 0, for unknown, if it is no `MovingPressure`."""
     known = isinstance(pressure, MovingPressure)
     return highest(pressure, highest_passing(pressure)) if known else 0.0
 
 
 def finer(highest: float, dt: float) -> int:
-    """How many times within dt in s a load up to `highest` Hz is sampled: once if none folds."""
+    """Samples within dt in s of a load up to `highest` Hz: one if nothing aliases."""
     return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
 
 
 def shown(pressure: MovingPressure, frequencies: Floats, times: Floats) -> NDArray[np.bool_]:
-    """Which lines (f,) in Hz of a load's answer are sampled at equally spaced times (t,) in s.
+    """Mask of the lines (f,) in Hz of a response that equally spaced times (t,) in s sample.
 
-    Those below half the rate; but all of a load none of which folds. What edges and corners then
-    leave above half the rate is next to nothing, and right at each sample.
+    Those below half the rate; but all of a load that does not alias. What edges and corners then
+    leave above half the rate is next to nothing, and exact at each sample.
     """
     below = frequencies < 0.5 / step(times)
     return np.asarray(below | (fold_parts(pressure, times) == 1))
 
 
 def fold_parts(pressure: MovingPressure, times: Floats) -> int:
-    """How many times as finely as at times (t,) in s a load is sampled so that nothing folds.
+    """Oversampling factor of a load at times (t,) in s, so that nothing aliases.
 
-    Once at fewer times than a low pass weighs: they show the load at an instant, and no line.
+    One at fewer times than the low-pass filter has taps: they show the load at an instant, and no
+    line.
     """
     if len(times) <= 2 * REACH:
         return 1
@@ -76,7 +77,7 @@ def fold_parts(pressure: MovingPressure, times: Floats) -> int:
 
 
 def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
-    """A load (t, ...) at equally spaced times (t,) in s, without what would fold back.
+    """Low-pass-filtered load (t, ...) at equally spaced times (t,) in s, without aliasing.
 
     Sampled `parts` times as finely, before and after those times too, and filtered by a windowed
     sinc; as it is if `parts` is 1.
@@ -93,7 +94,7 @@ def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> F
 
 
 def resolving_step(pressure: MovingPressure, longest: float) -> float:
-    """A time step in s, at most `longest`, at which nothing of a load folds."""
+    """Time step in s, at most `longest`, at which nothing of a load aliases."""
     hz = reached(pressure)
     return longest if hz < 0.5 / longest else 0.5 / hz
 
@@ -101,8 +102,9 @@ def resolving_step(pressure: MovingPressure, longest: float) -> float:
 def transform(
     load: Callable[[float], Floats | Complex], w: Complex, dt: float, parts: int
 ) -> Complex:
-    """Transform (f, ...) of what is sampled `parts` times within each dt in s, where `load` gives
-    every parts-th sample, from a time in 0..dt on; at frequencies w (f,) of its FFT, in rad/s.
+    """Fourier transform (f, ...) of a load sampled `parts` times within each dt in s, where `load`
+    gives every parts-th sample, from a time in 0..dt on; at frequencies w (f,) of its FFT, in
+    rad/s.
     """
     found = 0.0
     for late in np.arange(parts) * dt / parts:

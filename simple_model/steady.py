@@ -1,4 +1,4 @@
-"""The lines that a periodic load contains, exactly, before any body has answered it.
+"""Line spectrum of a periodic load, exact, before any body responds to it.
 
     q(x, t) = Q(t) sum_j S(x - X(f_d t + a_j))
     Q = sum_m c_m exp(2 pi i f_m t),  S = sum_n s_n(x) exp(2 pi i n f_d t)
@@ -7,8 +7,8 @@ so that a line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n 
 phases leave only every n-th harmonic of the path.
 
 A rhythm or a signal makes Q more than a few sinusoids. The lines are then those of the Tacton
-played over and over, at multiples of one over its duration. From rest that is the same load: a body
-cannot feel what comes after.
+repeated periodically, at multiples of one over its duration. From rest that is the same load within
+that time, by causality.
 """
 
 from dataclasses import dataclass
@@ -26,18 +26,18 @@ from simple_model.trajectory import Floats
 Complex = NDArray[np.complex128]
 
 FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
-KNOTS_PER_WIDTH = 8  # of the spot, which makes corners right to 1e-4
+KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
 PHASES = 8  # of each sinusoid: the drive laws are polynomials of second degree
-HIGHEST = 10_000.0  # Hz of what is kept of pulses and recordings: the rest moves bodies by 0.1 %
+HIGHEST = 10_000.0  # Hz of the lines of pulses and recordings: the rest moves bodies by 0.1 %
 SAMPLED = 40_000.0  # Hz at which a rhythm or signal is averaged
 MOST_SAMPLED = 50_000_000  # lines of a rhythm or signal, some hundred megabytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadLines:
-    """Lines at `frequencies` (f,) in Hz >= 0, several of which may coincide.
+    """Spectral lines of a load at `frequencies` (f,) in Hz >= 0, several of which may coincide.
 
-    Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the spot along the path
+    Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the focal spot along the path
     times exp(2 pi i f t)) is the pressure of a line; `strengths` (f,) in Pa is its largest
     amplitude on the path.
     """
@@ -48,8 +48,8 @@ class LoadLines:
     strengths: Floats
 
     def gather(self, of_path: Complex) -> tuple[Floats, Complex]:
-        """Distinct frequencies (g,) in Hz and what each is made of (g, ...), from the harmonics
-        (n, ...) along the path.
+        """Distinct frequencies (g,) in Hz and the sum (g, ...) of the lines at each, from the
+        harmonics (n, ...) along the path.
         """
         distinct, which = np.unique(np.round(self.frequencies, 9), return_inverse=True)
         shape = (len(distinct), len(of_path))
@@ -59,8 +59,8 @@ class LoadLines:
 
 
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
-    """The lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
-    that is silent, the mean alone.
+    """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
+    that is zero, the mean alone.
 
     Raises
     ------
@@ -98,12 +98,12 @@ def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[
 
 
 def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
-    """What all foci together make of harmonic n (k,) of one: (k,), 1 for a single focus."""
+    """Array factor (k,) of all foci on harmonics n (k,) of one: 1 for a single focus."""
     return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
 
 
 def path_knots(pressure: MovingPressure) -> Floats:
-    """Positions (k, 2) in metre along one period of the path; one if the focus rests.
+    """Sample positions (k, 2) in metre along one period of the path; one if the focus is static.
 
     They are the middles of k equal parts, between which corners and jumps of the path fall.
     """
@@ -112,12 +112,12 @@ def path_knots(pressure: MovingPressure) -> Floats:
 
 
 def path_weights(pressure: MovingPressure) -> Floats:
-    """What the levels of a recording make of the pressure (k,) at `path_knots`; 1 without any."""
+    """Factors (k,) of a recording's levels on the pressure at `path_knots`; 1 without levels."""
     return pressure.weight(_knot_phases(pressure))
 
 
 def harmonics(knots: int) -> NDArray[np.int_]:
-    """Orders of the harmonics of `along_path` that so many knots tell apart, ascending."""
+    """Orders of the harmonics of `along_path` that so many knots resolve, ascending."""
     return np.arange(-((knots - 1) // 2), (knots + 1) // 2)
 
 
@@ -129,13 +129,15 @@ def along_path(values: Floats | Complex) -> Complex:
 
 
 def played(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
-    """Re sum a exp(2 pi i f t) (t, p) of lines (f,) in Hz with amplitudes (f, p), at times in s."""
+    """Fourier synthesis (t, p): Re sum a exp(2 pi i f t) of lines (f,) in Hz with amplitudes
+    (f, p), at times in s.
+    """
     turn = np.exp(2j * np.pi * np.outer(times, frequencies))
     return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
 
 
 def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
-    """Distinct frequencies (g,) in Hz and the sum (g, ...) of what falls on each."""
+    """Lines merged by frequency: distinct ones (g,) in Hz and the sums (g, ...) of amplitudes."""
     distinct, which = np.unique(np.round(frequencies, 9), return_inverse=True)
     total = np.zeros((len(distinct), *amplitudes.shape[1:]), np.complex128)
     np.add.at(total, which, amplitudes)
@@ -143,7 +145,7 @@ def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
 
 
 def _knot_phases(pressure: MovingPressure) -> Floats:
-    """Fractions (k,) of the period, the middles of equal parts of it; 0 if the focus rests."""
+    """Fractions (k,) of the period, the middles of equal parts of it; 0 if the focus is static."""
     path = pressure.tacton.trajectory
     if path.is_static:
         return np.zeros(1)
@@ -157,9 +159,9 @@ def _knot_phases(pressure: MovingPressure) -> Floats:
 
 
 def _recorded_knots(tacton: Tacton, width: float) -> tuple[float, int]:
-    """How many knots a recording needs for a spot of a width in metre, and of what they are a
-    multiple: enough for all lines that are kept or, if nothing about it is abrupt within a path,
-    for its fastest part.
+    """Number of knots that a recording needs for a focal spot of a width in metre, and what they
+    are a multiple of: enough for all lines up to `HIGHEST` or, if nothing about it is abrupt within
+    a path, for its fastest part.
     """
     path, n = tacton.trajectory, tacton.n_paths
     clock, period = np.array(path.times), path.times[-1]
@@ -177,7 +179,7 @@ def _recorded_knots(tacton: Tacton, width: float) -> tuple[float, int]:
 
 
 def _swept(pressure: MovingPressure) -> Floats:
-    """The spot (8, k) at about eight points of the path while the focus runs round."""
+    """Focal spot (8, k) at about eight points of the path while the focus runs along it."""
     knots = path_knots(pressure)
     watched = knots[:: max(1, len(knots) // 8)][:9]
     return (pressure.spot(watched, knots) * path_weights(pressure)[:, None]).T
@@ -215,7 +217,7 @@ def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Float
 
 
 def _sinusoid_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floats, Complex]:
-    """The same of a gain that is made of sinusoids, exactly."""
+    """Lines as of `_sampled_lines`, of a gain that is made of sinusoids, exactly."""
     f, c = _gain_lines(pressure)
     f_d = pressure.tacton.trajectory.drawing_frequency
     return n[:, None] * f_d + f, np.broadcast_to(c, (len(n), len(c)))

@@ -42,7 +42,7 @@ class Tacton:
     trajectory : Trajectory
     foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the
         same path; for paths of their own see `simple_model.joined`
-    sharing : how the array makes several foci, each of which pushes with 1/n of the pressure that
+    sharing : how the array makes several foci, each of which has 1/n of the pressure that
         one alone would have, so that the total force stays the same. "simultaneous": all at once,
         each at 1/sqrt(n) of the sound pressure, which conserves the acoustic power; that the
         sound of one interferes with another's is left out. "time_multiplexed": in turn, each at
@@ -130,7 +130,7 @@ class Tacton:
 
 
 def modulation(tacton: Tacton, t: ArrayLike) -> Floats:
-    """{w1 M1 + w2 M2} E at times (...) in s: what the carrier is multiplied by, -1..1."""
+    """Modulation {w1 M1 + w2 M2} E of the carrier, -1..1, at times (...) in s."""
     t = np.asarray(t, np.float64)
     sinusoids = modulation_at_phases(tacton, *(2 * np.pi * f * t for f in tones(tacton)))
     if tacton.signal and tacton.signal.role == "modulation":
@@ -139,7 +139,7 @@ def modulation(tacton: Tacton, t: ArrayLike) -> Floats:
 
 
 def level(tacton: Tacton, t: ArrayLike) -> Floats | float:
-    """What rhythm and envelope multiply the amplitude by, 0..1, at times (...) in s."""
+    """Level: the factor of rhythm and envelope on the amplitude, 0..1, at times (...) in s."""
     found: Floats | float = 1.0
     if tacton.rhythm:
         found = tacton.rhythm.level(t)
@@ -164,7 +164,7 @@ def tones(tacton: Tacton) -> tuple[float, float, float]:
 
 
 def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
-    """p(t) of equation 1 at times (...) in s, carrier included, as a fraction of full drive.
+    """Commanded signal p(t) of equation 1 at times (...) in s, with its carrier, over full drive.
 
     Levels of a recorded path are not in it: each focus has its own.
     """

@@ -1,4 +1,4 @@
-"""Vibrotactile detection thresholds of the glabrous hand: what of a motion is felt at all.
+"""Vibrotactile detection thresholds of the glabrous hand, and sensation levels above them.
 
 Two channels, in dB re 1 um peak, and the more sensitive one decides (Bolanowski et al., J Acoust
 Soc Am 84:1680, 1988, who have four; the other two need larger motions in this band):
@@ -6,12 +6,13 @@ Soc Am 84:1680, 1988, who have four; the other two need larger motions in this b
     Pacinian      T = -20 + 12 log2(250 Hz / f)  below 250 Hz,  -20 + 9 log2(f / 250 Hz)  above
     non-Pacinian  T = +12
 
-How sure: that the threshold is flat out to 40 Hz, then falls by 12 dB an octave to its least near
-250 Hz, is Verrillo's (J Acoust Soc Am 35:1962, 1963; thenar, contactor of 2.9 cm2; read in abstract
-only). The two levels, -20 and +12 dB, were not read in a source; they fit that slope to 0.3 dB. The
-rise above 250 Hz is that of hairy skin. Above 500 Hz the line is carried on. People and
-laboratories differ by `BAND` either way. A small contactor is felt less in the Pacinian channel, by
-3 dB for each halving of its area: 7 dB from 2.9 cm2 to the 0.58 cm2 of a focal spot.
+Reliability: that the threshold is flat out to 40 Hz, then falls by 12 dB an octave to its least
+near 250 Hz, is Verrillo's (J Acoust Soc Am 35:1962, 1963; thenar, contactor of 2.9 cm2; read in
+abstract only). The two levels, -20 and +12 dB, were not read in a source; they fit that slope to
+0.3 dB. The rise above 250 Hz is that of hairy skin. Above 500 Hz the line is extrapolated. People
+and laboratories differ by `BAND` either way. The threshold of a small contactor is higher in the
+Pacinian channel (spatial summation), by 3 dB for each halving of its area: 7 dB from 2.9 cm2 to the
+0.58 cm2 of a focal spot.
 """
 
 import numpy as np
@@ -23,15 +24,15 @@ from simple_model.trajectory import Floats
 BAND = 5.0  # dB, between people and between laboratories
 LOWEST, HIGHEST = 10.0, 1000.0  # Hz
 AREAS = {"focal_spot": 7.0, "large_contactor": 0.0}  # dB added in the Pacinian channel
-# Pa at the focus that is just felt with AM at 200 Hz: 556.9 Pa of sound pressure (Howard et al.,
-# IEEE World Haptics 2019, as quoted by Lim, Park and Seifi, CHI 2024, arXiv 2405.02800; whether
-# rms or peak is not stated) pushes with 2 p^2 / (rho c^2).
+# Detection threshold in Pa at the focus with AM at 200 Hz: the radiation pressure 2 p^2 / (rho c^2)
+# of 556.9 Pa of sound pressure (Howard et al., IEEE World Haptics 2019, as quoted by Lim, Park and
+# Seifi, CHI 2024, arXiv 2405.02800; whether rms or peak is not stated).
 PRESSURE = 4.4
 TESTED = 200.0  # Hz
 
 
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
-    """Smallest displacement (...) in metre, peak, that is felt at frequencies (...) in Hz.
+    """Detection threshold (...) of displacement in metre, peak, at frequencies (...) in Hz.
 
     Parameters
     ----------
@@ -53,8 +54,8 @@ def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
 
 
 def pressure_threshold(frequency: ArrayLike) -> Floats:
-    """Smallest amplitude (...) in Pa of a component of the pressure at a focus that is felt, at
-    frequencies (...) in Hz; only of skin, and only of what vibrates.
+    """Detection threshold (...) in Pa of a vibrating component of the pressure at a focus on skin,
+    at frequencies (...) in Hz.
 
     `PRESSURE` was measured with AM at 200 Hz, whose component there is half of it: 2.2 Pa. At other
     frequencies it follows the displacement threshold, as if compliance did not depend on them.
@@ -66,10 +67,10 @@ def pressure_threshold(frequency: ArrayLike) -> Floats:
 def sensation_level(
     amplitude: ArrayLike, frequency: ArrayLike, area: str = "focal_spot", *, unit: str = "m"
 ) -> Floats:
-    """Level (...) in dB above the threshold of lines with amplitudes (...) in metre, peak, or in Pa
-    of the pressure at a place, see `pressure_threshold`.
+    """Sensation level (...), dB above the threshold, of lines with amplitudes (...) in metre, peak,
+    or in Pa of the pressure at a place, see `pressure_threshold`.
 
-    Of several lines the one with the highest level is what is felt: channels do not add up.
+    Of several lines the one with the highest level decides: channels do not add up.
     Minus infinity where nothing vibrates, at 0 Hz, or where the threshold is not known.
 
     Raises

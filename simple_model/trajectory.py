@@ -1,4 +1,4 @@
-"""Where the focus is: a named shape, any polyline at constant speed, or a path recorded in time.
+"""Trajectory of the focus: a named shape, a polyline at constant speed, or a path recorded in time.
 
 Named shapes: Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are computed from the phase
 of the drawing period, never by adding steps, and so are as exact at 10 s as at 0.
@@ -16,7 +16,7 @@ from simple_model.choices import choose
 Floats = NDArray[np.float64]
 Points = tuple[tuple[float, float], ...]
 
-SHAPES = ("point", "line", "circle", "triangle", "square")  # which a size says all of
+SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size alone
 BY_POINTS = ("polyline", "recorded")
 SWEEPS = ("there_and_back", "one_way", "sinusoidal")
 LARGEST = 0.060  # m, the size of a palm
@@ -111,7 +111,7 @@ class Trajectory:
 
     @property
     def outline(self) -> Floats:
-        """Positions (k, 2) in metre that the path stays within the convex hull of."""
+        """Positions (k, 2) in metre whose convex hull contains the path."""
         if self.shape in BY_POINTS:
             return self._corners + self.centre
         return self.at_phase(np.linspace(0, 1, 721))
@@ -189,7 +189,7 @@ class Trajectory:
         return np.array(self.times, np.float64)
 
     def _between(self, phase: Floats) -> tuple[NDArray[np.int_], Floats]:
-        """Which point of a recording was the last, and the fraction of the way to the next."""
+        """Index of the last point of a recording, and the fraction of the way to the next."""
         clock = self._clock
         t = phase * clock[-1]
         late = t + JUST_AFTER * clock[-1] / (len(clock) - 1)

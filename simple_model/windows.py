@@ -1,4 +1,4 @@
-"""Windows that lines are looked for under.
+"""Window functions for spectral lines.
 
 `scipy.signal` has them too, but brings all of `scipy.stats`, and every command would wait for it.
 """

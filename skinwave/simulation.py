@@ -1,4 +1,4 @@
-"""From a scene to a response, for every model by one name."""
+"""Simulation of a scene by any model, chosen by name."""
 
 import warnings
 from dataclasses import replace
@@ -35,29 +35,29 @@ def simulate(
     solver: str = "auto",
     mapped: Map = map,
 ) -> Response:
-    """Motion of a scene's probes, with its expected error.
+    """Simulate a scene: the motion of its probes, with its expected error.
 
-    What is less than was asked for is told in `effort.warnings` of the response, and each sentence
-    is a `SkinwaveWarning` once. An h or a model that is given is compared with what the plan would
-    take, which for elements costs another, coarser mesh; `compute` leaves that out.
+    Where a request is not met, `effort.warnings` of the response say so, and each sentence is a
+    `SkinwaveWarning` once. The error of a given h or model is estimated as in a plan, which for
+    elements costs another, coarser mesh; `compute` leaves that out.
 
     Parameters
     ----------
     scene : Scene
     model : "point-kernel", without propagation, under the scene's own load;
         "point-kernel-published", the same under the paper's load (linear drive, main lobe);
-        "flat-body", exact waves in an endless body; "fem", the reduced model;
-        "fem-transient", every time step; "flat-body-harmonic" and "fem-harmonic", the steady state
-        line by line; "fem-nonlinear", a sheet that stretches as it bends, in its modes, about its
-        rest under the mean pressure; "fem-nonlinear-transient", the same with all unknowns; or
-        "auto": what `plan` chooses, which is linear
+        "flat-body", the wavenumber integral of an infinite body; "fem", the reduced-order model;
+        "fem-transient", direct time integration; "flat-body-harmonic" and "fem-harmonic", the
+        steady state line by line; "fem-nonlinear", a sheet at large deflection, in its modes, about
+        its equilibrium under the mean pressure; "fem-nonlinear-transient", the same with all dofs;
+        or "auto": the choice of `plan`, which is linear
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : called with the name of the phase and the fraction done
-    h : float, metre, element size; planned if not given, and with it how much of the body counts,
-        as it is for "auto"
+    h : float, metre, element size; planned if not given, and with it the extent of the body, as it
+        is for "auto"
     dt : float, s, time step of "fem-transient" and the nonlinear models
     solver : a backend of `fem.linear_solver`
-    mapped : shaped like the built-in `map`, for the lines of "fem-harmonic", which are solved one
+    mapped : called like the built-in `map`, for the lines of "fem-harmonic", which are solved one
         by one; `engine.mapped_on` spreads them over the workers of a Dask scheduler
 
     Raises
@@ -65,7 +65,7 @@ def simulate(
     ValueError
         If the model is unknown or does not fit the scene, or a number is out of range.
     Diverged
-        If a nonlinear model does not converge, or an answer does not account for its energy.
+        If a nonlinear model does not converge, or a response violates the energy balance.
     """
     found = answered(
         scene, model, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped
@@ -86,7 +86,7 @@ def answered(
     solver: str = "auto",
     mapped: Map = map,
 ) -> Response:
-    """The response of `simulate`, for those who tell its warnings themselves."""
+    """The response of `simulate`, for callers that show its warnings themselves."""
     required = required_plan(
         scene, model, tolerance, progress, h=h, dt=dt, solver=solver
     )  # fmt: skip
@@ -105,7 +105,7 @@ def required_plan(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Plan:
-    """The plan of what was asked for; raises what `simulate` does before any work."""
+    """Plan of a request; raises what `simulate` does before any work."""
     choose("model", model, MODELS)
     check_knobs(solver, h=h, dt=dt)
     asked = None if model == "auto" else model
@@ -123,8 +123,8 @@ def follow(
     solver: str = "auto",
     mapped: Map = map,
 ) -> Response:
-    """The response that a plan leads to, with its expected error and all warnings; arguments are
-    those of the plan.
+    """Response of a plan, with its expected error and all warnings; arguments are those of the
+    plan.
     """
     if required.model == "fem" and required.prepared:
         found = answer(required.prepared, scene, progress)
@@ -148,8 +148,8 @@ def compute(
     solver: str = "auto",
     mapped: Map = map,
 ) -> Response:
-    """The response of one model, not planned: its expected error is unknown, and it warns of
-    nothing. Arguments are those of `simulate`, and so is what it raises.
+    """Response of one model, not planned: its expected error is unknown, and it gives no warnings.
+    Arguments and exceptions are those of `simulate`.
     """
     choose("model", model, MODELS[1:])
     check_knobs(solver, h=h, dt=dt)
@@ -195,7 +195,7 @@ def _computed(
 
 
 def warned(response: Response, sentences: tuple[str, ...]) -> Response:
-    """A response that tells what is less than was asked for."""
+    """The response with these sentences as its warnings."""
     return replace(response, effort=replace(response.effort, warnings=sentences))
 
 

@@ -258,7 +258,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     )
     (tmp_path / "scene.toml").write_text(dumps(scene))
     assert main(["relax", "scene.toml", "--h", "9", "--quiet"]) == 0
-    coarse = "elements of 9 mm are wider than twice the standard deviation of the focus"
+    coarse = "elements of 9 mm are wider than twice the standard deviation of the focal spot"
     assert coarse in capsys.readouterr().err
     record = json.loads((tmp_path / "scene-relaxed/relax.json").read_text())
     effects = {effect["name"]: effect for effect in record["effects"]}

@@ -341,9 +341,7 @@ def test_a_support_keeps_the_balance_of_energy():
 def test_a_hand_without_ends_cannot_be_held_by_them(dome, tmp_path):
     meshes.write(tmp_path / "body.vtu", dome)
     for base in ("free", "absorbing"):
-        with pytest.raises(
-            ValueError, match=r"has no facets 'sides' or 'cut' to hold it by; clamp"
-        ):
+        with pytest.raises(ValueError, match=r"has no facets 'sides' or 'cut' to fix; clamp"):
             build(replace(hand_in(tmp_path / "body.vtu"), base=base), 0.005)
 
 

@@ -200,8 +200,8 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
         '[body]\nwidth_mm = 30\nheight_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
     )
     for model, cause in (
-        ("fem", "elements of 15 mm will be wrong"),
-        ("flat-body", "flat-body, which lets no wave"),
+        ("fem", "elements of 15 mm will have a relative error"),
+        ("flat-body", "flat-body, which leaves out reflections"),
     ):
         asked = ["run", "scene.toml", "--model", model, "--h", "15", "--quiet", "--overwrite"]
         assert main(asked) == 0

@@ -93,7 +93,7 @@ def test_what_no_machine_can_solve_is_refused_with_number_limit_and_cure(
     (folder / "huge.toml").write_text(scene)
     model = [] if command == "compare" else ["--model", "fem"]
     sentence = said(capsys, folder, [command, "huge.toml", *model, *knobs])
-    assert "unknowns or more, the limit is 3,000,000; take larger elements" in sentence
+    assert "degrees of freedom or more, the limit is 3,000,000; take larger elements" in sentence
 
 
 @pytest.mark.parametrize("name", MESHES)

@@ -149,7 +149,8 @@ def test_the_ready_palm_lies_on_its_true_surface():
 
 
 def test_a_spoilt_or_unknown_ready_mesh_is_refused(tmp_path, monkeypatch):
-    with pytest.raises(MeshError, match="no ready mesh 'fist'; there are: flat-palm, palm, slab"):
+    said = "no built-in mesh 'fist'; there are: flat-palm, palm, slab"
+    with pytest.raises(MeshError, match=said):
         meshes.ready("fist")
     module = sys.modules["meshes.ready"]
     shutil.copytree(module.HOME, tmp_path / "data")

@@ -102,7 +102,7 @@ def test_a_floating_body_is_refused_with_the_cure(backend):
     if backend not in fem.available():
         pytest.skip(f"{backend} is not installed")
     singular = sparse.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
-    with pytest.raises(ValueError, match="is the body held anywhere"):
+    with pytest.raises(ValueError, match="is the body constrained anywhere"):
         fem.factorise(singular, backend=backend)
 
 

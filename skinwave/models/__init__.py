@@ -1,1 +1,1 @@
-"""Models that answer on a body: built, prepared, marched."""
+"""Models of a body: meshed, reduced, integrated in time or solved line by line."""

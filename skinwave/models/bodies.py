@@ -1,4 +1,4 @@
-"""From a body to its mesh: element sizes, the material that the mesh is made of, its ends."""
+"""Mesh, material, boundary conditions and absorbing layer of a scene's body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,38 +21,38 @@ from simple_model.compliance import AIR_DENSITY, Compliance, half_space, slab, t
 from skinwave.models import hands
 from skinwave.scene import Body
 
-SLAB_CELL = 3e-3  # m: two thirds of the spot's standard deviation
+SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
 # From cell to cell along the surface and downwards, and the coarsest cell over the finest.
 GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
-# A layer around absorbing sides, in which a drag that rises with the square of the depth lets waves
-# die out: dashpots alone send back a quarter of a shear wave at 30 degrees. Near the cut-on of a
-# slab on a rigid base, c_s/(4 depth), waves are long, and only a wide layer takes them. Its cells
-# may grow fast. What a plane slab of 50 mm sends back is at most 1.4 % of the motion at the focus
-# at any line, where dashpots alone send back 17 % (`skinwave.verify.sides`).
+# An absorbing (sponge) layer around absorbing sides; its mass-proportional damping rises with the
+# square of the distance: dashpots alone reflect a quarter of a shear wave at 30 degrees. Near the
+# cut-on of a slab on a rigid base, c_s/(4 depth), waves are long, and only a wide layer absorbs
+# them. Its cells may grow fast. The reflection of a plane slab of 50 mm is at most 1.4 % of the
+# motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.sides`).
 LAYER_WIDTH, LAYER_DRAG = 7.0, 0.35  # of the depth; of the angular frequency of cut-on
 LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
-LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs let pass below it is no wave yet where they end
-HAND_CELL = 5e-3  # m: within 1.2 % of cells of 3 mm at every probe, at a third of the cost
-FINE_PALM = 2e-3  # m: cells of a palm with thin layers, of 300,000 unknowns; more must be asked for
-FINEST_HAND = 1e-3  # m: finer cells of a hand are more than its mesher is let make
-NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the spot's
-THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it can tell
+LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs carry below it is still near field at their sides
+HAND_CELL = 5e-3  # m: within 1.2 % of elements of 3 mm at every probe, at a third of the cost
+FINE_PALM = 2e-3  # m: elements of a palm with thin layers, 300,000 dofs; finer ones on request only
+FINEST_HAND = 1e-3  # m: finer elements of a hand exceed the limits of its mesher
+NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
+THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it resolves
 COMPARED = (
     4 / 3
 )  # of a size that is asked for: a mesh that it is compared with may be so much coarser
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
-# area, and the fatter elements are far more accurate: thin ones lock.
+# area, and thicker elements are far more accurate: thin ones lock.
 SHEET_THICKNESS = 0.01
 
 
-EXACT = {"flat-body": flat_body, "flat-body-harmonic": steady_state}  # models of exact waves
+EXACT = {"flat-body": flat_body, "flat-body-harmonic": steady_state}  # by wavenumber integral
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Build:
-    """How a body is meshed: arguments of `fem.assemble`; `drag` (m,) in 1/s, or None; `support` of
-    a hand, or None.
+    """Meshed body: arguments of `fem.assemble`; `drag` (m,) in 1/s of the absorbing layer, or None;
+    `support` of a hand, or None.
     """
 
     mesh: TetMesh
@@ -67,19 +67,19 @@ class Build:
 def build(
     body: Body, h: float | None = None, symmetry: str = "", thickness: float | None = None
 ) -> Build:
-    """Mesh a flat body with cells of h in metre, or as fine as the scene set needs.
+    """Mesh a body with elements of h in metre, or as fine as the scene set needs.
 
     Parameters
     ----------
     symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
-        part with positive coordinates is meshed, and slides along these planes
+        part with positive coordinates is meshed, with symmetry conditions on these planes
     thickness : of the equivalent of a sheet in metre, `SHEET_THICKNESS` of its shorter side if not
         given, and no less than the sheet's own
 
     Raises
     ------
     ValueError
-        If the body is "none", or would have too many unknowns.
+        If the body is "none", or would have too many degrees of freedom.
     """
     size, drag = _checked(body, h or default_size(body), COMPARED), None
     if body.kind == "sheet":
@@ -107,8 +107,8 @@ def build(
     support = hands.support(body, mesh) if body.kind in hands.KINDS else None
     if body.is_held and "xyz" not in fixed.values() and not (support and support.stiffness.any()):
         raise ValueError(
-            f"the sides are clamped, but {body.file} has no facets 'sides' or 'cut' to hold it by; "
-            "clamp its base, or name them in the file"
+            f"the sides are clamped, but {body.file} has no facets 'sides' or 'cut' to fix; clamp "
+            "its base, or name them in the file"
         )
     mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
@@ -136,12 +136,12 @@ def operators(build: Build) -> Operators:
 
 
 def air(body: Body, build: Build, operators: Operators) -> Added | None:
-    """The air that moves with a meshed sheet, for `fem.reduce`; None in vacuum.
+    """Added mass of the air around a meshed sheet, for `fem.reduce`; None in vacuum.
 
     Raises
     ------
     ValueError
-        If no frame holds the sheet: around an edge without one the air would flow.
+        If the sheet has no frame: air would flow around a free edge.
     """
     if not body.air:
         return None
@@ -158,7 +158,7 @@ def air(body: Body, build: Build, operators: Operators) -> Added | None:
 
 
 def vacuum_only(body: Body, model: str) -> None:
-    """Refuse a body with air, which is a mass of every place upon every other.
+    """Refuse a body with air, whose added-mass operator is dense.
 
     Raises
     ------
@@ -167,39 +167,40 @@ def vacuum_only(body: Body, model: str) -> None:
     """
     if body.air:
         raise ValueError(
-            f"{model} solves sparse equations, and air couples every place of a sheet with every "
-            "other; leave air out, or use --model fem, fem-nonlinear or flat-body"
+            f"{model} solves sparse equations, and the added mass of air is a dense operator; "
+            "leave air out, or use --model fem, fem-nonlinear or flat-body"
         )
 
 
 def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
-    """P (3 n, k): nodal forces in N of the pressure in Pa that a surface across the beam would
-    feel, and the points (k, 3) in metre where it is taken.
+    """Load operator P (3 n, k): nodal forces in N of the pressure in Pa on a surface across the
+    beam, and the points (k, 3) in metre where it is taken.
 
-    Radiation pressure goes with the square of the cosine of incidence: once for the beam that a
-    sloping surface spreads over, and once for the momentum that it turns back along its normal.
+    Radiation pressure goes with the square of the cosine of incidence: once for the beam that is
+    spread over a sloping surface, and once for the momentum that is reflected along its normal.
     """
     cosine = np.maximum(facet_normals(build.mesh)[:, 2], 0.0)
     return load_operator(build.mesh) * cosine**2, facet_points(build.mesh)
 
 
 def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:
-    """S (p, 3 n): displacement into a meshed body, in metre, at probes (p, 2) in metre.
+    """Probe operator S (p, 3 n): displacement into a meshed body, in metre, at probes (p, 2) in
+    metre.
 
     The surface in a file is made of flat triangles, at whose edges its own normals jump: there the
-    mean normal about a probe says what into the body is.
+    direction into the body is that of the mean normal about a probe.
     """
     patch = NORMAL_PATCH if body.kind == "mesh" else 0.0
     return probe_operator(build.mesh, probes, patch=patch)
 
 
 def check_mesh(body: Body, h: float) -> None:
-    """Refuse, before anything is computed, what `build` cannot mesh with cells of h in metre.
+    """Refuse, before anything is computed, what `build` cannot mesh with elements of h in metre.
 
     Raises
     ------
     ValueError
-        If cells are larger than the body, or more than can be solved for.
+        If elements are larger than the body, or more than can be solved for.
     """
     h = _checked(body, h)
     if body.kind == "sheet":
@@ -209,7 +210,7 @@ def check_mesh(body: Body, h: float) -> None:
 
 
 def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
-    """Grid lines along x, y and z: fine where the focus travels, with a layer that absorbs."""
+    """Grid lines along x, y and z: fine where the focus travels, with any absorbing layer."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
     halves = [graded_axis(side / 2, h, along) for side in (body.width, body.height)]
     if has_layer(body):
@@ -225,22 +226,22 @@ def _depth_line(body: Body, h: float) -> Floats:
 
 
 def cell_layers(body: Body, h: float) -> int:
-    """How many cells of h in metre lie below each other in a slab."""
+    """Number of cells of h in metre through the depth of a slab."""
     return len(_depth_line(body, h)) - 1
 
 
 def has_layer(body: Body) -> bool:
-    """Whether more is meshed around a body than itself, to take waves away."""
+    """Whether an absorbing layer is meshed around a body."""
     return body.kind == "slab" and body.sides == "absorbing"
 
 
 def layer_scale(body: Body) -> float:
-    """The length in metre that an absorbing layer is a multiple of: the depth, if that counts."""
+    """Reference length of an absorbing layer, metre: the depth, at most that of `LOWEST_CUT_ON`."""
     return min(body.depth, body.solid.shear_speed / (4 * LOWEST_CUT_ON))
 
 
 def _layer_line(body: Body, half: Floats) -> Floats:
-    """Grid lines of the layer, from where the body ends."""
+    """Grid lines of the absorbing layer, from where the body ends."""
     scale = layer_scale(body)
     grading = Grading(radius=0.0, growth=LAYER_GROWTH, coarsest=LAYER_COARSEST * scale)
     first = min(LAYER_GROWTH * (half[-1] - half[-2]), grading.coarsest)
@@ -248,7 +249,7 @@ def _layer_line(body: Body, half: Floats) -> Floats:
 
 
 def layer_drag(body: Body, mesh: TetMesh) -> Floats:
-    """Drag (m,) in 1/s of each element: 0 in the body, rising with the square of the distance."""
+    """Damping profile (m,) in 1/s of the absorbing layer: 0 in the body, quadratic beyond it."""
     scale, ends = layer_scale(body), np.array([body.width, body.height]) / 2
     middles = np.abs(mesh.points[mesh.tets[:, :4], :2].mean(axis=1))
     beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / (LAYER_WIDTH * scale)
@@ -290,7 +291,7 @@ def _check_layers(body: Body, h: float, slack: float) -> None:
 
 
 def default_size(body: Body) -> float:
-    """Element size in metre of a body whose user asks for none."""
+    """Default element size of a body, metre."""
     if body.kind == "sheet":
         return min(body.width, body.height) / SHEET_CELLS
     if body.kind == "mesh":  # whose depth is that of its file
@@ -300,16 +301,17 @@ def default_size(body: Body) -> float:
 
 
 def coarsest_size(body: Body) -> float:
-    """Element size in metre that still tells a body's layers apart; those of a slab follow them."""
+    """Coarsest element size in metre that resolves a body's layers; those of a slab follow them."""
     starts = [start for start, _ in body.strata]
     followed = body.kind not in hands.KINDS
     return np.inf if followed else float(np.diff(starts).min(initial=np.inf)) / THINNEST
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
-    """The material of a thicker sheet that bends and weighs the same; ratio of the thicknesses.
+    """Material of a thicker sheet of the same bending stiffness and mass per area; `ratio` is that
+    of the thicknesses, original over equivalent.
 
-    Bending stiffness goes with E d^3, mass per area with rho d. Right for linear bending only.
+    Bending stiffness goes with E d^3, mass per area with rho d. Valid for linear bending only.
     """
     return replace(
         material,
@@ -321,28 +323,29 @@ def bending_equivalent(material: Material, ratio: float) -> Material:
 
 
 def has_exact_waves(body: Body) -> bool:
-    """Whether exact waves of an endless slab stand for a body, but for what its sides send back.
+    """Whether the wavenumber integral of an infinite slab is the solution for a body, but for
+    reflections from its sides.
 
-    Without any loss a slab's resonances have no limit.
+    Without any loss a slab's resonances are unbounded.
     """
     return is_plain_layer(body) and body.solid.has_loss
 
 
 def is_plain_layer(body: Body) -> bool:
     """Whether a body is a half-space or a slab on a rigid base, of one material, across the beam:
-    if nothing is lost in it, it has exact waves from rest, but no steady state.
+    without loss it has a wavenumber integral from rest, but no steady state.
     """
     layer = body.kind == "slab" and (body.base == "clamped" or not isfinite(body.depth))
     return layer and body.is_plain
 
 
 def exact_waves(body: Body, model: str) -> Compliance:
-    """How a body gives way that a model of exact waves is asked for.
+    """Compliance of a body for a wavenumber-integral model.
 
     Raises
     ------
     ValueError
-        If there is no body, or none that has exact waves.
+        If there is no body, or it has no wavenumber integral.
     """
     if not body.is_plain:
         raise ValueError(
@@ -353,12 +356,12 @@ def exact_waves(body: Body, model: str) -> Compliance:
 
 
 def compliance(body: Body) -> Compliance:
-    """How an endless body of the same section gives way.
+    """Compliance of an infinite body of the same section.
 
     Raises
     ------
     ValueError
-        If there is no body, or none that has exact waves.
+        If there is no body, or it has no wavenumber integral.
     """
     solid = body.solid
     if body.kind == "sheet":
@@ -373,7 +376,7 @@ def compliance(body: Body) -> Compliance:
         )
     if body.kind not in ("sheet", "slab") or (body.base != "clamped" and isfinite(body.depth)):
         raise ValueError(
-            "flat-body answers a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
+            "flat-body is for a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
         )
     values = vars(solid)
     return slab(**values, depth=body.depth) if isfinite(body.depth) else half_space(**values)

@@ -1,4 +1,4 @@
-"""Answers without reduction: every time step, every line, and exact waves of endless bodies."""
+"""Full-order models: direct time integration, and the steady state line by line."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -31,7 +31,7 @@ from skinwave.scene import Body, Scene
 
 Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 
-MOST_IMBALANCE = 0.01  # of the energy that goes round, beyond which an answer is refused
+MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
 MOST_LINES, MOST_KNOTS = 1000, 10_000  # of fem-harmonic, each a factorisation or a pattern
@@ -41,21 +41,22 @@ MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 def meshed(
     body: Body, h: float | None, clock: Clock, report: Progress, symmetry: str = ""
 ) -> Build:
-    """A body's mesh and what it is made of."""
+    """Mesh a body; its materials and boundary conditions."""
     with clock("mesh"):
         report("mesh", 0.0)
         return build_body(body, h, symmetry)
 
 
 def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
-    """A meshed body's operators."""
+    """Assemble a meshed body's operators."""
     with clock("assemble"):
         report("assemble", 0.0)
         return operators(build)
 
 
 def energy_balance(spent: fem.Spent, stored: float = 0.0, when: str = "") -> tuple[float, float]:
-    """The imbalance, if it is small enough to trust an answer, and the share that was radiated.
+    """Relative error of the energy balance, if small enough to trust a response, and the share of
+    the losses that was radiated.
 
     Raises
     ------
@@ -81,7 +82,7 @@ def transient_answer(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Response:
-    """The full time stepping in steps of dt, read between steps by a cubic spline."""
+    """Direct time integration of all dofs in steps of dt, interpolated by a cubic spline."""
     vacuum_only(scene.body, "fem-transient")
     dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
@@ -115,12 +116,12 @@ def marched(
     stored: Callable[[fem.State], float],
     report: Progress,
 ) -> tuple[Floats, tuple[float, float]]:
-    """What is read (steps + 1, p) of each state, and the last balance of the energy.
+    """Probe readings (steps + 1, p) of each state, and the last energy balance.
 
     Raises
     ------
     Diverged
-        If energy is missing in one of the states that are checked.
+        If the energy balance is violated in one of the states that are checked.
     """
     found = []
     for k, (state, spent) in enumerate(audited):
@@ -133,7 +134,7 @@ def marched(
 
 
 def step_count(duration: float, dt: float) -> int:
-    """How many steps of dt reach a duration in s.
+    """Number of steps of dt that reach a duration in s.
 
     Raises
     ------
@@ -142,7 +143,7 @@ def step_count(duration: float, dt: float) -> int:
     """
     if dt > duration:
         raise ValueError(
-            f"dt = {dt:g} s is longer than the answer, {duration:g} s; take a shorter step"
+            f"dt = {dt:g} s is longer than the response, {duration:g} s; take a shorter step"
         )
     if duration / dt > MOST_STEPS:
         raise ValueError(
@@ -162,10 +163,10 @@ def harmonic_answer(
     threshold: float = 1e-3,
     mapped: Map = map,
 ) -> Response:
-    """The steady state: one factorisation for each line of the load above the threshold, but for
-    the mean if nothing holds the body.
+    """Steady state: one factorisation for each line of the load above the threshold, but for the
+    mean if the body is unconstrained.
 
-    `mapped` is shaped like the built-in `map`; it may spread the lines over other machines.
+    `mapped` is called like the built-in `map`; it may spread the lines over other machines.
     """
     vacuum_only(scene.body, "fem-harmonic")
     clock = Clock()
@@ -184,7 +185,7 @@ def harmonic_answer(
         weights = path_weights(scene.pressure)[:, None]
         spots = along_path((scene.pressure.spot(points, knots) * weights).T)
         frequencies, pressures = lines.gather(spots.T)
-        if not scene.body.is_held:  # a mean would push what nothing holds ever further
+        if not scene.body.is_held:  # under its mean an unconstrained body would drift
             frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         total = fem.Spent()
@@ -211,7 +212,7 @@ def _line(
     frequency: float,
     pressure: fem.Complex,
 ) -> tuple[fem.Complex, fem.Spent]:
-    """Motion (p,) in metre of the probes at one line, and what becomes of its power."""
+    """Motion (p,) in metre of the probes at one line, and its mean power balance."""
     force, free = P @ pressure, ops.free
     u = fem.harmonic(ops, force, frequency, solver=solver)
     line = force[None, free], u[:, free], np.array([frequency])
@@ -219,7 +220,7 @@ def _line(
 
 
 def discretised(response: Response, build: Build, h: float, dt: float = 0.0) -> Response:
-    """A response that tells its element size in metre, time step in s and mesh."""
+    """The response with its element size in metre, time step in s and mesh."""
     mesh = cache.digest(build.mesh.points, build.mesh.tets)
     return replace(response, effort=replace(response.effort, h=h, dt=dt, mesh=mesh))
 

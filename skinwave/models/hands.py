@@ -1,4 +1,4 @@
-"""Hands: a palm from its parameters, or the body in a file, meshed for the focus above it."""
+"""Meshes and supports of hands: a parametric palm, or a body in a file, fine under the focus."""
 
 from collections.abc import Callable
 
@@ -22,16 +22,17 @@ from meshes.tetmesh import Floats, Ints
 from skinwave.scene import Body
 
 KINDS = ("palm", "mesh")
-COARSEST = 2.0  # cells far from the middle, over those of h
-RIM = 0.7  # cells at the rim of a palm, over the radius of its edge
-# Cells at the surface, over those of h, because the motion there has the scale of the focus; how
-# far from the middle they keep their size; and how much slower than sideways they grow downwards.
+COARSEST = 2.0  # elements far from the middle, over those of h
+RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
+# Elements at the surface, over those of h, because the motion there has the scale of the focal
+# spot; up to which radius they have that size; and how much slower than sideways they grow
+# downwards.
 SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
-# Cosine between the outward normal and straight down, or along the hand, where what is below the
-# surface begins to hold it, and where it does so entirely. From 0.5 to 0.9 the hold rises within
-# less than an element of a palm's rim, and meshes of 5 mm differ by 2.9 %; so they do by 1.4 %.
+# Cosine between the outward normal and straight down, or along the hand, where the support of a
+# surface begins, and where it is complete. From 0.5 to 0.9 it would rise within less than an
+# element of a palm's rim, and meshes of 5 mm differ by 2.9 %; from 0.2 to 1 they differ by 1.4 %.
 BEGINS, ENTIRE = 0.2, 1.0
-# Of the shear stiffness of the whole thickness: what stands for bone.
+# Stiffness that stands for bone, over the shear stiffness of the whole thickness.
 STIFFEST = 1e6
 
 
@@ -39,15 +40,15 @@ def hand(body: Body, h: float) -> TetMesh:
     """Ten-node tetrahedra of h in metre about the middle of the palm, growing away from it.
 
     The facet sets are `top`, seen from above, and of a mesh in a file its own `bottom`, and `sides`
-    where it was cut or says so. What else a hand rests on is a `support`.
+    where it was cut or has a set of that name. All else that a hand rests on is a `support`.
 
     Raises
     ------
     MeshError
-        If the body cannot be meshed, or its file tells regions apart.
+        If the body cannot be meshed, or its file has several regions.
     """
     if body.kind == "palm":
-        # Wider cells do not follow the rim, where waves come back and the hold of the base ends.
+        # Larger elements do not follow the rim, where waves reflect and the base's support ends.
         coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
         mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
         return TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
@@ -75,14 +76,14 @@ def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
 
 
 def support(body: Body, mesh: TetMesh) -> fem.Support:
-    """What a hand rests on where no facet set says so: bone below, and at the ends of a palm what
-    it is cut from.
+    """Elastic and absorbing support of a hand where no facet set is given: bone below, and at the
+    ends of a palm the tissue that it is cut from.
 
-    Of a surface whose normal leans by a cosine c towards either, a share s takes part, which rises
-    smoothly from 0 at c = 0.2 to 1 at 1. Where that is clamped it rests on soft tissue over
+    Of a surface whose normal has a cosine c with either direction, a share s is supported, which
+    rises smoothly from 0 at c = 0.2 to 1 at 1. Where that is clamped it rests on soft tissue over
     bone, whose thickness falls from infinite to next to nothing as the share rises: springs of
-    mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. The share of what
-    absorbs has dashpots. A palm's normals are those of its level set, others those of the facets.
+    mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. Where it is absorbing,
+    the share has dashpots. A palm's normals are those of its level set, others those of the facets.
 
     Parameters
     ----------
@@ -111,13 +112,13 @@ def _outward(body: Body, mesh: TetMesh, facets: Ints) -> Floats:
 
 
 def _share(cosine: Floats) -> Floats:
-    """A smooth step from 0 where nothing is held to 1 where all is."""
+    """Smooth step from 0 where a surface is free to 1 where all of it is supported."""
     t = np.clip((cosine - BEGINS) / (ENTIRE - BEGINS), 0.0, 1.0)
     return np.asarray(t * t * (3 - 2 * t))
 
 
 def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
-    """Shear modulus of fast motion over the mean thickness, N/m3."""
+    """Unrelaxed (fast) shear modulus over the mean thickness, N/m3."""
     _, normals = facet_geometry(mesh, boundary_facets(mesh.tets))
     thickness = corner_volumes(mesh.points, mesh.tets).sum() / np.maximum(normals[..., 2], 0).sum()
     return float((body.solid.shear_modulus + body.solid.relaxing_modulus) / thickness)
@@ -132,7 +133,7 @@ def _check_regions(file: str, mesh: TetMesh) -> None:
 
 
 def _is_rest(mesh: TetMesh) -> bool:
-    """Whether `bottom` is all that is not seen from above, but for what was cut."""
+    """Whether `bottom` is all of the boundary that is not seen from above, but for the cut."""
     unseen = boundary_facets(mesh.tets)[~seen_from_above(mesh)]
     cut = _corners(mesh.facets["cut"]) if "cut" in mesh.facets else set()
     return _corners(mesh.facets["bottom"]) | cut == _corners(unseen) | cut
@@ -144,7 +145,7 @@ def _corners(facets: Ints) -> set[tuple[int, ...]]:
 
 
 def depths(mesh: TetMesh) -> Floats:
-    """How far (m,) in metre the middle of each tetrahedron lies below the top, along the beam."""
+    """Depth (m,) in metre of the middle of each tetrahedron below the top, along the beam."""
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
     seen = mesh.points[np.unique(mesh.facets["top"])]

@@ -1,4 +1,4 @@
-"""A body reduced to its probes, ready to answer any Tacton."""
+"""Reduced body (offline stage), and its response to any Tacton (online stage)."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -17,27 +17,27 @@ from skinwave.models.bodies import Build, air, default_size, surface_load, surfa
 from skinwave.models.full import assembled, energy_balance, meshed
 from skinwave.scene import SAMPLE_RATE, Body, Scene
 
-BAND = 1000.0  # Hz up to which the reduced model must be right
+BAND = 1000.0  # Hz up to which the reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
 FORMAT = 2  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "relaxing", "relaxation_times", "read", "load", "points")
-NEGLIGIBLE_LINE = 1e-7  # of the strongest at the probes
+NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
 
 
 def reduction_tolerance(tolerance: float) -> float:
-    """What a reduction is asked for where a waveform may be wrong by so much: little of it."""
+    """Tolerance of a reduction: a small share of the relative error that a waveform may have."""
     return min(REDUCTION_TOLERANCE, tolerance / 50)
 
 
 def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
-    """Times (t,) in s of a response: from 0 up to the duration, at least two."""
+    """Sample times (t,) in s of a response: from 0 up to the duration, at least two."""
     return np.arange(max(2, round(scene.tacton.duration * rate))) / rate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
-    """A body ready to answer any Tacton at its probes.
+    """Reduced body: the model of its probes' response to any Tacton.
 
     `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
     `radiation` (r, r) in it, and `relaxing` stiffness (j, r, r) with its `relaxation_times` (j,);
@@ -58,7 +58,7 @@ class Prepared:
 
     @property
     def branches(self) -> tuple[fem.Branch, ...]:
-        """What relaxes of the reduced stiffness."""
+        """Generalised Maxwell branches of the reduced model."""
         both = zip(self.relaxing, self.relaxation_times.tolist(), strict=True)
         return tuple(fem.Branch(K=K, time=time) for K, time in both)
 
@@ -73,7 +73,8 @@ def prepare(
     tolerance: float = REDUCTION_TOLERANCE,
     symmetry: str = "",
 ) -> Prepared:
-    """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine.
+    """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
+    cache, once per machine.
 
     With `symmetry`, as in `bodies.build`, once for all Tactons that have it.
     """
@@ -91,9 +92,9 @@ def prepare(
 
 
 def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance: float) -> str:
-    """The cache's name for everything that a reduced body depends on."""
+    """Cache key of everything that a reduced body depends on."""
     mesh = build.mesh
-    # A file may call other facets of the same mesh its top, or hold others.
+    # A file may call other facets of the same mesh its top, or fix others.
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     rests = tuple(vars(build.support).values()) if build.support else ()
     used = fem.available()[0] if solver == "auto" else solver
@@ -180,7 +181,7 @@ def _prepared_anew(
 
 
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
-    """The probes where they are seen in the part that is modelled."""
+    """Mirror images of the probes in the part that is modelled."""
     kept = probes.copy()
     for axis in ("xy".index(a) for a in symmetry):
         kept[:, axis] = np.abs(kept[:, axis])
@@ -188,8 +189,8 @@ def _mirrored(probes: Floats, symmetry: str) -> Floats:
 
 
 def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -> Response:
-    """Motion of the prepared probes under a scene's Tacton, from rest: every line of the load,
-    and the free vibration that its start leaves.
+    """Online stage: response of a reduced body to a scene's Tacton from rest, as the steady state
+    of every line of the load and the free vibration of its start.
     """
     clock, times = Clock(), sample_times(scene)
     if progress:
@@ -201,7 +202,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         power = fem.mean_power(*damping, forces, motion, frequencies, prepared.branches)
         imbalance, radiated = energy_balance(power)
         lines, start = motion @ prepared.read.T, start @ prepared.read.T
-        # The mean is not what others are weighed by: it is boundless where nothing holds a body.
+        # Lines are not weighed against the mean: that of an unconstrained body has no bound.
         strength, mean = np.abs(lines).max(axis=1), frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
         heard &= shown(scene.pressure, frequencies, times)
@@ -227,7 +228,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
 def reduced_lines(
     pressure: MovingPressure, points: Floats, load: Floats
 ) -> tuple[Floats, fem.Complex]:
-    """Frequencies (f,) in Hz of a load's lines, and the reduced force (f, r) of each."""
+    """Reduced load spectrum: frequencies (f,) in Hz of its lines, and their forces (f, r)."""
     lines = load_lines(pressure)
     knots, reach = path_knots(pressure), spot_reach(pressure.height, pressure.focus)
     forces = []
@@ -240,7 +241,7 @@ def reduced_lines(
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:
-    """Unit Gaussian spots (n, 12) where palm-sized paths run, to judge a reduction by."""
+    """Unit Gaussian focal spots (n, 12) where palm-sized paths run, to estimate errors with."""
     reach = min(20e-3, body.width / 3, body.height / 3)
     centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
     squared = ((points[:, None, :2] - centres) ** 2).sum(axis=2)

@@ -1,4 +1,4 @@
-"""How fast waves run along the surface of a body, and what a faster focus leaves behind it."""
+"""Phase speed of surface waves, the Mach angle of a faster focus, and the period of a pattern."""
 
 from dataclasses import replace
 from math import asin, ceil, pi
@@ -12,14 +12,14 @@ from simple_model.compliance import AIR_DENSITY
 from simple_model.tacton import pattern_period, repeated
 from skinwave.scene import Body
 
-FEWEST, MOST = 40, 256  # frames of what pictures play
+FEWEST, MOST = 40, 256  # frames of an animation
 EACH = 8  # frames to a period of the fastest line that counts
 AIR_TURNS = 30  # each leaves a quarter of the error, or less
 SAME = 1e-6  # of a tone: further from a multiple of the common frequency it is none
 
 
 def surface_speed(body: Body, frequency: float) -> float:
-    """Phase speed in m/s of the surface wave of an endless body at a frequency in Hz.
+    """Phase speed in m/s of the surface wave of an infinite body at a frequency in Hz.
 
     A slab's is that of the Rayleigh wave of its material, as if it were deep: in a layer that is
     thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s sqrt(mu*/rho)) and
@@ -39,7 +39,9 @@ def surface_speed(body: Body, frequency: float) -> float:
 
 
 def bending_wavenumber(body: Body, frequency: float) -> float:
-    """k of an endless sheet, rad/m, at a frequency in Hz: D k^4 = (m + 2 rho / k) w^2."""
+    """Bending wavenumber k of an infinite sheet, rad/m, at a frequency in Hz:
+    D k^4 = (m + 2 rho / k) w^2.
+    """
     w = 2 * pi * frequency
     k = (body.mass_per_area * w**2 / body.bending_stiffness) ** 0.25
     for _ in range(AIR_TURNS if body.air and w else 0):
@@ -48,7 +50,7 @@ def bending_wavenumber(body: Body, frequency: float) -> float:
 
 
 def air_mass(body: Body, frequency: float) -> float:
-    """2 rho / k, kg/m2: the air that moves with both sides of a sheet in waves of a frequency, Hz.
+    """Added mass 2 rho / k, kg/m2, of the air on both sides of a sheet at a frequency in Hz.
 
     Junger and Feit, Sound, Structures, and Their Interaction (1986), section 5.11.
     """
@@ -61,15 +63,16 @@ def _viscous(solid: Material, w: float) -> float:
 
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:
-    """Angle in rad between the path and the front behind a focus, asin(c/v); None if it is slower.
+    """Mach angle asin(c/v) in rad between a path and the wavefront of a focus; None if it is
+    slower than the wave.
 
-    Of a straight path: on a circle smaller than a wavelength no clean cone forms.
+    For a straight path: on a circle smaller than a wavelength no clean cone forms.
     """
     return asin(wave_speed / speed) if speed > wave_speed else None
 
 
 def apparent_speed(distances: Floats, times: Floats, motion: Floats, frequency: float) -> float:
-    """Speed in m/s at which a line of motion (t, p) runs along distances (p,) in metre.
+    """Apparent phase speed in m/s of a line of motion (t, p) along distances (p,) in metre.
 
     The phase of its part at `frequency` Hz is fitted by a straight line, weighted by amplitude;
     the times (t,) in s should span whole periods. Negative where waves come in.
@@ -81,23 +84,23 @@ def apparent_speed(distances: Floats, times: Floats, motion: Floats, frequency: 
 
 
 def seam(tacton: Tacton, span: float) -> float:
-    """By how much of a turn, 0..0.5, the worst phase of what a Tacton repeats is off after a time
-    in s: the jump of pictures that play this time over and over.
+    """Phase jump in turns, 0..0.5, of the worst of a Tacton's periodic parts after a time in s:
+    that of an animation which repeats this time.
     """
     turns = span * np.array(list(repeated(tacton).values()))
     return float(np.abs(turns - np.round(turns)).max(initial=0.0))
 
 
 def period(pressure: MovingPressure) -> float | None:
-    """The period in s of a load's whole pattern; None if it has none within its duration."""
+    """Period in s of a load's whole pattern; None if it has none within its duration."""
     whole = pattern_period(pressure.tacton)
     turns = whole * max(repeated(pressure.tacton).values(), default=0.0)
     return whole if turns and seam(pressure.tacton, whole) <= SAME * turns else None
 
 
 def shown_period(pressure: MovingPressure) -> float:
-    """The time in s that pictures play: the period of the whole pattern or, if it has none, that
-    after which it has all but returned.
+    """Duration in s of an animation: the period of the whole pattern or, if it has none, the time
+    after which the pattern nearly repeats.
     """
     return pattern_period(pressure.tacton)
 
@@ -105,9 +108,9 @@ def shown_period(pressure: MovingPressure) -> float:
 def shown_part(
     pressure: MovingPressure, fastest: float, frames: int | None = None, most: int = MOST
 ) -> tuple[float, int]:
-    """The time in s that pictures play, and in how many frames: `EACH` to a period of the `fastest`
-    line in Hz that counts. A pattern that takes more than `most` frames is played in part, as long
-    as these last, with the least jump where it begins again.
+    """Duration in s of an animation and its number of frames: `EACH` to a period of the `fastest`
+    line in Hz that counts. A pattern that takes more than `most` frames is shown in part, as long
+    as these last, with the smallest jump where it repeats.
 
     Parameters
     ----------
@@ -122,7 +125,7 @@ def shown_part(
 
 
 def strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:
-    """The frequency in Hz of the line (f,) that moves a set of points (f, p) most; 0 of none."""
+    """Frequency in Hz of the line (f,) with the largest motion of points (f, p); 0 of none."""
     if not len(frequencies):
         return 0.0
     return float(frequencies[np.argmax((amplitudes**2).sum(axis=1))])

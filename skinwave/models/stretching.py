@@ -1,9 +1,9 @@
-"""Answers of a sheet that stretches as it bends: about its rest under the mean pressure.
+"""Nonlinear models of a sheet at large deflection, about its equilibrium under the mean pressure.
 
-A sheet is meshed as the linear models do it, with a solid some ten times too thick that bends and
-weighs as the true one. Solids so thick resist stretching d^2 / h^2 times too little, so that a
-membrane half way through makes up for what is missing: bending stiffness, mass and resistance to
-stretching are all those of the true sheet, and no element is flat.
+A sheet is meshed as in the linear models, by an equivalent solid some ten times too thick with the
+bending stiffness and mass of the true one. The membrane stiffness of so thick a solid is too small
+by the factor d^2 / h^2, and a membrane in its middle plane adds what is missing: bending stiffness,
+mass and membrane stiffness are all those of the true sheet, and no element is flat.
 """
 
 from collections.abc import Callable
@@ -30,16 +30,16 @@ from skinwave.models.speeds import bending_wavenumber
 from skinwave.scene import Body, Scene
 
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
-# as much as elements of this side raise them. At 7 elements a wave 0.3 % are left of 5 %.
+# as much as elements of this side raise them. At 7 elements a wavelength 0.3 % are left of 5 %.
 STOCKY, STOUTEST = 0.48, 0.05
 FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
 COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
-HIGHEST_MODE = 1500.0  # Hz, of the modes that are kept
+HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
 FEWEST_MODES, MOST_MODES = 40, 160
 
 
 def sheet_only(body: Body, model: str) -> None:
-    """Refuse a body that is no sheet held at its edges, or of a material that relaxes.
+    """Refuse a body that is no sheet with clamped edges, or of a material with a Maxwell branch.
 
     Raises
     ------
@@ -48,24 +48,24 @@ def sheet_only(body: Body, model: str) -> None:
     """
     if body.kind != "sheet" or body.sides != "clamped":
         raise ValueError(
-            f"{model} answers a sheet with clamped sides, not a {body.kind} with {body.sides} "
+            f"{model} is for a sheet with clamped sides, not a {body.kind} with {body.sides} "
             "sides; give it one, or use --model fem"
         )
     if body.solid.relaxing_modulus:
         raise ValueError(
-            f"{model} answers no material that relaxes, and this one's relaxing_modulus is "
+            f"{model} has no Maxwell branches, and this material's relaxing_modulus is "
             f"{body.solid.relaxing_modulus:g} Pa; leave it out, or use --model fem, fem-harmonic "
             "or fem-transient"
         )
     if body.placement.is_tilted:
         raise ValueError(
-            f"{model} answers a sheet that lies across the beam, not a tilted one; leave out its "
+            f"{model} is for a sheet that lies across the beam, not a tilted one; leave out its "
             "tilt, or use --model fem"
         )
 
 
 def stretching_size(body: Body, *, reduced: bool) -> float:
-    """Element size in metre of a sheet whose user asks for none."""
+    """Default element size of a sheet at large deflection, metre."""
     return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)
 
 
@@ -75,13 +75,13 @@ def expected_error(body: Body, h: float) -> float:
 
 
 def meshed_sheet(body: Body, h: float) -> Build:
-    """The sheet in cells of h in metre, as thick as suits them."""
+    """Mesh of the equivalent sheet in cells of h in metre, with a thickness to match."""
     thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
     return build(body, h, thickness=thickness)
 
 
 def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membrane:
-    """What a meshed sheet lacks of its resistance to stretching, or a given share of the whole."""
+    """Membrane with the stiffness that a meshed sheet lacks, or a given share of the whole."""
     ratio = body.depth / float(np.ptp(made.mesh.points[:, 2]))
     share = 1 - ratio**2 if share is None else share
     triangles = middle_plane(made.mesh)
@@ -89,7 +89,7 @@ def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membran
 
 
 def stretching_body(body: Body, made: Build) -> fem.Elastic:
-    """The meshed sheet with all its unknowns."""
+    """Full-order model of the meshed sheet at large displacement."""
     missing = membrane(body, made)
     return fem.finite_strain(
         made.mesh,
@@ -100,7 +100,7 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
 
 
 def mean_pressure(pressure: MovingPressure, points: Floats) -> Floats:
-    """Pressure (n,) in Pa at surface points (n, 2 or 3), averaged over all time."""
+    """Mean pressure (n,) in Pa at surface points (n, 2 or 3), averaged over all time."""
     lines = load_lines(pressure)
     mean = lines.frequencies < 1e-9
     weighted = pressure.spot(points, path_knots(pressure)) * path_weights(pressure)[:, None]
@@ -117,7 +117,7 @@ def full_answer(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Response:
-    """Every unknown and every step, from rest under the mean pressure."""
+    """Direct time integration of all dofs, from equilibrium under the mean pressure."""
     sheet_only(scene.body, "fem-nonlinear-transient")
     vacuum_only(scene.body, "fem-nonlinear-transient")
     clock = Clock()
@@ -142,7 +142,7 @@ def full_answer(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Reduced:
-    """A sheet in its bending modes."""
+    """Sheet reduced to its bending modes, with its load."""
 
     made: Build
     modes: fem.StretchingModes
@@ -160,7 +160,7 @@ def reduced_answer(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Response:
-    """The sheet's bending modes, step by step, from rest under the mean pressure."""
+    """Time integration of the sheet's bending modes, from equilibrium under the mean pressure."""
     sheet_only(scene.body, "fem-nonlinear")
     clock = Clock()
     with clock("reduce"):
@@ -189,7 +189,7 @@ def reduced_answer(
 
 @lru_cache(maxsize=1)
 def _reduced(body: Body, h: float | None, solver: str) -> _Reduced:
-    """The sheet reduced, once for many Tactons in a row."""
+    """Reduce the sheet to its modes, cached for many Tactons in a row."""
     made = meshed_sheet(body, h or stretching_size(body, reduced=True))
     operators = stretching_body(body, made).operators
     modes = fem.stretching_modes(
@@ -203,7 +203,7 @@ def _reduced(body: Body, h: float | None, solver: str) -> _Reduced:
 
 
 def mode_count(body: Body) -> int:
-    """Modes of a sheet below `HIGHEST_MODE`: its area times k^2 / 4 pi (Courant and Hilbert)."""
+    """Number of modes below `HIGHEST_MODE`: area times k^2 / 4 pi (Weyl; Courant and Hilbert)."""
     squared = bending_wavenumber(body, HIGHEST_MODE) ** 2
     found = round(body.width * body.height * squared / 4 / pi)
     return min(max(found, FEWEST_MODES), MOST_MODES)
@@ -214,7 +214,7 @@ def _about_rest(
     body: fem.Elastic, mean: Floats, force: Callable[[float], Floats],
     read: Callable[[Floats], Floats], dt: float, solver: str, effort: Effort,
 ) -> Response:  # fmt: skip
-    """The motion from rest under the mean load."""
+    """Time integration from the static equilibrium under the mean load (preload)."""
     steps = step_count(float(times[-1]), dt)
     kept = lru_cache(maxsize=2)(force)
     with clock("preload"):

@@ -1,1 +1,1 @@
-"""What a scene requires, and how wrong an answer will be."""
+"""Plans: the model and mesh that a scene requires, and the expected error of its response."""

@@ -1,8 +1,8 @@
-"""Expected error and warnings of an answer whose mesh is decided already.
+"""Expected error and warnings of a response on a given mesh.
 
-The error of a mesh is that which a coarser one leaves, as in `refinement`. An element size that
-was asked for is compared with the next coarser one; a default one with one of twice the size,
-which costs a tenth of it and makes errors out up to one and a half times too large.
+The error of a mesh is extrapolated from a coarser one, as in `refinement`. An element size that was
+asked for is compared with the next coarser one; a default one with one of twice the size, which
+costs a tenth of it and overestimates errors by up to a half.
 """
 
 from dataclasses import replace
@@ -35,7 +35,7 @@ def assessed(
     *,
     compared: Coarser | None = None,
 ) -> Response:
-    """The response of a reduced body with its expected error and all warnings.
+    """Response of a reduced body with its expected error and all warnings.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def told(
     *,
     compared: Coarser | None = None,
 ) -> Response:
-    """`assessed`, of what counts of any answer by linear elements: waveforms (t, p), or the lines
-    (f, p) of a body that is not held.
+    """Response of any linear finite-element model, `assessed` by its quantity of interest `fine`:
+    waveforms (t, p), or the lines (f, p) of an unconstrained body.
     """
     body, size = scene.body, h or default_size(scene.body)
     other, coarse = compared or coarser_body(scene, h, tolerance, solver)
@@ -77,7 +77,7 @@ def coarser_body(
     tolerance: float = 0.05,
     solver: str = "auto",
 ) -> Coarser:
-    """The element size in metre that `assessed` compares with, and the body reduced with it."""
+    """Coarser element size in metre that `assessed` compares with, and the body reduced with it."""
     body = scene.body
     other = compared_with(body, h) if h else _coarser(body, default_size(body))
     return other, _prepared(body, scene.probes, other, solver, reduction_tolerance(tolerance))
@@ -91,7 +91,7 @@ def sentences(
     h: float | None = None,
     error: float = 0.0,
 ) -> tuple[str, ...]:
-    """All warnings of a response, whichever door it goes out by; computes no mesh.
+    """All warnings of a response, by whichever interface it is returned; computes no mesh.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def sentences(
 
 
 def _coarser(body: Body, h: float) -> float:
-    """A size in metre to compare a default one with at little cost, if it can be meshed."""
+    """Coarser size in metre to compare a default one with at little cost, if it can be meshed."""
     try:
         check_mesh(body, QUICKLY * h)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Warnings of what was asked for and is not enough, each with its number and its cure."""
+"""Warnings where a request is not met, each with its number and its cure."""
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
 
-LINEAR = 0.5  # of its thickness that a sheet may deflect
-LOSS_ERROR = 0.4  # of a loss factor, of which the fit differs by 0.3 within its band
+LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
+LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its band is up to 0.3
 
 
 def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple[str, ...]:
@@ -29,9 +29,9 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
 
 
 def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
-    """Of a sheet that a linear model deflects by more than `LINEAR` times its thickness: at its
-    probes or, clamped, in the middle under its mean load. The rigid motion of a sheet that is not
-    held is no deflection.
+    """Warning of a sheet that a linear model deflects by more than `LINEAR` times its thickness: at
+    its probes or, clamped, in the middle under its mean load. The rigid-body motion of an
+    unconstrained sheet is no deflection.
     """
     body, u = scene.body, response.displacement
     if body.kind != "sheet" or response.unit != "m" or response.model.startswith("fem-nonlinear"):
@@ -49,23 +49,23 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
 
 
 def unknown(error: float) -> tuple[str, ...]:
-    """Of a mesh beside which there is no other."""
+    """Warning of an unknown discretisation error: a file with a single mesh."""
     if np.isfinite(error):
         return ()
     return (
-        "how wrong this mesh makes the answer is not known, because its file has only one; give a "
+        "the discretisation error of this mesh is not known, because its file has only one; give a "
         "finer one and compare",
     )
 
 
 def unheld(scene: Scene) -> tuple[str, ...]:
-    """Of a body that a mean pressure pushes away."""
+    """Warning of rigid-body drift under a load with non-zero mean."""
     if scene.body.is_held or not mean_gain(scene):
         return ()
     endless = ", or take depth_mm = inf" if scene.body.kind == "slab" else ""
     return (
-        "nothing holds this body, and a lasting pressure pushes it ever further: only motion about "
-        f"the mean counts; clamp its base or its sides{endless}",
+        "this body is unconstrained and drifts under a pressure with non-zero mean: only motion "
+        f"about the mean counts; clamp its base or its sides{endless}",
     )
 
 
@@ -78,7 +78,7 @@ def _damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
 def other_loss(
     scene: Scene, frequencies: Floats, shares: Floats, tolerance: float
 ) -> tuple[str, ...]:
-    """Where Rayleigh damping is far from the loss factor that it stands for."""
+    """Warning of lines where Rayleigh damping is far from the loss factor that it is fitted to."""
     if not any(solid.loss_factor for _, solid in scene.body.strata):
         return ()
     by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND)
@@ -98,21 +98,21 @@ def other_loss(
 
 
 def exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
-    """Of what will be more wrong than it may be."""
+    """Warning of an expected error above the tolerance."""
     if not error > tolerance:
         return ()
     percent = f"{100 * error:.0f}" if error > 0.1 else f"{100 * error:.2g}"
     return (
-        f"{what} will be wrong by about {percent} %, more than the tolerance of "
+        f"{what} will have a relative error of about {percent} %, more than the tolerance of "
         f"{100 * tolerance:g} %; {cure} enough",
     )
 
 
 def under_resolved(h: float, width: float) -> tuple[str, ...]:
-    """Of elements that are too wide for the focus."""
+    """Warning of elements that do not resolve the focal spot."""
     if h <= 2 * width:
         return ()
     return (
-        f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focus, "
-        f"{1e3 * width:.2g} mm: they keep its force but not its shape; make them smaller",
+        f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focal "
+        f"spot, {1e3 * width:.2g} mm: they preserve its force but not its shape; make them smaller",
     )

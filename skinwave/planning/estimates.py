@@ -1,4 +1,4 @@
-"""How wrong an answer will be, estimated before it is computed."""
+"""A-priori estimates of lines, edge reflections and the initial transient of a response."""
 
 from dataclasses import replace
 from math import isfinite
@@ -14,18 +14,19 @@ from simple_model.trajectory import BY_POINTS
 from skinwave.models.bodies import compliance, is_plain_layer
 from skinwave.scene import Body, Scene
 
-REFLECTED = 0.03  # of a wave that meets an absorbing side and the layer around it
-# The four sides may be in step; slabs gave back 0.5 to 0.9 times as much. Where viscosity rules, a
-# free side gives back more than its image: overdamped slabs of 80 to 120 mm gave back 0.9 to 1.1
-# times as much as both factors make it, of 70 mm up to 1.5.
+REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
+# Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where
+# viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80 to
+# 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
 IN_STEP, OVERDAMPED = 2.0, 1.5
-FAR = 0.25  # m, beyond which waves are not followed
-FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: how waves are followed
+FAR = 0.25  # m, beyond which waves are neglected
+FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: duration and sampling rate of the estimate
 
 
 def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
-    """Frequencies (f,) in Hz of the lines that move the probes, and each one's share (f, p) of
-    the motion's power; by exact waves of the endless body, or as the load has them.
+    """Response spectrum: frequencies (f,) in Hz of the lines that move the probes, and each one's
+    share (f, p) of the motion's power; by the wavenumber integral of the infinite body, or those of
+    the load.
     """
     body = scene.body
     if scene.tacton.trajectory.shape == "recorded":
@@ -37,7 +38,7 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if pressure.focus != "gaussian":  # of the same width; only which lines matter is asked
+        if pressure.focus != "gaussian":  # of the same width; only to find which lines matter
             pressure = replace(pressure, focus="gaussian")
         try:
             f, a = steady_lines(
@@ -55,25 +56,26 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def highest_line(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """The line above which the motion of every probe is negligible, in Hz."""
+    """Cutoff frequency in Hz above which the motion of every probe is negligible."""
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
 
 def is_flat(scene: Scene) -> bool:
-    """Whether there are exact waves for the scene, but for what its sides send back."""
+    """Whether the scene has a wavenumber integral, but for reflections from its sides."""
     return is_plain_layer(scene.body) and scene.pressure.focus == "gaussian"
 
 
 def returned_and_start(scene: Scene) -> tuple[float, float]:
-    """What the sides send back to the probes over their motion in an endless body, and what of that
-    motion is not its steady state; at most 1 each. Both are followed for the first `FOLLOWED`. What
-    loses nothing, or next to nothing, has no steady state, and all of its motion counts.
+    """Edge reflections at the probes relative to their motion in an infinite body, and the
+    transient relative to the steady state; at most 1 each. Both are computed for the first
+    `FOLLOWED`. A body without loss, or nearly so, has no steady state, and all of its motion counts
+    as transient.
 
-    What a side sends back to a probe is what an endless body would have at the probe's mirror
+    The reflection of a side at a probe is the motion of an infinite body at the probe's mirror
     image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
-    `OVERDAMPED` times that where shear waves cannot oscillate. Sides that absorb send
-    nothing back, and a half-space has none.
+    `OVERDAMPED` times that where shear waves cannot oscillate. Absorbing sides count as free of
+    reflections, and a half-space has no sides.
     """
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
@@ -95,7 +97,7 @@ def returned_and_start(scene: Scene) -> tuple[float, float]:
     except ArithmeticError:
         return back, 1.0
     left = (u[:, : len(probes)] - steady) ** 2
-    # What is left at the end of that time is taken to last: it is less.
+    # The transient at the end of that time is taken to last, which is an upper bound.
     lasting = left[-len(left) // 4 :].mean(axis=0) * (tacton.duration - len(times) / FOLLOWED_AT)
     energy = left.sum(axis=0) / FOLLOWED_AT + np.maximum(lasting, 0.0)
     own = np.maximum((steady**2).mean(axis=0) * tacton.duration, 1e-300)
@@ -103,16 +105,16 @@ def returned_and_start(scene: Scene) -> tuple[float, float]:
 
 
 def _loss_at_cut_off(body: Body) -> float:
-    """The loss tangent at the lowest cut-off of shear waves across the depth, w = pi c / 2 H."""
+    """Loss tangent at the lowest cut-off of shear waves across the depth, w = pi c / 2 H."""
     modulus = body.solid.complex_modulus(np.pi * body.solid.shear_speed / (2 * body.depth))
     return float(modulus.imag / modulus.real)
 
 
 def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
-    """Steady motion that absorbing sides `half` (2,) metre away send back, over the probes' own.
+    """Reflection of absorbing sides `half` (2,) metre away, over the probes' own steady motion.
 
-    By mirror images of the focus in the four sides and the exact waves of the endless body, for
-    the lines that the load is made of. 1, for unknown, of a body that loses too little for that.
+    By mirror images of the focus in the four sides and the wavenumber integral of the infinite
+    body, for the lines of the load. 1, for unknown, of a body with too little loss for that.
     """
     body, width = scene.body, spot_width(scene.pressure.height)
     path = _along(scene.tacton.trajectory)
@@ -135,7 +137,7 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
 
 
 def _mirrored(points: Floats, half: Floats) -> list[Floats]:
-    """Images (n, 2) of points (n, 2) in the four sides."""
+    """Mirror images (n, 2) of points (n, 2) in the four sides."""
     return [
         np.where(np.arange(2) == axis, 2 * sign * half - points, points)
         for axis in (0, 1)
@@ -144,20 +146,20 @@ def _mirrored(points: Floats, half: Floats) -> list[Floats]:
 
 
 def _to_edge(scene: Scene, half: Floats) -> float:
-    """From the path or the probes to the nearest side, metre."""
+    """Distance from the path or the probes to the nearest side, metre."""
     used = np.vstack([_along(scene.tacton.trajectory), scene.probe_points])
     return float((half - np.abs(used).max(axis=0)).min())
 
 
 def _along(path: Trajectory) -> Floats:
-    """Some positions (k, 2) in metre of the focus."""
+    """Sample positions (k, 2) in metre of the focus."""
     if path.shape in BY_POINTS:
         return path.outline[:: max(1, len(path.points) // 24)]
     return path.at_phase(np.arange(24) / 24)
 
 
 def mean_gain(scene: Scene) -> float:
-    """Pa of all foci together, on average over a Tacton."""
+    """Mean pressure in Pa of all foci together over a Tacton."""
     # At random, because any even spacing would take some modulation for a constant.
     times = np.random.default_rng(0).uniform(0, scene.tacton.duration, 20_000)
     gain: Floats = scene.pressure.gain(np.sort(times))

@@ -1,4 +1,4 @@
-"""How much of a body a scene requires, and what of its physics stays out."""
+"""Extent of a body that a scene requires, its symmetry, and physics that is neglected."""
 
 from dataclasses import dataclass, replace
 
@@ -9,12 +9,12 @@ from skinwave.models.speeds import air_mass
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
 
-LOWEST = 20.0  # Hz at which air is weighed where no line is higher
+LOWEST = 20.0  # Hz at which air is estimated where no line is higher
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One thing that was decided, and why."""
+    """One decision of a plan, and its reason."""
 
     what: str
     value: str
@@ -22,7 +22,7 @@ class Row:
 
 
 def symmetry(scene: Scene) -> str:
-    """Axes across whose middle plane the load is its own mirror image at all times."""
+    """Symmetry axes: across their middle planes the load is its own mirror image at all times."""
     if scene.body.kind not in ("sheet", "slab") or scene.body.placement != FLAT:
         return ""
     path = scene.tacton.trajectory
@@ -31,9 +31,9 @@ def symmetry(scene: Scene) -> str:
 
 
 def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
-    """The body as far as waves come back from, and the reason if that is not all of it.
+    """The body out to where reflections are negligible, and the reason if that is not all of it.
 
-    Only sides that absorb are moved inwards: what others send back belongs to the answer.
+    Only absorbing sides are moved inwards: reflections from others belong to the response.
     """
     body = scene.body
     plain = body.kind == "slab" and body.base == "clamped" and body.is_plain
@@ -54,14 +54,16 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[R
     row = Row(
         what="extent",
         value=f"{1e3 * width:.0f} x {1e3 * height:.0f} mm",
-        reason=f"what comes back from further away is below {10 * tolerance:.2g} %; absorbing "
+        reason=f"reflections from further away are below {10 * tolerance:.2g} %; absorbing "
         f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
     )
     return replace(body, width=width, height=height), [row]
 
 
 def left_out(scene: Scene, highest: float) -> list[Row]:
-    """What the model leaves out, with the estimate behind that; of a sheet's air how much it is."""
+    """Neglected physics of a sheet with an estimate of each: air, if it is in vacuum, and
+    stretching; with air, its added mass.
+    """
     body = scene.body
     if body.kind != "sheet":
         return []
@@ -76,7 +78,7 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
             value=f"+{100 * air:.0f} % mass",
             reason=f"{lowered}; each wavenumber has its own, as air = true asks"
             if body.air
-            else f"{lowered}: take the answer as that of a sheet in vacuum, or set air = true in "
+            else f"{lowered}: take the response as that of a sheet in vacuum, or set air = true in "
             "[body]",
         ),
         Row(
@@ -90,7 +92,7 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
 
 
 def mean_sag(scene: Scene) -> float:
-    """Deflection in metre of a clamped sheet's middle under its mean load, if that were there.
+    """Deflection in metre of a clamped sheet's middle under its mean load, if applied there.
 
     0.0056 F a^2 / D of a square (Timoshenko and Woinowsky-Krieger 1959, table 37).
     """

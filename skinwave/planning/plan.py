@@ -1,4 +1,4 @@
-"""What a scene requires and no more: model, extent, element size, cost, and a reason for each."""
+"""Plan of a scene: the cheapest model, extent and element size within a tolerance, with reasons."""
 
 from dataclasses import dataclass, field, replace
 
@@ -22,20 +22,20 @@ from skinwave.planning.refinement import Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.scene import FLAT, Body, Scene
 
-WAVES_SHARE = 0.8  # of the tolerance that sides left out may take
+WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 UNREDUCED = ("fem-transient", "fem-harmonic", "fem-nonlinear-transient")
 KERNELS = ("point-kernel", "point-kernel-published")
-KERNEL_ERROR = 1.0  # of the point kernel on any body, measured 0.98 to 1.04
+KERNEL_ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What to run.
+    """Plan of a simulation.
 
     `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
     element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
-    expected relative `error`; predicted `seconds` and bytes of `memory` of the first answer;
-    a reason for each; `warnings` of what was asked for and is not enough; and the body `prepared`
+    expected relative `error`; predicted `seconds` and bytes of `memory` of the first response;
+    a reason for each; `warnings` where a request is not met; and the reduced body, `prepared`,
     on the mesh that was found.
     """
 
@@ -62,12 +62,12 @@ def plan(
     solver: str = "auto",
     progress: Progress | None = None,
 ) -> Plan:
-    """What answers a scene within a relative error of `tolerance` in its probes' waveforms.
+    """Plan a scene's simulation to a relative error of `tolerance` in its probes' waveforms.
 
     Parameters
     ----------
-    model, h, dt : what is decided already: a model's name, element size in metre, time step in s;
-        with both a model and h all of the body counts
+    model, h, dt : given choices: a model's name, element size in metre, time step in s; with both
+        a model and h all of the body is modelled
     solver, progress : for the meshes that are tried where the scene needs elements
 
     Raises
@@ -84,7 +84,7 @@ def plan(
         step_count(float(sample_times(scene)[-1]), dt)
     if scene.body.kind == "none":
         if model not in (None, *KERNELS):
-            raise ValueError(f"a scene without a body has no {model} answer; use --model auto")
+            raise ValueError(f"a scene without a body has no {model} response; use --model auto")
         kernel = model or "point-kernel"
         row = Row(what="model", value=kernel, reason="there is no body to move")
         return Plan(model=kernel, body=scene.body, rows=(row,))
@@ -127,7 +127,7 @@ def plan(
             *of_elements(scene, found.h, found.error, tolerance),
             *exceeds(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
-            *exceeds("fem-harmonic, which leaves out how the motion starts,", start_error,
+            *exceeds("fem-harmonic, which leaves out the initial transient,", start_error,
                       tolerance, "fem is"),
         ),
         prepared=found.prepared,
@@ -141,8 +141,8 @@ def _kernel(scene: Scene, tolerance: float, model: str) -> Plan:
 
 
 def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> Plan:
-    """A sheet with large deflection, whose element size does not come from the linear answer: what
-    stretching stiffens has longer waves and fewer resonances than the linear sheet.
+    """Plan of a sheet at large deflection, whose element size does not come from the linear
+    response: stiffened by stretching it has longer waves and fewer resonances than the linear one.
     """
     sheet_only(scene.body, model)
     size = h or stretching_size(scene.body, reduced=model == "fem-nonlinear")
@@ -174,15 +174,15 @@ def _without_mesh(
         both = np.hypot(returned, start)
         model = "flat-body-harmonic" if both <= tolerance else "flat-body"
     left = start if model == "flat-body-harmonic" else 0.0
-    reason = "a homogeneous flat slab without sides that reflect: exact waves, no mesh"
+    reason = "a homogeneous flat slab without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
-        reason = f"waves that come back from the sides are {100 * returned:.2g} %: take none"
+        reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
     if left:
-        reason += f"; how the motion starts, {100 * start:.2g} %, is left out"
+        reason += f"; the initial transient, {100 * start:.2g} %, is left out"
     warnings = (
-        *exceeds(f"{model}, which lets no wave return from the sides,", returned, tolerance,
+        *exceeds(f"{model}, which leaves out reflections from the sides,", returned, tolerance,
                   "fem is"),
-        *exceeds(f"{model}, which leaves out how the motion starts,", left, tolerance,
+        *exceeds(f"{model}, which leaves out the initial transient,", left, tolerance,
                   "flat-body is"),
     )  # fmt: skip
     rows = [
@@ -200,7 +200,7 @@ def _element_rows(
     scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
 ) -> list[Row]:
     effort = found.prepared.effort
-    kept = "" if "factorise and reduce" in effort.seconds else ", which is kept"
+    kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
     return [
         Row(
             what="symmetry",
@@ -211,7 +211,7 @@ def _element_rows(
         ),
         Row(
             what="element size",
-            value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} unknowns",
+            value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} dofs",
             reason=f"{_why_size(found, tolerance, h)}: those of "
             f"{1e3 * found.compared:.2f} mm differ by so much that an error of "
             f"{100 * found.error:.2g} % is left"
@@ -220,7 +220,7 @@ def _element_rows(
         ),
         Row(
             what="reduction",
-            value=f"{effort.reduced_dofs} unknowns, {effort.estimate:.0e} up to {BAND:.0f} Hz",
+            value=f"{effort.reduced_dofs} dofs, {effort.estimate:.0e} up to {BAND:.0f} Hz",
             reason=f"asked for {reduction_tolerance(tolerance):.1g}: it costs little",
         ),
         *left_out(scene, highest),
@@ -241,7 +241,7 @@ def _why_size(found: Refined, tolerance: float, h: float | None) -> str:
 
 
 def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, float]:
-    """Expected relative errors of a time step, and of leaving out how the motion starts."""
+    """Expected relative errors of a time step, and of leaving out the initial transient."""
     if model not in ("fem-transient", "fem-harmonic"):
         return 0.0, 0.0
     known = sensitivity(scene)
@@ -253,19 +253,22 @@ def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, fl
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
-        return f"exact waves need a Gaussian focus, not '{scene.pressure.focus}'"
+        return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus}'"
     if body.kind in ("palm", "mesh"):
         return "a body that is not flat"
     if len(body.strata) > 1:
-        return f"{len(body.strata)} layers; exact waves are for one material"
+        return f"{len(body.strata)} layers; the wavenumber integral is for one material"
     if body.placement != FLAT:
-        return "the body is tilted or moved; exact waves are for a flat one across the beam"
+        return "the body is tilted or moved; the wavenumber integral is for one across the beam"
     if body.kind == "sheet" and body.sides == "absorbing":
-        return "sides of a sheet absorb some of what reaches them; exact waves are endless"
+        return "absorbing sides of a sheet reflect in part; the wavenumber integral has no sides"
     if body.kind == "sheet":
-        return f"the {body.sides} sides of this sheet reflect; exact waves are endless"
+        return f"the {body.sides} sides of this sheet reflect; the wavenumber integral has no sides"
     if not is_flat(scene):
-        return f"its base is {body.base}; exact waves are for one that holds the slab, or none"
+        return f"its base is {body.base}; the wavenumber integral is for a clamped one or none"
     if body.sides == "absorbing":
-        return "as asked; there are exact waves of this body"
-    return f"the {body.sides} sides send back about {100 * returned:.3g} %; exact waves are endless"
+        return "as asked; this body has a wavenumber integral, too"
+    return (
+        f"the {body.sides} sides reflect about {100 * returned:.3g} %; "
+        "the wavenumber integral has no sides"
+    )

@@ -1,9 +1,10 @@
-"""How fine a mesh must be, found by refining it: no error law holds for every scene.
+"""Mesh refinement with Richardson error estimates: no a-priori error law holds for every scene.
 
-Near a resonance a mesh that is a little too stiff moves the waveform by many times as much as
-elsewhere, and soft or thin bodies need more elements than stiff ones. Each mesh of a rising
-ladder is judged by what the next one changes, with the order that all of them reach. All axes are
-refined alike: a slab has few layers, and one more changes as much as all that is between.
+Near a resonance a mesh that is a little too stiff changes the waveform by many times as much as
+elsewhere, and soft or thin bodies need more elements than stiff ones. The error of each mesh in a
+sequence is extrapolated from its change to the one before, at the order of convergence of all of
+them. All axes are refined alike: a slab has few layers of cells, and one more changes as much as
+all that is between.
 """
 
 from dataclasses import dataclass
@@ -28,18 +29,18 @@ from skinwave.models.bodies import (
 from skinwave.models.prepared import Prepared, answer, prepare, reduced_lines, reduction_tolerance
 from skinwave.scene import Body, Scene
 
-FIRST, RATIO = 2.6, 1.3  # of the default element size; of two sizes next to each other
+FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands
-ORDER = 2.25  # of a waveform's error in the element size; measured 1.9 to 3.5
-AIM = 0.6  # of the tolerance, so that one more mesh is enough
-STRIDE = 1.6  # between two sizes at most: coarse meshes make their errors out too large
-FINEST = 0.4  # of the default element size, beyond which no more is promised
+ORDER = 2.25  # of convergence of a waveform in the element size; measured 1.9 to 3.5
+AIM = 0.6  # of the tolerance: safety factor, so that one more mesh is enough
+STRIDE = 1.6  # between two sizes at most: coarse meshes overestimate their errors
+FINEST = 0.4  # of the default element size: the finest that is tried
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Element size `h` in metre, the expected relative `error` with it, the size in metre that it
-    was `compared` with, and the body `prepared` with it.
+    """Refined mesh: element size `h` in metre, the expected relative `error` with it, the size in
+    metre that it was `compared` with, and the reduced body, `prepared` with it.
     """
 
     h: float
@@ -58,9 +59,10 @@ def refined(
     solver: str = "auto",
     h: float | None = None,
 ) -> Refined:
-    """The coarsest mesh of a ladder that is right to a tolerance, or how right h is.
+    """Coarsest mesh of a sequence that is accurate to a tolerance, or that of a given h, with its
+    expected error.
 
-    If the end of the ladder is not, it comes back with its error.
+    If the finest of the sequence is not, that one is returned, with its error.
 
     Raises
     ------
@@ -95,7 +97,7 @@ def refined(
 
 
 def ladder(body: Body) -> Floats:
-    """Sizes (k,) in metre that a body may be meshed with, falling."""
+    """Sequence of element sizes (k,) in metre that a body may be meshed with, descending."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
     if body.kind in hands.KINDS:  # whose coarser meshes cut the rim off, and layers
         coarsest = min(FIRST_HAND * default_size(body), COMPARED * coarsest_size(body))
@@ -112,13 +114,13 @@ def ladder(body: Body) -> Floats:
 
 
 def _finer(sizes: Floats, size: float) -> Floats:
-    """Those that are finer by `RATIO` or more; the last if none is."""
+    """Sizes that are finer by `RATIO` or more; the last if none is."""
     coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
 
 def compared_with(body: Body, h: float) -> float:
-    """A size that a given one can be compared with: coarser, or finer than a single layer."""
+    """Size that a given one can be compared with: coarser, or finer than a single layer."""
     if not _has_cell_layers(body):
         return min(RATIO * h, max(body.width, body.height))
     layers = cell_layers(body, h)
@@ -127,18 +129,18 @@ def compared_with(body: Body, h: float) -> float:
 
 
 def _has_cell_layers(body: Body) -> bool:
-    """Whether the size alone says how many cells lie below each other, not the body's layers."""
+    """Whether the size alone sets the number of cells through the depth, not the body's layers."""
     return body.kind == "slab" and len(body.strata) == 1
 
 
 def _layered(body: Body, layers: int, near: float) -> float:
-    """The size in metre next to another of which a slab has so many layers of cells, or nearly."""
+    """Size in metre near another with which a slab has so many layers of cells, or nearly."""
     sizes = (near * 2 ** np.linspace(-1, 1, 101)).tolist()
     return min(sizes, key=lambda h: (abs(cell_layers(body, h) - layers), abs(np.log(h / near))))
 
 
 def coarser_by(body: Body, other: float, h: float) -> float:
-    """How many times as coarse as one mesh another is, along the axis where they differ less."""
+    """Refinement ratio of two meshes, coarser over finer, along the axis where they differ less."""
     if not _has_cell_layers(body):
         return other / h
     down = cell_layers(body, h) / cell_layers(body, other)
@@ -146,8 +148,8 @@ def coarser_by(body: Body, other: float, h: float) -> float:
 
 
 def counted(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
-    """What an answer is judged by: waveforms (t, p); the lines (f, p) beside the mean of a body
-    that nothing holds, because the mean pushes it ever further, and that would hide the rest.
+    """Quantity of interest of a response: waveforms (t, p); of an unconstrained body the lines
+    (f, p) without the mean, because rigid-body drift would hide the rest.
     """
     if scene.body.is_held:
         return found.displacement
@@ -157,8 +159,8 @@ def counted(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
 
 
 def error_left(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
-    """The expected relative error of what is `counted` of an answer, (k, p), by that of another
-    with elements `ratio` times as large.
+    """Richardson estimate of the relative error of a quantity of interest (k, p), see `counted`, by
+    that of another mesh with elements `ratio` times as large.
     """
     size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
     change = np.linalg.norm(found - other, axis=0)
@@ -166,6 +168,8 @@ def error_left(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
-    """A size in metre that will do where h leaves an error; a slab's cells are never higher."""
+    """Element size in metre that meets a tolerance, by the error with h; a slab's cells are at most
+    as high as its depth.
+    """
     aim, size = AIM * tolerance, min(h, body.depth if body.kind == "slab" else h)
     return size * (aim / max(aim, error)) ** (1 / ORDER)

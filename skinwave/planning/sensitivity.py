@@ -1,8 +1,8 @@
-"""How much a scene's answer depends on its body's frequencies, found on a coarse mesh.
+"""Sensitivity of a scene's response to its body's natural frequencies, found on a coarse mesh.
 
-Elements and time steps make every natural frequency a little wrong. Near a resonance that moves
-the waveform many times as much as elsewhere, so that no error law holds for all scenes; but the
-poles of a coarse reduced model, moved by a thousandth, tell.
+Discretisation in space and time gives every natural frequency a small error. Near a resonance that
+changes the waveform many times as much as elsewhere, so that no a-priori error law holds for all
+scenes; but the poles of a coarse reduced model, shifted by a thousandth, give the sensitivity.
 """
 
 from dataclasses import dataclass, replace
@@ -17,16 +17,16 @@ from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene
 
 COARSENING = 2.0  # of the default element size
-DETUNING = 0.010  # natural frequencies of the coarse mesh are too high by this: put right first
+DETUNING = 0.010  # natural frequencies of the coarse mesh are too high by this: corrected first
 MOVED = 1e-3
-LONGEST = 1.0  # s of the answers that are compared
+LONGEST = 1.0  # s of the responses that are compared
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sensitivity:
-    """`value`: relative change of the worst probe's waveform per relative change of all natural
-    frequencies; `frequency` in Hz: that of the motion, root mean square; `start`: the share of
-    the waveform that is not its steady state.
+    """Sensitivity of a response. `value`: relative change of the worst probe's waveform per
+    relative change of all natural frequencies; `frequency` in Hz: that of the motion, root mean
+    square; `start`: the share of the waveform that is transient.
     """
 
     value: float
@@ -35,7 +35,7 @@ class Sensitivity:
 
 
 def sensitivity(scene: Scene) -> Sensitivity:
-    """Found from two answers of a coarse reduced model, which takes seconds once per body."""
+    """Sensitivity from two responses of a coarse reduced model, seconds once per body."""
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
     coarse = prepare(scene.body, scene.probe_points, h=h)
     values = coarse.poles.values * (1 - DETUNING)
@@ -43,7 +43,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE
 
     def parts(moved: float) -> tuple[Floats, Floats]:
-        """Steady state and start (t, p) where all natural frequencies are higher by this much."""
+        """Steady state and transient (t, p) where all natural frequencies are higher by so much."""
         higher = np.asarray(values * (1 + moved), np.complex128)
         poles = replace(coarse.poles, values=higher)
         lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
