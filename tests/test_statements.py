@@ -85,8 +85,7 @@ def test_lines_that_cannot_be_told_apart_are_not_reported():
     assert short.untold == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
     assert list(line_rows(short)) == []
     assert (
-        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be resolved in 0.5 s"
-        in untold([short])[0]
+        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be resolved in 0.5 s" in untold([short])[0]
     )
     assert evaluate([short]) == []
     assert long.untold == ()

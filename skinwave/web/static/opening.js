@@ -17,8 +17,8 @@
 
   async function why() {
     try {
-      const answer = await fetch(`turn?page=${page}`, { cache: "no-store" });
-      return answer.ok ? (await answer.json()).wait : await answer.text();
+      const response = await fetch(`turn?page=${page}`, { cache: "no-store" });
+      return response.ok ? (await response.json()).wait : await response.text();
     } catch {
       return LOST;
     }

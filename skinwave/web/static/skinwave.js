@@ -43,8 +43,8 @@ document.addEventListener("keydown", (event) => {
 setInterval(async () => {
   if (!document.getElementById("sw-lost")) return;
   try {
-    const answer = await fetch("alive", { cache: "no-store" });
-    if (answer.ok) window.location.reload();
-    else document.getElementById("sw-lost-why").textContent = await answer.text();
+    const response = await fetch("alive", { cache: "no-store" });
+    if (response.ok) window.location.reload();
+    else document.getElementById("sw-lost-why").textContent = await response.text();
   } catch {}
 }, 1500);
