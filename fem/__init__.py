@@ -9,21 +9,18 @@ einsum in this package: e element, q quadrature point, a b element nodes, i j co
 n node, p probe, t time, f frequency, l derivative along an element edge.
 """
 
+import warnings
+from typing import Any
+
 from fem import nonlinear
-from fem.air import Added, added_mass
+from fem.added_mass import AddedMass, added_mass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
-from fem.energy import Spent, audited, imbalance, mean_power, stored
+from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
 from fem.linear_solver import Factor, available, factorise
-from fem.materials import PRESETS, Material, from_young
-from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
-from fem.reduced import ReducedModel, load_subspace, reduce, transfer
-from fem.reduced_nonlinear import StretchingModes, stretching_modes
-from fem.relaxation import Branch
-from fem.static import modes, static
-from fem.surface import (
+from fem.load_and_probe import (
     facet_normals,
     facet_points,
     load_operator,
@@ -31,29 +28,34 @@ from fem.surface import (
     pressure_force,
     probe_operator,
 )
+from fem.materials import PRESETS, Material, from_young
+from fem.maxwell import MaxwellBranch
+from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
+from fem.reduced import ReducedModel, load_subspace, reduce, transfer
+from fem.reduced_nonlinear import StretchingModes, stretching_modes
+from fem.static import modes, static
 from fem.transient import Diverged, State, at_rest, transient
 
 __all__ = [
     "PRESETS",
-    "Added",
-    "Branch",
+    "AddedMass",
     "Complex",
     "Diverged",
     "Elastic",
+    "EnergyBalance",
     "Factor",
     "Material",
+    "MaxwellBranch",
     "Membrane",
     "Operators",
     "Poles",
     "ReducedModel",
-    "Spent",
     "State",
     "StretchingModes",
     "Support",
     "added_mass",
     "assemble",
     "at_rest",
-    "audited",
     "available",
     "exponential_sum",
     "facet_normals",
@@ -80,4 +82,21 @@ __all__ = [
     "stretching_modes",
     "transfer",
     "transient",
+    "with_energy_balance",
 ]
+
+# Names of version 0.2, which load for one release.
+_RENAMED = {
+    "Added": "AddedMass",
+    "Branch": "MaxwellBranch",
+    "Spent": "EnergyBalance",
+    "audited": "with_energy_balance",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _RENAMED:
+        raise AttributeError(f"module 'fem' has no attribute '{name}'")
+    new = _RENAMED[name]
+    warnings.warn(f"fem.{name} is now fem.{new}", DeprecationWarning, stacklevel=2)
+    return globals()[new]

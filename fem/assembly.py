@@ -23,17 +23,19 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.boundary import Support, dashpots, fixed_dofs, springs
-from fem.dilatation import projected_dilatation
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.pattern import UPPER, Pattern, from_components, from_nodal, slabs
-from fem.relaxation import Branch, on_free
+from fem.maxwell import MaxwellBranch, on_free
+from fem.pressure_projection import projected_divergence
+from fem.sparsity import UPPER, Pattern, from_components, from_nodal, slabs
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
 LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra do not lock up to it
-DIRECT = 2.0  # lam / mu of the unprojected part beyond it; a slab's error was least with 1 to 3
+UNPROJECTED = (
+    2.0  # lam / mu of the unprojected part beyond it; a slab's error was least with 1 to 3
+)
 LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
 
@@ -53,7 +55,7 @@ class Operators:
     R: sparse.csr_array
     free: Ints
     n_dofs: int
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[MaxwellBranch, ...] = ()
 
     def expand(self, values: Floats) -> Floats:
         """Values (n_free, ...) on all dofs (n_dofs, ...), 0 where the body is fixed."""
@@ -121,14 +123,14 @@ def _of(materials: list[Material], name: str) -> Floats:
 
 def _volume_operators(
     mesh: TetMesh, pattern: Pattern, materials: list[Material], region: Ints
-) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[MaxwellBranch, ...]]:
     """K, C, M and a generalised Maxwell branch of each relaxation time, on all dofs."""
     rho, mu, lam = (_of(materials, name) for name in ("density", "shear_modulus", "first_lame"))
     mass_rate, hysteretic_lag = np.array(
         [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
     ).T
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
-    D = {m: projected_dilatation(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
+    D = {m: projected_divergence(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
     projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
 
     def stiffness(share: Floats) -> sparse.csr_array:
@@ -149,7 +151,7 @@ def _volume_operators(
     M = _mass(mesh, pattern, rho[region])
     relaxing, times = (_of(materials, name) for name in ("relaxing_modulus", "relaxation_time"))
     branches = tuple(
-        Branch(K=portion((times == time) * relaxing / mu), time=time)
+        MaxwellBranch(K=portion((times == time) * relaxing / mu), time=time)
         for time in np.unique(times[relaxing > 0])
     )
     C = portion(hysteretic_lag + _of(materials, "viscosity") / mu)
@@ -162,7 +164,7 @@ def _volume_operators(
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:
     """Unprojected part (r,) of lam in Pa; the rest acts on the projection of the dilatation."""
-    return np.where(lam > LOCKING_FREE * mu, DIRECT * mu, lam)
+    return np.where(lam > LOCKING_FREE * mu, UNPROJECTED * mu, lam)
 
 
 def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:

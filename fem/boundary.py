@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from fem.load_and_probe import facet_geometry, facet_normals
 from fem.materials import Material
-from fem.surface import facet_geometry, facet_normals
 from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import FACES, Floats, Ints, facet_keys
 

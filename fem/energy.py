@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.assembly import Operators
-from fem.relaxation import Branch
+from fem.maxwell import MaxwellBranch
 from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
@@ -25,7 +25,7 @@ ROUND_OFF = 1e-6  # of the reactive power
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spent:
+class EnergyBalance:
     """Energy balance of a load in J (or its mean power in W): its work, what the material
     dissipated, what absorbing boundaries took; and for mean powers the apparent power exchanged.
     """
@@ -35,8 +35,8 @@ class Spent:
     radiated: float = 0.0
     exchanged: float = 0.0
 
-    def __add__(self, other: "Spent") -> "Spent":
-        return Spent(
+    def __add__(self, other: "EnergyBalance") -> "EnergyBalance":
+        return EnergyBalance(
             work=self.work + other.work,
             dissipated=self.dissipated + other.dissipated,
             radiated=self.radiated + other.radiated,
@@ -49,9 +49,9 @@ class Spent:
         return self.dissipated + self.radiated
 
 
-def audited(
+def with_energy_balance(
     operators: Operators, states: Iterator[State], force: Callable[[float], Floats]
-) -> Iterator[tuple[State, Spent]]:
+) -> Iterator[tuple[State, EnergyBalance]]:
     """States from rest, each with the energy balance so far, at the cost of a product with C, R and
     each Maxwell branch a step.
 
@@ -61,7 +61,7 @@ def audited(
     """
     C, R, free = operators.C, operators.R, operators.free
 
-    def lost(before: State, state: State) -> Spent:
+    def lost(before: State, state: State) -> EnergyBalance:
         velocity = (state.velocity + before.velocity)[free] / 2
         dt = state.time - before.time
         out = dt * float(velocity @ (R @ velocity))
@@ -71,27 +71,27 @@ def audited(
         for branch, (old, new) in zip(operators.branches, both, strict=True):
             mean = (old + new)[free] / 2
             relaxed += dt / branch.time * float(mean @ (branch.K @ mean))
-        return Spent(dissipated=viscous + relaxed, radiated=out)
+        return EnergyBalance(dissipated=viscous + relaxed, radiated=out)
 
-    return accounted(states, force, free, lost)
+    return with_losses(states, force, free, lost)
 
 
-def accounted(
+def with_losses(
     states: Iterator[State],
     force: Callable[[float], Floats],
     free: Ints,
-    lost: Callable[[State, State], Spent],
-) -> Iterator[tuple[State, Spent]]:
+    lost: Callable[[State, State], EnergyBalance],
+) -> Iterator[tuple[State, EnergyBalance]]:
     """States of any body, each with the energy balance since the first: `lost` gives the losses
     between two states.
     """
-    before, spent = next(states), Spent()
+    before, spent = next(states), EnergyBalance()
     f = force(before.time)[free]
     yield before, spent
     for state in states:
         f_next = force(state.time)[free]
         moved = (state.displacement - before.displacement)[free]
-        spent += Spent(work=float(moved @ (f + f_next)) / 2) + lost(before, state)
+        spent += EnergyBalance(work=float(moved @ (f + f_next)) / 2) + lost(before, state)
         yield state, spent
         before, f = state, f_next
 
@@ -104,7 +104,7 @@ def stored(operators: Operators, state: State) -> float:
     return float(u @ (operators.K @ u) + v @ (operators.M @ v) + springs) / 2
 
 
-def imbalance(spent: Spent, stored: float = 0.0) -> float:
+def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
     """Relative error of the energy balance; `stored` in J since its start.
 
     Where nothing is lost, round-off of the reactive power is no imbalance.
@@ -119,8 +119,8 @@ def mean_power(
     forces: NDArray[np.complex128],
     motion: NDArray[np.complex128],
     frequencies: Floats,
-    branches: Sequence[Branch] = (),
-) -> Spent:
+    branches: Sequence[MaxwellBranch] = (),
+) -> EnergyBalance:
     """Mean power balance of a load's spectral lines, in W.
 
     Parameters
@@ -146,4 +146,6 @@ def mean_power(
     relaxed = sum(taken(b.K, b.time / (1 + (w * b.time) ** 2)) for b in branches)
     dissipated = taken(C, always) - radiated + relaxed
     exchanged = float(np.abs(apparent).sum())
-    return Spent(work=supplied, dissipated=dissipated, radiated=radiated, exchanged=exchanged)
+    return EnergyBalance(
+        work=supplied, dissipated=dissipated, radiated=radiated, exchanged=exchanged
+    )

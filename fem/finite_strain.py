@@ -21,7 +21,7 @@ from fem.assembly import LOSS_BAND, Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.pattern import UPPER, Pattern, from_components, slabs
+from fem.sparsity import UPPER, Pattern, from_components, slabs
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
-from fem.relaxation import relaxing_stiffness
+from fem.maxwell import relaxing_stiffness
 from meshes.tetmesh import Floats
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from fem.maxwell import factors
 from fem.reduced import ReducedModel
-from fem.relaxation import factors
 from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]

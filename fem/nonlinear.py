@@ -19,7 +19,7 @@ from itertools import count
 import numpy as np
 from scipy.optimize import brentq
 
-from fem.energy import Spent, accounted
+from fem.energy import EnergyBalance, with_losses
 from fem.finite_strain import Elastic
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged, State, acceleration, at_rest, weights
@@ -271,10 +271,11 @@ def total_energy(body: Elastic, state: State) -> float:
     return float(v @ (body.operators.M @ v)) / 2 + body.energy(state.displacement[free])
 
 
-def audited(
+def with_energy_balance(
     body: Elastic, states: Iterator[State], force: Callable[[float], Floats]
-) -> Iterator[tuple[State, Spent]]:
-    """States, each with the energy balance since the first, as `fem.audited` of a linear body.
+) -> Iterator[tuple[State, EnergyBalance]]:
+    """States, each with the energy balance since the first, as `fem.with_energy_balance` of a
+    linear body.
 
     Parameters
     ----------
@@ -282,10 +283,10 @@ def audited(
     """
     free = body.operators.free
 
-    def lost(before: State, state: State) -> Spent:
+    def lost(before: State, state: State) -> EnergyBalance:
         moved = (state.displacement - before.displacement)[free]
         middle = (state.displacement + before.displacement)[free] / 2
         dt = state.time - before.time
-        return Spent(dissipated=float(moved @ body.viscous(middle, moved)) / dt)
+        return EnergyBalance(dissipated=float(moved @ body.viscous(middle, moved)) / dt)
 
-    return accounted(states, force, free, lost)
+    return with_losses(states, force, free, lost)

@@ -27,10 +27,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse.linalg import aslinearoperator
 
-from fem.air import Added
+from fem.added_mass import AddedMass
 from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
-from fem.relaxation import Branch, relaxing_stiffness
+from fem.maxwell import MaxwellBranch, relaxing_stiffness
 from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
@@ -67,7 +67,7 @@ class ReducedModel:
     moments: int
     estimate: float
     solver: str
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[MaxwellBranch, ...] = ()
 
 
 def reduce(
@@ -77,7 +77,7 @@ def reduce(
     tolerance: float = 1e-3,
     *,
     loads: Floats | None = None,
-    added: Added | None = None,
+    added: AddedMass | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -158,7 +158,7 @@ def reduce(
     )
 
 
-def _with_added(operators: Operators, added: Added) -> Operators:
+def _with_added(operators: Operators, added: AddedMass) -> Operators:
     """Operators of a body with an added mass, of which C and M can only be applied."""
     C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
     return replace(operators, C=C + added.rate * added.M, M=M + added.M)
@@ -296,12 +296,12 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
     return grown
 
 
-def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[Branch, ...]:
+def _branches(small: list[Floats], large: tuple[MaxwellBranch, ...]) -> tuple[MaxwellBranch, ...]:
     """The full model's Maxwell branches with the reduced stiffness."""
-    return tuple(Branch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
+    return tuple(MaxwellBranch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
 
 
-def _impedance(K: Floats, C: Floats, branches: tuple[Branch, ...], w: Floats) -> Complex:
+def _impedance(K: Floats, C: Floats, branches: tuple[MaxwellBranch, ...], w: Floats) -> Complex:
     s = 1j * w[:, None, None]
     return np.asarray(K + s * C + s**2 * np.eye(len(K)) + relaxing_stiffness(branches, s))
 
@@ -309,7 +309,7 @@ def _impedance(K: Floats, C: Floats, branches: tuple[Branch, ...], w: Floats) ->
 def _probe_response(
     K: Floats,
     C: Floats,
-    branches: tuple[Branch, ...],
+    branches: tuple[MaxwellBranch, ...],
     seeds: Floats,
     loads: Floats | None,
     band: float,

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
-from fem.air import Added
+from fem.added_mass import AddedMass
 from fem.assembly import Operators
 from fem.finite_strain import (
     Elastic,
@@ -65,7 +65,7 @@ def stretching_modes(
     membrane: Membrane,
     n: int,
     *,
-    added: Added | None = None,
+    added: AddedMass | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
@@ -107,7 +107,7 @@ def stretching_modes(
 
 
 def _with_added(
-    operators: Operators, added: Added, hz: Floats, shapes: Floats
+    operators: Operators, added: AddedMass, hz: Floats, shapes: Floats
 ) -> tuple[Floats, Floats]:
     """Modes with an added mass, by the Rayleigh-Ritz method from those without."""
     mass = np.eye(len(hz)) + _projected(added.M, shapes[operators.free])

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import cg
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
-from fem.relaxation import pull, relaxing_stiffness
+from fem.maxwell import branch_force, relaxing_stiffness
 from meshes.tetmesh import Floats
 
 
@@ -74,7 +74,7 @@ def transient(
     u, v = start.displacement[free], start.velocity[free]
     d = np.array([part[free] for part in start.stretch]) if start.stretch else 0 * felt * u
     f = force(start.time)[free]
-    a = acceleration(operators, f - C @ v - K @ u - pull(branches, d))
+    a = acceleration(operators, f - C @ v - K @ u - branch_force(branches, d))
     step = 0
     while True:
         time = start.time + step * dt
@@ -97,7 +97,7 @@ def transient(
         d_next = (2 * felt - 1) * d + felt * (u_next - u)
         inner = (1 - a_f) * f_next + a_f * f - a_m * (M @ a)
         inner -= K @ ((1 - a_f) * u_next + a_f * u) + C @ ((1 - a_f) * v_next + a_f * v)
-        inner -= pull(branches, (1 - a_f) * d_next + a_f * d)
+        inner -= branch_force(branches, (1 - a_f) * d_next + a_f * d)
         a = factor.solve(inner)
         u, v, f = u_next + dt**2 * beta * a, v_next + dt * gamma * a, f_next
         d = d_next + felt * (dt**2 * beta * a)

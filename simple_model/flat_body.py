@@ -30,18 +30,18 @@ from scipy.special import jv
 
 from simple_model.compliance import Complex, Compliance
 from simple_model.focus import spot_width
-from simple_model.pressure import MovingPressure, check_lines
-from simple_model.response import Effort, Response, step
-from simple_model.sampling import finer, highest, reached, shown, transform
-from simple_model.steady import (
-    along_path,
+from simple_model.load_spectrum import (
     foci_harmonics,
     harmonics,
     load_lines,
-    path_knots,
-    played,
-    summed,
+    merge_lines,
+    path_fourier,
+    path_samples,
+    synthesise,
 )
+from simple_model.pressure import MovingPressure, check_lines
+from simple_model.response import Effort, Response, step
+from simple_model.sampling import finer, highest, reached, shown, transform
 from simple_model.trajectory import Floats
 
 PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
@@ -119,10 +119,10 @@ def steady_lines(
     respond = _response_at(compliance, pressure, distance, 2 * np.pi * f)
     blocks = max(1, distance.size * len(f) // AT_ONCE)
     amplitudes = [
-        along_path(respond(part))[which, :, lines.harmonics] * lines.coefficients[:, None]
+        path_fourier(respond(part))[which, :, lines.harmonics] * lines.coefficients[:, None]
         for part in np.array_split(distance, min(blocks, len(distance)))
     ]
-    return summed(lines.frequencies, np.hstack(amplitudes))
+    return merge_lines(lines.frequencies, np.hstack(amplitudes))
 
 
 def steady_state(
@@ -145,7 +145,7 @@ def steady_state(
     below = shown(pressure, f, times)
     f, a = f[below], a[below]
     effort = {"steps": len(f), "dofs": len(f)}
-    return _timed("flat-body-harmonic", started, times, probes, played(f, a, times), **effort)
+    return _timed("flat-body-harmonic", started, times, probes, synthesise(f, a, times), **effort)
 
 
 def flat_body(
@@ -203,7 +203,7 @@ def _circling(
     """Transform (f, p) of the probes' motion under foci that run a closed path."""
     f_d = pressure.tacton.trajectory.drawing_frequency
     u = np.zeros((len(w), len(probes)), np.complex128)
-    h = along_path(_on_path(compliance, pressure, probes, w, NEGLIGIBLE))
+    h = path_fourier(_on_path(compliance, pressure, probes, w, NEGLIGIBLE))
     orders = harmonics(h.shape[2])
     h[:, :, orders] *= foci_harmonics(pressure, orders)
     largest = np.abs(h).max()
@@ -320,7 +320,7 @@ def _integrated(
 
 def _distances(pressure: MovingPressure, probes: Floats) -> Floats:
     """Distances (p, k) in metre from the probes to knots of the path."""
-    return np.linalg.norm(probes[:, None] - path_knots(pressure), axis=2)
+    return np.linalg.norm(probes[:, None] - path_samples(pressure), axis=2)
 
 
 def _on_path(

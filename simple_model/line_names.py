@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model.drive import DRIVES
+from simple_model.load_spectrum import foci_harmonics, gain_orders, path_strengths
 from simple_model.pressure import MovingPressure
-from simple_model.steady import foci_harmonics, gain_orders, path_strengths
 from simple_model.tacton import Tacton, tones
 from simple_model.trajectory import Floats
 

@@ -13,8 +13,8 @@ from skinwave.models.bodies import EXACT, exact_waves
 from skinwave.models.full import Map, harmonic_answer, transient_answer
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
-from skinwave.planning.cautions import beyond_linear
 from skinwave.planning.plan import Plan, plan
+from skinwave.planning.warnings import beyond_linear
 from skinwave.scene import Scene
 
 MODELS = (

@@ -8,7 +8,7 @@ import pytest
 
 import fem
 import meshes
-from fem.air import added_mass
+from fem.added_mass import added_mass
 from fem.assembly import LOSS_BAND
 from fem.materials import rayleigh_damping
 from simple_model import MovingPressure, Tacton, Trajectory

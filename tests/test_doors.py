@@ -15,7 +15,7 @@ from simple_model import Effort, Response
 from skinwave import document
 from skinwave.cli import main
 from skinwave.planning.assessment import sentences
-from skinwave.planning.cautions import beyond_linear
+from skinwave.planning.warnings import beyond_linear
 from skinwave.scene_file import loads
 from skinwave.simulation import answered, compute
 

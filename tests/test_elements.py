@@ -9,9 +9,9 @@ import pytest
 import fem
 import meshes
 from fem.assembly import element_stiffness
-from fem.dilatation import clusters, projected_dilatation
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
-from fem.pattern import Pattern, from_components
+from fem.pressure_projection import macroelements, projected_divergence
+from fem.sparsity import Pattern, from_components
 from meshes import TetMesh
 
 
@@ -51,7 +51,7 @@ def test_rigid_motion_has_no_energy(distorted_cube):
 
 def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
     mesh = distorted_cube
-    cluster, sloping = clusters(mesh)
+    cluster, sloping = macroelements(mesh)
     assert set(cluster) == set(range(len(sloping)))
     assert sloping.all()
     x, y, z = mesh.points.T
@@ -59,19 +59,19 @@ def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
         (np.stack([x, y, z], axis=1), 9.0),
         (np.stack([x**2 / 2, 0 * y, y * z], axis=1), 2 / 3 + 1 / 2),  # (x + y)^2
     ):
-        found = projected_dilatation(mesh) @ u.ravel()
+        found = projected_divergence(mesh) @ u.ravel()
         assert found @ found == pytest.approx(squared, rel=1e-12)
     rough = np.random.default_rng(0).standard_normal(mesh.n_dofs)
     lam = np.ones(len(mesh.tets))
     pattern = Pattern.of(mesh.tets, len(x))
     direct = from_components(pattern, pattern.sum(element_stiffness(mesh, 0 * lam, lam), 6))
-    found = projected_dilatation(mesh) @ rough
+    found = projected_divergence(mesh) @ rough
     assert found @ found < 0.6 * (rough @ direct @ rough)
 
 
 def test_clusters_are_the_boxes_of_a_mesh_of_boxes():
     mesh = meshes.block((3.0, 2.0, 1.0), 0.5)
-    cluster, sloping = clusters(mesh)
+    cluster, sloping = macroelements(mesh)
     assert sloping.all()
     np.testing.assert_array_equal(np.bincount(cluster), 6)
     centres = mesh.points[mesh.tets[:, :4]].mean(axis=1)
@@ -85,10 +85,10 @@ def test_clusters_are_the_boxes_of_a_mesh_of_boxes():
 def test_an_element_without_inner_edges_is_a_cluster_of_its_own():
     points = np.vstack([np.zeros(3), np.eye(3)])
     mesh = meshes.quadratic(TetMesh(points=points, tets=[[0, 1, 2, 3]]))
-    cluster, sloping = clusters(mesh)
+    cluster, sloping = macroelements(mesh)
     np.testing.assert_array_equal(cluster, [0])
     np.testing.assert_array_equal(sloping, [False])
-    swelling = projected_dilatation(mesh) @ mesh.points.ravel()
+    swelling = projected_divergence(mesh) @ mesh.points.ravel()
     assert (swelling**2).sum() == pytest.approx(3**2 / 6)  # div u squared, times the volume
 
 
@@ -160,3 +160,10 @@ def test_probes_read_the_displacement_along_the_push(distorted_cube):
     u[:, 2] = -(1 + distorted_cube.points[:, 0] ** 2)
     S = fem.probe_operator(distorted_cube, [[0.3, 0.4], [0.71, 0.2]])
     np.testing.assert_allclose(S @ u.ravel(), [1.09, 1.5041], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("old", "new"), fem._RENAMED.items())
+def test_a_name_of_the_last_release_loads_with_a_warning(old, new):
+    with pytest.warns(DeprecationWarning, match=f"fem.{old} is now fem.{new}"):
+        assert getattr(fem, old) is getattr(fem, new)
+    assert not hasattr(fem, "nothing")

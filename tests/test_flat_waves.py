@@ -104,12 +104,12 @@ def test_flat_bodies_take_a_gaussian_focus_only():
 
 
 def test_load_lines_add_up_to_the_load():
-    from simple_model.steady import along_path, load_lines, path_knots
+    from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 
     load = circling(0.02, 12, am=140, drive="pressure_squared")
     points, times = np.array([[0.01, 0.0], [0.0, 0.004]]), np.arange(300) / 1e4
     lines = load_lines(load, 1e-8)
-    spots = along_path(load.spot(points, path_knots(load)).T)  # (point, n)
+    spots = path_fourier(load.spot(points, path_samples(load)).T)  # (point, n)
     waves = lines.coefficients * np.exp(2j * np.pi * lines.frequencies * times[:, None])
     summed = (waves @ spots[:, lines.harmonics].T).real
     np.testing.assert_allclose(summed, point_kernel(load, points, times).displacement, atol=1e-6)

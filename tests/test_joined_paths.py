@@ -20,7 +20,7 @@ from simple_model import (
 )
 from simple_model.compliance import half_space
 from simple_model.joined import parted
-from simple_model.steady import along_path, load_lines, path_knots
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from skinwave.models.speeds import period
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps, loads
@@ -84,7 +84,7 @@ def test_lines_are_those_of_the_load_sampled(paths, more):
     sampled = np.fft.rfft(load(PLACES, (np.arange(count) + 0.5) / 320_000), axis=0)[:200] / count
     sampled *= np.exp(-1j * np.pi * np.arange(200) / count)[:, None]
     sampled[1:] *= 2
-    f, a = load_lines(load).gather(along_path(load.spot(PLACES, path_knots(load)).T).T)
+    f, a = load_lines(load).gather(path_fourier(load.spot(PLACES, path_samples(load)).T).T)
     found = np.zeros_like(sampled)
     rank = np.round(f * load.tacton.duration).astype(int)
     np.testing.assert_allclose(f, rank / load.tacton.duration, atol=1e-6)

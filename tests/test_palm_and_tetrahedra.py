@@ -52,7 +52,7 @@ def together(*surfaces):
 def enclosed(mesh):
     """Volume within curved boundary facets, exact for ten-node elements."""
     facets = meshes.boundary_facets(mesh.tets)
-    _, normals = fem.surface.facet_geometry(mesh, facets)
+    _, normals = fem.load_and_probe.facet_geometry(mesh, facets)
     at = fem.facet_points(mesh, facets).reshape(normals.shape)
     return np.einsum("eqi,eqi->", at, normals) / 3
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simple_model import MovingPressure, Response, Tacton, Trajectory, phasors
-from simple_model.steady import load_lines
+from simple_model.load_spectrum import load_lines
 from skinwave.comparison import compare
 from skinwave.propagation import OUTSIDE, propagation, share_outside
 from skinwave.run import Run

@@ -16,8 +16,8 @@ from simple_model.compliance import half_space, slab
 from simple_model.drive import DRIVES
 from simple_model.flat_body import steady_lines
 from simple_model.focus import FOCI
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.rhythm import ROLES
-from simple_model.steady import along_path, load_lines, path_knots
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import Body, Scene, SkinwaveWarning, dumps, loads
@@ -276,7 +276,7 @@ def test_probes_around_a_circle_see_the_same_lines(tacton, distance, angle):
     load = MovingPressure(tacton=replace(tacton, am_frequency=0.0))
     probes = turned(distance, np.array([0.0, angle]))
     _, waves = steady_lines(half_space(**SLOW), load, probes)
-    spots = along_path(load.spot(probes, path_knots(load)).T)  # the point kernel's
+    spots = path_fourier(load.spot(probes, path_samples(load)).T)  # the point kernel's
     lines = load_lines(load)
     kernel = lines.coefficients * spots[:, lines.harmonics]
     for amplitudes in (np.abs(waves.T), np.abs(kernel)):

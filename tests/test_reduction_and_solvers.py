@@ -348,10 +348,10 @@ def test_an_answer_that_makes_energy_is_refused():
     ops = fem.assemble(mesh, fem.PRESETS["palm"])
     push = fem.load_operator(mesh) @ np.ones(fem.load_operator(mesh).shape[1])
     states = list(islice(fem.transient(ops, lambda t: push, 1e-4), 50))
-    *_, (state, spent) = fem.audited(ops, iter(states), lambda t: push)
+    *_, (state, spent) = fem.with_energy_balance(ops, iter(states), lambda t: push)
     stored = fem.stored(ops, state)
     assert fem.imbalance(spent, stored) < 1e-9
-    *_, (state, spent) = fem.audited(ops, iter(states), lambda t: 1.1 * push)
+    *_, (state, spent) = fem.with_energy_balance(ops, iter(states), lambda t: 1.1 * push)
     stored = fem.stored(ops, state)
     assert 0.05 < fem.imbalance(spent, stored) < 0.15
     with pytest.raises(fem.Diverged, match="energy balance is off by 9"):

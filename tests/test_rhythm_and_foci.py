@@ -19,7 +19,7 @@ from simple_model import (
 )
 from simple_model.compliance import half_space
 from simple_model.flat_body import flat_body
-from simple_model.steady import along_path, load_lines, path_knots, path_weights
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
 from skinwave import Body, Scene, simulate
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
@@ -99,7 +99,7 @@ def test_lines_are_those_of_the_load_sampled(extra, foci):
     sampled = np.fft.rfft(load(PLACES, fine), axis=0)[:251] / 80_000
     sampled *= np.exp(-1j * np.pi * np.arange(251) / 80_000)[:, None]
     sampled[1:] *= 2
-    f, a = load_lines(load).gather(along_path(load.spot(PLACES, path_knots(load)).T).T)
+    f, a = load_lines(load).gather(path_fourier(load.spot(PLACES, path_samples(load)).T).T)
     np.testing.assert_allclose(f[:251], np.arange(251) / 0.25, atol=1e-8)
     assert np.abs(a[:251] - sampled).max() < 2e-4 * np.abs(sampled).max()
 
@@ -203,8 +203,8 @@ def test_levels_of_a_recording_follow_the_drive_law():
 
 def test_lines_of_a_recording_add_up_to_its_load():
     load = MovingPressure(tacton=Tacton(trajectory=wandering(0.25, 5001), duration=0.25))
-    spots = load.spot(PLACES, path_knots(load)) * path_weights(load)[:, None]
-    f, a = load_lines(load).gather(along_path(spots.T).T)
+    spots = load.spot(PLACES, path_samples(load)) * path_weights(load)[:, None]
+    f, a = load_lines(load).gather(path_fourier(spots.T).T)
     t = np.arange(2000) / 1e4 + 0.01
     summed = (np.exp(2j * np.pi * t[:, None] * f) @ a).real
     exact = load(PLACES, t)

@@ -22,11 +22,11 @@ from skinwave.models.bodies import (
 )
 from skinwave.models.full import harmonic_answer
 from skinwave.models.prepared import answer, prepare
-from skinwave.planning.cautions import other_loss
 from skinwave.planning.estimates import is_flat, motion_lines, returned_and_start
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
 from skinwave.planning.sensitivity import sensitivity
+from skinwave.planning.warnings import other_loss
 from skinwave.scene import Body, Layer
 from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes, tactons

@@ -7,11 +7,11 @@ from math import isfinite
 import numpy as np
 from scipy import sparse
 
-from fem.air import Added, added_mass
+from fem.added_mass import AddedMass, added_mass
 from fem.assembly import LOSS_BAND, Operators, assemble
 from fem.boundary import Support
+from fem.load_and_probe import facet_normals, facet_points, load_operator, probe_operator
 from fem.materials import Material, rayleigh_damping
-from fem.surface import facet_normals, facet_points, load_operator, probe_operator
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
 from meshes.intake import FINE_RADIUS
 from meshes.structured import check_size, round_up, with_planes
@@ -135,7 +135,7 @@ def operators(build: Build) -> Operators:
     )
 
 
-def air(body: Body, build: Build, operators: Operators) -> Added | None:
+def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
     """Added mass of the air around a meshed sheet, for `fem.reduce`; None in vacuum.
 
     Raises

@@ -15,8 +15,14 @@ import fem
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
+from simple_model.load_spectrum import (
+    load_lines,
+    path_fourier,
+    path_samples,
+    path_weights,
+    synthesise,
+)
 from simple_model.sampling import resolving_step, shown
-from simple_model.steady import along_path, load_lines, path_knots, path_weights, played
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import (
     Build,
@@ -54,7 +60,9 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
         return operators(build)
 
 
-def energy_balance(spent: fem.Spent, stored: float = 0.0, when: str = "") -> tuple[float, float]:
+def energy_balance(
+    spent: fem.EnergyBalance, stored: float = 0.0, when: str = ""
+) -> tuple[float, float]:
     """Relative error of the energy balance, if small enough to trust a response, and the share of
     the losses that was radiated.
 
@@ -99,9 +107,13 @@ def transient_answer(
 
     with clock("march"):
         states = fem.transient(ops, force, dt, solver=solver)
-        audited = fem.audited(ops, islice(states, steps + 1), force)
+        balanced = fem.with_energy_balance(ops, islice(states, steps + 1), force)
         stepped, energy = marched(
-            audited, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
+            balanced,
+            steps,
+            lambda u: S @ u,
+            lambda state: fem.stored(ops, state),
+            report,
         )
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
@@ -110,7 +122,7 @@ def transient_answer(
 
 
 def marched(
-    audited: Iterator[tuple[fem.State, fem.Spent]],
+    balanced: Iterator[tuple[fem.State, fem.EnergyBalance]],
     steps: int,
     read: Callable[[Floats], Floats],
     stored: Callable[[fem.State], float],
@@ -124,7 +136,7 @@ def marched(
         If the energy balance is violated in one of the states that are checked.
     """
     found = []
-    for k, (state, spent) in enumerate(audited):
+    for k, (state, spent) in enumerate(balanced):
         found.append(read(state.displacement))
         report("march", k / steps)
         if k % CHECKED_EACH == 0 or k == steps:
@@ -175,7 +187,7 @@ def harmonic_answer(
     P, points = surface_load(build)
     S = surface_motion(scene.body, build, scene.probe_points)
     with clock("lines"):
-        lines, knots = load_lines(scene.pressure, threshold), path_knots(scene.pressure)
+        lines, knots = load_lines(scene.pressure, threshold), path_samples(scene.pressure)
         count = len(np.unique(np.round(lines.frequencies, 9)))
         if count > MOST_LINES or len(knots) > MOST_KNOTS:
             raise ValueError(
@@ -183,12 +195,12 @@ def harmonic_answer(
                 f"{MOST_LINES:,} and {MOST_KNOTS:,}; take --model fem"
             )
         weights = path_weights(scene.pressure)[:, None]
-        spots = along_path((scene.pressure.spot(points, knots) * weights).T)
+        spots = path_fourier((scene.pressure.spot(points, knots) * weights).T)
         frequencies, pressures = lines.gather(spots.T)
         if not scene.body.is_held:  # under its mean an unconstrained body would drift
             frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
-        total = fem.Spent()
+        total = fem.EnergyBalance()
         report("lines", 0.0)
         answers = mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
         for k, (amplitudes[k], power) in enumerate(answers):
@@ -197,7 +209,7 @@ def harmonic_answer(
             total += power
     energy = energy_balance(total)
     below = shown(scene.pressure, frequencies, times)
-    displacement = played(frequencies[below], amplitudes[below], times)
+    displacement = synthesise(frequencies[below], amplitudes[below], times)
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
     found = _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
@@ -211,7 +223,7 @@ def _line(
     solver: str,
     frequency: float,
     pressure: fem.Complex,
-) -> tuple[fem.Complex, fem.Spent]:
+) -> tuple[fem.Complex, fem.EnergyBalance]:
     """Motion (p,) in metre of the probes at one line, and its mean power balance."""
     force, free = P @ pressure, ops.free
     u = fem.harmonic(ops, force, frequency, solver=solver)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 import fem
-from fem.surface import facet_geometry, facet_normals, facet_points
+from fem.load_and_probe import facet_geometry, facet_normals, facet_points
 from meshes import (
     MeshError,
     TetMesh,

@@ -10,8 +10,8 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
 from simple_model.sampling import shown
-from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.models.bodies import Build, air, default_size, surface_load, surface_motion
 from skinwave.models.full import assembled, energy_balance, meshed
@@ -57,10 +57,10 @@ class Prepared:
     effort: Effort
 
     @property
-    def branches(self) -> tuple[fem.Branch, ...]:
+    def branches(self) -> tuple[fem.MaxwellBranch, ...]:
         """Generalised Maxwell branches of the reduced model."""
         both = zip(self.relaxing, self.relaxation_times.tolist(), strict=True)
-        return tuple(fem.Branch(K=K, time=time) for K, time in both)
+        return tuple(fem.MaxwellBranch(K=K, time=time) for K, time in both)
 
 
 def prepare(
@@ -230,14 +230,14 @@ def reduced_lines(
 ) -> tuple[Floats, fem.Complex]:
     """Reduced load spectrum: frequencies (f,) in Hz of its lines, and their forces (f, r)."""
     lines = load_lines(pressure)
-    knots, reach = path_knots(pressure), spot_reach(pressure.height, pressure.focus)
+    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.focus)
     forces = []
     for part in np.array_split(knots, len(knots) // 64 + 1):
         low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
         near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
         forces.append(pressure.spot(points[near], part) @ load[near])
     weighted = np.vstack(forces) * path_weights(pressure)[:, None]
-    return lines.gather(along_path(weighted.T).T)
+    return lines.gather(path_fourier(weighted.T).T)
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:

@@ -20,8 +20,8 @@ from fem import nonlinear
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
 from simple_model.sampling import resolving_step
-from simple_model.steady import along_path, load_lines, path_knots, path_weights
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import Build, air, build, surface_load, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
@@ -103,8 +103,8 @@ def mean_pressure(pressure: MovingPressure, points: Floats) -> Floats:
     """Mean pressure (n,) in Pa at surface points (n, 2 or 3), averaged over all time."""
     lines = load_lines(pressure)
     mean = lines.frequencies < 1e-9
-    weighted = pressure.spot(points, path_knots(pressure)) * path_weights(pressure)[:, None]
-    along = along_path(weighted.T)
+    weighted = pressure.spot(points, path_samples(pressure)) * path_weights(pressure)[:, None]
+    along = path_fourier(weighted.T)
     return (along[:, lines.harmonics[mean]] @ lines.coefficients[mean]).real
 
 
@@ -225,7 +225,7 @@ def _about_rest(
     with clock("march"):
         states = nonlinear.dynamic(body, lambda t, u: kept(t), dt, initial=start, solver=solver)
         stepped, (imbalance, _) = marched(
-            nonlinear.audited(body, islice(states, steps + 1), kept), steps, read,
+            nonlinear.with_energy_balance(body, islice(states, steps + 1), kept), steps, read,
             lambda state: nonlinear.total_energy(body, state) - at_start, report,
         )  # fmt: skip
     return Response(

@@ -12,7 +12,7 @@ import fem
 from meshes import TetMesh, cache, part
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.steady import path_knots
+from simple_model.load_spectrum import path_samples
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
 from skinwave.models.bodies import air, default_size, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
@@ -66,7 +66,7 @@ def waves(
     P, points = surface_load(build)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        spots = scene.pressure.spot(points, path_knots(scene.pressure))
+        spots = scene.pressure.spot(points, path_samples(scene.pressure))
         seeds = fem.load_subspace(P @ spots.T, tolerance / 10)
         model = fem.reduce(
             operators, sparse.csr_array(seeds.T), BAND, tolerance,

@@ -16,8 +16,8 @@ import fem
 from meshes import reading
 from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, MovingPressure, sensation_level
+from simple_model.load_spectrum import load_lines, merge_lines, path_fourier, path_samples
 from simple_model.response import UNITS
-from simple_model.steady import along_path, load_lines, path_knots, summed
 from skinwave.fitting import effort_of, fitting
 from skinwave.models.speeds import repeated, shown_part, strongest_tone, surface_speed
 from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
@@ -299,8 +299,8 @@ def _grid(reach: Floats) -> tuple[Floats, Ints]:
 def _pressure_lines(pressure: MovingPressure, points: Floats) -> tuple[Floats, fem.Complex]:
     """Distinct frequencies (g,) in Hz and the load's complex lines (g, n) in Pa at points."""
     lines = load_lines(pressure)
-    of_path = along_path(pressure.spot(points, path_knots(pressure)).T).T
-    return summed(lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics])
+    of_path = path_fourier(pressure.spot(points, path_samples(pressure)).T).T
+    return merge_lines(lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics])
 
 
 def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from simple_model import Response
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
-from skinwave.planning.cautions import beyond_linear, of_elements
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import coarser_by, compared_with, counted, error_left
+from skinwave.planning.warnings import beyond_linear, of_elements
 from skinwave.scene import Body, Scene
 
 Coarser = tuple[float, Prepared]  # element size in metre, and the body with it

@@ -9,7 +9,7 @@ from meshes.tetmesh import Floats
 from simple_model import Trajectory
 from simple_model.flat_body import flat_body, point_response, steady_lines, steady_state
 from simple_model.focus import spot_width
-from simple_model.steady import Complex, load_lines, summed
+from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
 from skinwave.models.bodies import compliance, is_plain_layer
 from skinwave.scene import Body, Scene
@@ -31,7 +31,7 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     body = scene.body
     if scene.tacton.trajectory.shape == "recorded":
         lines = load_lines(scene.pressure, tolerance / 100)
-        f, a = summed(lines.frequencies, lines.strengths[:, None].astype(complex))
+        f, a = merge_lines(lines.frequencies, lines.strengths[:, None].astype(complex))
     elif not body.solid.has_loss or (
         body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped")
     ):
@@ -52,7 +52,7 @@ def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
 
 def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
     lines = load_lines(scene.pressure, tolerance / 100)
-    return summed(lines.frequencies, lines.coefficients[:, None])
+    return merge_lines(lines.frequencies, lines.coefficients[:, None])
 
 
 def highest_line(frequencies: Floats, shares: Floats, tolerance: float) -> float:

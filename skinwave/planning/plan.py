@@ -10,7 +10,6 @@ from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
-from skinwave.planning.cautions import exceeds, of_elements
 from skinwave.planning.estimates import (
     highest_line,
     is_flat,
@@ -20,6 +19,7 @@ from skinwave.planning.estimates import (
 from skinwave.planning.extent import Row, extent, left_out, symmetry
 from skinwave.planning.refinement import Refined, refined
 from skinwave.planning.sensitivity import sensitivity
+from skinwave.planning.warnings import exceeds, of_elements
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected

@@ -7,7 +7,7 @@ from scipy import sparse
 
 import fem
 import meshes
-from fem.air import near_field
+from fem.added_mass import near_field
 from simple_model.compliance import AIR_DENSITY, thin_sheet
 from simple_model.flat_body import point_response
 from skinwave.verify.case import Case, Plot, described, misfit, order, relative

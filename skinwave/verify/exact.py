@@ -11,7 +11,7 @@ from meshes import TetMesh
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import Compliance, half_space, slab, thin_sheet
 from simple_model.flat_body import point_response, steady_lines
-from simple_model.steady import along_path, load_lines, path_knots
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from skinwave.verify import references
 from skinwave.verify.case import Case, Plot, below, described, largest, misfit, relative
 from skinwave.verify.references import Complex, Floats
@@ -238,7 +238,7 @@ def _line(
     n = lines.harmonics[mine]
     odd = bool(n[0] % 2)
     ops = fem.assemble(mesh, solid, fixed={**fixed, "left": "yz" if odd else "x", "front": "y"})
-    spots = along_path(load.spot(fem.facet_points(mesh), path_knots(load)).T)[:, n].real
+    spots = path_fourier(load.spot(fem.facet_points(mesh), path_samples(load)).T)[:, n].real
     force = fem.load_operator(mesh) @ (spots @ lines.coefficients[mine])
     return fem.probe_operator(mesh, probes) @ fem.harmonic(ops, force, hz)[0]
 

@@ -9,7 +9,7 @@ import numpy as np
 import fem
 import meshes
 from fem import nonlinear
-from fem.surface import facet_geometry
+from fem.load_and_probe import facet_geometry
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, lines

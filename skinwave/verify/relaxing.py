@@ -99,7 +99,7 @@ def circling_on_skin_that_relaxes() -> Case:
 
 def _springs() -> fem.Operators:
     plain = oscillator()
-    branch = fem.Branch(K=MODULUS * plain.K, time=TIME)
+    branch = fem.MaxwellBranch(K=MODULUS * plain.K, time=TIME)
     return fem.Operators(**{**vars(plain), "branches": (branch,)})
 
 
@@ -116,6 +116,6 @@ def _error(n: int, radius: float) -> float:
 
 def _imbalance(dt: float) -> float:
     ops = _springs()
-    audited = fem.audited(ops, fem.transient(ops, _drive, dt), _drive)
-    state, spent = next(islice(audited, 300, None))
+    with_energy_balance = fem.with_energy_balance(ops, fem.transient(ops, _drive, dt), _drive)
+    state, spent = next(islice(with_energy_balance, 300, None))
     return fem.imbalance(spent, fem.stored(ops, state))

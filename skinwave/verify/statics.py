@@ -8,8 +8,8 @@ from scipy import sparse
 import fem
 import meshes
 from fem.assembly import direct_part
-from fem.dilatation import clusters, linear_functions, projected_dilatation
 from fem.elements import shape_derivatives
+from fem.pressure_projection import linear_functions, macroelements, projected_divergence
 from meshes import TetMesh
 from meshes.tetmesh import Ints
 from skinwave.verify import references
@@ -229,9 +229,9 @@ def _element_pressures(
     D = shape_derivatives(np.full((1, 4), 0.25), 10)[0]
     moved = u.reshape(-1, 3)[mesh.tets]
     dilatation = np.einsum("eai,al,eil->e", moved, D, np.linalg.inv(edges), optimize=True)
-    cluster, sloping = clusters(mesh)
+    cluster, sloping = macroelements(mesh)
     at_points = linear_functions(mesh, cluster, sloping)
-    coefficients = (projected_dilatation(mesh) @ u).reshape(-1, 4)[cluster]
+    coefficients = (projected_divergence(mesh) @ u).reshape(-1, 4)[cluster]
     projected = np.einsum("eqv,ev->eq", at_points, coefficients).mean(axis=1)
     lam, mu = np.array([material.first_lame]), np.array([material.shear_modulus])
     direct = direct_part(lam, mu)

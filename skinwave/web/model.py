@@ -25,7 +25,7 @@ from simple_model.drive import DRIVES
 from simple_model.focus import lobe_width
 from simple_model.joined import parted
 from simple_model.line_names import level_factor
-from simple_model.steady import along_path, load_lines, path_knots
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.tacton import CARRIER, level, tones
 from skinwave.run import JUDGED, is_skin
 from skinwave.scene import Scene
@@ -204,9 +204,9 @@ def harmonics_of(
     """
     tacton = Tacton(trajectory=path, foci=evenly(n_paths))
     pressure = MovingPressure(tacton=tacton, height=height, focus=focus)
-    spots = pressure.spot(places(), path_knots(pressure))
+    spots = pressure.spot(places(), path_samples(pressure))
     mean = spots.reshape(n_paths, -1, SIDE**2).mean(axis=0)
-    return along_path(mean.T).T
+    return path_fourier(mean.T).T
 
 
 def borderline(values: Floats, at: float) -> tuple[Floats, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import MovingPressure
-from simple_model.steady import played
+from simple_model.load_spectrum import synthesise
 from skinwave.models.speeds import seam, shown_part
 from skinwave.scene import Body
 
@@ -86,7 +86,7 @@ def moving_of(
     span, count = shown_part(pressure, seen.max(initial=0.0))
     t = np.arange(count) * span / count
     return Moving(
-        shape=shape, frames=played(frequencies, upwards, t), period=span,
+        shape=shape, frames=synthesise(frequencies, upwards, t), period=span,
         repeats=seam(pressure.tacton, span) < CLOSED,
     )  # fmt: skip
 

@@ -22,14 +22,14 @@ from scipy.interpolate import CubicSpline
 import fem
 from meshes.tetmesh import Floats, Ints, TetMesh
 from simple_model import Effort, MovingPressure, Response, sensation_level
-from simple_model.response import step
-from simple_model.steady import (
-    along_path,
+from simple_model.load_spectrum import (
     foci_harmonics,
     harmonics,
     load_lines,
-    path_knots,
+    path_fourier,
+    path_samples,
 )
+from simple_model.response import step
 from skinwave.effort import Progress
 from skinwave.models.bodies import (
     air,
@@ -82,7 +82,7 @@ class Reduced:
 
     poles: fem.Poles
     damping: tuple[Floats, Floats]
-    branches: tuple[fem.Branch, ...]
+    branches: tuple[fem.MaxwellBranch, ...]
     load: Floats
     points: Floats
     read: Floats
@@ -164,7 +164,7 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
         displacement=flat_motion(table, pressure, scene.probe_points[0], times)[:, None],
     )  # fmt: skip
     f, w = path_amplitudes(_steady(pressure))
-    away = np.linalg.norm(places()[:, None] - path_knots(pressure), axis=2)
+    away = np.linalg.norm(places()[:, None] - path_samples(pressure), axis=2)
     fine = np.linspace(0, FURTHEST, FINER * len(table.distances))
     index = np.rint(away / fine[1]).astype(np.int32)
     of_lines = CubicSpline(table.frequencies, table.g, axis=0)(f)
@@ -191,8 +191,8 @@ def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Fl
     f = f[f <= HIGHEST]
     gain = pressure.gain(t, over=dt) * (np.arange(padded) < n)
     gain[0] /= 2  # as in `flat_body`
-    away = np.linalg.norm(probe - path_knots(pressure), axis=1)
-    h = along_path(CubicSpline(table.distances, table.g, axis=1)(away))
+    away = np.linalg.norm(probe - path_samples(pressure), axis=1)
+    h = path_fourier(CubicSpline(table.distances, table.g, axis=1)(away))
     orders = harmonics(h.shape[1])
     h[:, orders] *= foci_harmonics(pressure, orders)
     orders = orders[np.abs(h[:, orders]).max(axis=0) > FAINTEST * np.abs(h).max()]
@@ -209,7 +209,7 @@ def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
     """Frequencies (f,) in Hz of the strongest lines, and their w (f, k) in Pa at the knots."""
     found = load_lines(pressure, 1e-3)
     heard = (found.frequencies > 1e-6) & (found.frequencies <= BAND)
-    knots = len(path_knots(pressure))
+    knots = len(path_samples(pressure))
     phases = (np.arange(knots) + 0.5) / knots
     f, which = np.unique(np.round(found.frequencies[heard], 9), return_inverse=True)
     waves = np.exp(-2j * np.pi * found.harmonics[heard, None] * phases) / knots
@@ -254,7 +254,7 @@ def reduced(
     """A meshed and assembled body, reduced to a pressure's path."""
     progress("factorise", 0.0)
     P, points = surface_load(made)
-    knots = path_knots(pressure)
+    knots = path_samples(pressure)
     spots = pressure.spot(points, knots[:: 1 if len(knots) < MANY else 2])
     near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
     # As columns: taken out of coordinates they take longer than the factorisation.

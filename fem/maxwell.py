@@ -18,7 +18,7 @@ from meshes.tetmesh import Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Branch:
+class MaxwellBranch:
     """Generalised Maxwell branch: stiffness `K` (n, n) of its springs, N/m, sparse or dense, and
     relaxation `time` in s.
     """
@@ -33,19 +33,19 @@ class Branch:
         return s * self.time / (1 + s * self.time)
 
 
-def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:
+def relaxing_stiffness(branches: Sequence[MaxwellBranch], s: Any) -> Any:
     """Complex stiffness that branches add to K at the complex frequency s in rad/s; 0 if there are
     none.
     """
     return sum(branch.share(s) * branch.K for branch in branches)
 
 
-def pull(branches: Sequence[Branch], stretch: Floats) -> Any:
-    """Branch forces (n,) in N at internal variables (j, n) in metre; 0 if there are none."""
+def branch_force(branches: Sequence[MaxwellBranch], stretch: Floats) -> Any:
+    """Forces (n,) in N of branches at internal variables (j, n) in metre; 0 without branches."""
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
 
 
-def factors(branch: Branch) -> tuple[Floats, float]:
+def factors(branch: MaxwellBranch) -> tuple[Floats, float]:
     """Low-rank factor L (n, k) of a branch, K = L L^T, as many columns as K has rank; and its time
     in s.
 
@@ -57,8 +57,9 @@ def factors(branch: Branch) -> tuple[Floats, float]:
     return vectors[:, kept] * np.sqrt(squares[kept]), branch.time
 
 
-def on_free(branches: Sequence[Branch], free: Any) -> tuple[Branch, ...]:
+def on_free(branches: Sequence[MaxwellBranch], free: Any) -> tuple[MaxwellBranch, ...]:
     """Branches restricted to some of the degrees of freedom."""
     return tuple(
-        Branch(K=sparse.csr_array(branch.K)[free][:, free], time=branch.time) for branch in branches
+        MaxwellBranch(K=sparse.csr_array(branch.K)[free][:, free], time=branch.time)
+        for branch in branches
     )

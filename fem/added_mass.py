@@ -37,7 +37,7 @@ UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Added:
+class AddedMass:
     """Added mass `M` (n_free, n_free) of a fluid in kg, and `rate` in 1/s of the damping rate M u'.
 
     Rayleigh damping is fitted to a loss factor for the mass of the body alone; with added mass its
@@ -57,7 +57,7 @@ def added_mass(
     mirrored: str = "",
     facets: str | Ints = "top",
     rate: float = 0.0,
-) -> Added:
+) -> AddedMass:
     """Added mass of the fluid on both sides of a sheet in a baffle, without loss of its own.
 
     Parameters
@@ -99,7 +99,7 @@ def added_mass(
     M = LinearOperator(
         (n, n), dtype=np.float64, matmat=apply, matvec=lambda u: apply(u.reshape(n, 1))
     )
-    return Added(M=M, rate=rate)
+    return AddedMass(M=M, rate=rate)
 
 
 def near_field(

@@ -34,7 +34,7 @@ MOST_SAMPLED = 50_000_000  # lines of a rhythm or signal, some hundred megabytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LoadLines:
+class LoadSpectrum:
     """Spectral lines of a load at `frequencies` (f,) in Hz >= 0, several of which may coincide.
 
     Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the focal spot along the path
@@ -58,7 +58,7 @@ class LoadLines:
         return distinct, np.asarray(table @ of_path)
 
 
-def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
+def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectrum:
     """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
     that is zero, the mean alone.
 
@@ -78,7 +78,7 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadLines:
         kept &= f <= HIGHEST
     if not kept.any():
         kept = (order == 0) & (f == 0)
-    return LoadLines(
+    return LoadSpectrum(
         frequencies=np.abs(f[kept]),
         harmonics=order[kept],
         coefficients=c[kept],
@@ -90,7 +90,7 @@ def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[
     """Orders (n,) of the harmonics of one focus along the path that, with all foci, exceed a
     fraction of the strongest, and 0; and their largest amplitude (n,) at about eight points of it.
     """
-    of_spot = np.abs(along_path(_swept(pressure))).max(axis=0)
+    of_spot = np.abs(path_fourier(_swept(pressure))).max(axis=0)
     n = harmonics(len(of_spot))
     share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
     heard = (share > threshold * share.max()) | (n == 0)
@@ -102,7 +102,7 @@ def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
     return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
 
 
-def path_knots(pressure: MovingPressure) -> Floats:
+def path_samples(pressure: MovingPressure) -> Floats:
     """Sample positions (k, 2) in metre along one period of the path; one if the focus is static.
 
     They are the middles of k equal parts, between which corners and jumps of the path fall.
@@ -112,23 +112,23 @@ def path_knots(pressure: MovingPressure) -> Floats:
 
 
 def path_weights(pressure: MovingPressure) -> Floats:
-    """Factors (k,) of a recording's levels on the pressure at `path_knots`; 1 without levels."""
+    """Factors (k,) of a recording's levels on the pressure at `path_samples`; 1 without levels."""
     return pressure.weight(_knot_phases(pressure))
 
 
 def harmonics(knots: int) -> NDArray[np.int_]:
-    """Orders of the harmonics of `along_path` that so many knots resolve, ascending."""
+    """Orders of the harmonics of `path_fourier` that so many knots resolve, ascending."""
     return np.arange(-((knots - 1) // 2), (knots + 1) // 2)
 
 
-def along_path(values: Floats | Complex) -> Complex:
-    """Fourier coefficients (..., n) of values (..., k) at `path_knots`; -n is harmonic -n."""
+def path_fourier(values: Floats | Complex) -> Complex:
+    """Fourier coefficients (..., n) of values (..., k) at `path_samples`; -n is harmonic -n."""
     k = values.shape[-1]
     shift = np.exp(-1j * np.pi * np.fft.fftfreq(k))
     return np.asarray(np.fft.fft(values, axis=-1) / k * shift)
 
 
-def played(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
+def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
     """Fourier synthesis (t, p): Re sum a exp(2 pi i f t) of lines (f,) in Hz with amplitudes
     (f, p), at times in s.
     """
@@ -136,7 +136,7 @@ def played(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
     return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
 
 
-def summed(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
+def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
     """Lines merged by frequency: distinct ones (g,) in Hz and the sums (g, ...) of amplitudes."""
     distinct, which = np.unique(np.round(frequencies, 9), return_inverse=True)
     total = np.zeros((len(distinct), *amplitudes.shape[1:]), np.complex128)
@@ -180,7 +180,7 @@ def _recorded_knots(tacton: Tacton, width: float) -> tuple[float, int]:
 
 def _swept(pressure: MovingPressure) -> Floats:
     """Focal spot (8, k) at about eight points of the path while the focus runs along it."""
-    knots = path_knots(pressure)
+    knots = path_samples(pressure)
     watched = knots[:: max(1, len(knots) // 8)][:9]
     return (pressure.spot(watched, knots) * path_weights(pressure)[:, None]).T
 

@@ -19,12 +19,12 @@ from meshes import TetMesh
 from meshes.tetmesh import EDGES, FACES, Floats, Ints, neighbours
 
 
-def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
+def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:
     """Projected-divergence matrix D (4 c, 3 n) of ten-node tetrahedra in c macroelements: |D u|^2
     is the integral of the squared projection of div u, and D u its coefficients in the
     `linear_functions`.
     """
-    cluster, sloping = clusters(mesh)
+    cluster, sloping = macroelements(mesh)
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
     q = linear_functions(mesh, cluster, sloping)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
@@ -39,8 +39,9 @@ def projected_dilatation(mesh: TetMesh) -> sparse.bsr_array:
 
 
 def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -> Floats:
-    """Orthonormal linear pressure functions over each of the `clusters`, in m^-3/2, at the points
-    of each element for degree 2 (e, q, 4); the constant alone, and else 0, where not `sloping`.
+    """Orthonormal linear pressure functions over each of the `macroelements`, in m^-3/2, at the
+    points of each element for degree 2 (e, q, 4); the constant alone, and else 0, where not
+    `sloping`.
     """
     nodes = shape_nodes(mesh)
     volumes = jacobians(nodes, 2, 0)[2]
@@ -58,7 +59,7 @@ def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -
     return q @ np.linalg.inv(np.linalg.cholesky(products)).swapaxes(1, 2)[cluster]
 
 
-def clusters(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
+def macroelements(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
     """Macroelements: the one (e,) that each element is in, and whether each (c,) has an inner edge.
 
     A macroelement is all elements around an inner edge, the longest edges first: in a box that is
