@@ -22,11 +22,15 @@ from skinwave.models.bodies import (
 )
 from skinwave.models.full import harmonic_answer
 from skinwave.models.prepared import answer, prepare
-from skinwave.planning.estimates import is_flat, motion_lines, returned_and_start
+from skinwave.planning.estimates import (
+    has_wavenumber_solution,
+    reflection_and_transient,
+    response_spectrum,
+)
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
 from skinwave.planning.sensitivity import sensitivity
-from skinwave.planning.warnings import other_loss
+from skinwave.planning.warnings import damping_misfit
 from skinwave.scene import Body, Layer
 from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes, tactons
@@ -155,7 +159,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
              viscosity_pa_s={viscosity}}}
 """.replace(",\n", ",")
     )
-    returned, _ = returned_and_start(scene)
+    returned, _ = reflection_and_transient(scene)
     found = compare(compute(scene, "fem", h=h), compute(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
@@ -217,8 +221,8 @@ def test_a_layers_own_loss_factor_is_warned_of_too():
     layers = (Layer(thickness=1e-3, material=lossy),)
     layered = replace(scene, body=replace(scene.body, layers=layers))
     asked = np.array([0.0, 10.0]), np.array([[0.5], [0.5]]), 0.05
-    assert other_loss(scene, *asked) == ()
-    (said,) = other_loss(layered, *asked)
+    assert damping_misfit(scene, *asked) == ()
+    (said,) = damping_misfit(layered, *asked)
     assert "at 10 Hz the loss factor is" in said
 
 
@@ -234,9 +238,9 @@ def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
 def test_a_body_without_loss_is_judged_by_its_load():
     lossless = "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.45}"
     scene = loads(SHORT.replace("width_mm = 60", f"width_mm = 30\n{lossless}"))
-    frequencies, _ = motion_lines(scene, 0.05)
+    frequencies, _ = response_spectrum(scene, 0.05)
     assert 140 in frequencies
-    assert is_flat(scene)  # from rest
+    assert has_wavenumber_solution(scene)  # from rest
     assert not has_exact_waves(scene.body)  # that have gone on for ever
 
 

@@ -16,7 +16,12 @@ from simple_model import Response
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import coarser_by, compared_with, counted, error_left
+from skinwave.planning.refinement import (
+    coarser_by,
+    compared_with,
+    quantity_of_interest,
+    richardson_error,
+)
 from skinwave.planning.warnings import beyond_linear, of_elements
 from skinwave.scene import Body, Scene
 
@@ -42,7 +47,7 @@ def assessed(
     h : float, metre, element size, the default of the body if not given
     compared : element size in metre to compare with, and the body with it; chosen if not given
     """
-    fine = counted(prepared, scene, response)
+    fine = quantity_of_interest(prepared, scene, response)
     return told(scene, response, fine, h, tolerance, solver, compared=compared)
 
 
@@ -64,8 +69,8 @@ def told(
     if coarse.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
         error = np.nan if body.kind == "mesh" else 1.0
     else:
-        found = counted(coarse, scene, answer(coarse, scene))
-        error = error_left(found, fine, coarser_by(body, other, size))
+        found = quantity_of_interest(coarse, scene, answer(coarse, scene))
+        error = richardson_error(found, fine, coarser_by(body, other, size))
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)

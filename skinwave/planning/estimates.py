@@ -23,7 +23,7 @@ FAR = 0.25  # m, beyond which waves are neglected
 FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: duration and sampling rate of the estimate
 
 
-def motion_lines(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
+def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     """Response spectrum: frequencies (f,) in Hz of the lines that move the probes, and each one's
     share (f, p) of the motion's power; by the wavenumber integral of the infinite body, or those of
     the load.
@@ -55,18 +55,18 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
     return merge_lines(lines.frequencies, lines.coefficients[:, None])
 
 
-def highest_line(frequencies: Floats, shares: Floats, tolerance: float) -> float:
+def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
     """Cutoff frequency in Hz above which the motion of every probe is negligible."""
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
 
-def is_flat(scene: Scene) -> bool:
+def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
     return is_plain_layer(scene.body) and scene.pressure.focus == "gaussian"
 
 
-def returned_and_start(scene: Scene) -> tuple[float, float]:
+def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     """Edge reflections at the probes relative to their motion in an infinite body, and the
     transient relative to the steady state; at most 1 each. Both are computed for the first
     `FOLLOWED`. A body without loss, or nearly so, has no steady state, and all of its motion counts

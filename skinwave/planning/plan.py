@@ -11,15 +11,15 @@ from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
 from skinwave.planning.estimates import (
-    highest_line,
-    is_flat,
-    motion_lines,
-    returned_and_start,
+    cutoff_frequency,
+    has_wavenumber_solution,
+    reflection_and_transient,
+    response_spectrum,
 )
 from skinwave.planning.extent import Row, extent, left_out, symmetry
 from skinwave.planning.refinement import Refined, refined
 from skinwave.planning.sensitivity import sensitivity
-from skinwave.planning.warnings import exceeds, of_elements
+from skinwave.planning.warnings import of_elements, over_tolerance
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
@@ -94,8 +94,8 @@ def plan(
         return _nonlinear(scene, tolerance, model, h)
     if model in EXACT:
         exact_waves(scene.body, model)
-    spectrum = motion_lines(scene, tolerance)
-    highest = highest_line(*spectrum, tolerance)
+    spectrum = response_spectrum(scene, tolerance)
+    highest = cutoff_frequency(*spectrum, tolerance)
     rows = [
         Row(
             what="highest line",
@@ -104,7 +104,9 @@ def plan(
             f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    returned, start = returned_and_start(scene) if is_flat(scene) else (1.0, 1.0)
+    returned, start = (
+        reflection_and_transient(scene) if has_wavenumber_solution(scene) else (1.0, 1.0)
+    )
     if model in EXACT or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
     body: Body = scene.body
@@ -125,9 +127,9 @@ def plan(
         rows=(*rows, *_element_rows(scene, tolerance, axes, found, highest, h)),
         warnings=(
             *of_elements(scene, found.h, found.error, tolerance),
-            *exceeds(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
+            *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
-            *exceeds("fem-harmonic, which leaves out the initial transient,", start_error,
+            *over_tolerance("fem-harmonic, which leaves out the initial transient,", start_error,
                       tolerance, "fem is"),
         ),
         prepared=found.prepared,
@@ -136,7 +138,7 @@ def plan(
 
 def _kernel(scene: Scene, tolerance: float, model: str) -> Plan:
     row = Row(what="model", value=model, reason="as asked; nothing propagates in it")
-    warning = exceeds("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
+    warning = over_tolerance("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
     return Plan(model=model, body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning)
 
 
@@ -156,7 +158,9 @@ def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> P
         ),
         *(row for row in left_out(scene, 0.0) if row.what != "left out: stretching"),
     )  # fmt: skip
-    warnings = exceeds(f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are")
+    warnings = over_tolerance(
+        f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are"
+    )
     return Plan(model=model, body=scene.body, h=size, error=error, rows=rows, warnings=warnings)
 
 
@@ -180,11 +184,13 @@ def _without_mesh(
     if left:
         reason += f"; the initial transient, {100 * start:.2g} %, is left out"
     warnings = (
-        *exceeds(f"{model}, which leaves out reflections from the sides,", returned, tolerance,
-                  "fem is"),
-        *exceeds(f"{model}, which leaves out the initial transient,", left, tolerance,
-                  "flat-body is"),
-    )  # fmt: skip
+        *over_tolerance(
+            f"{model}, which leaves out reflections from the sides,", returned, tolerance, "fem is"
+        ),
+        *over_tolerance(
+            f"{model}, which leaves out the initial transient,", left, tolerance, "flat-body is"
+        ),
+    )
     rows = [
         *rows,
         Row(what="model", value=model, reason="as asked" if warnings else reason),
@@ -264,7 +270,7 @@ def _why_elements(scene: Scene, returned: float) -> str:
         return "absorbing sides of a sheet reflect in part; the wavenumber integral has no sides"
     if body.kind == "sheet":
         return f"the {body.sides} sides of this sheet reflect; the wavenumber integral has no sides"
-    if not is_flat(scene):
+    if not has_wavenumber_solution(scene):
         return f"its base is {body.base}; the wavenumber integral is for a clamped one or none"
     if body.sides == "absorbing":
         return "as asked; this body has a wavenumber integral, too"

@@ -32,8 +32,8 @@ from skinwave.scene import Body, Scene
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands
 ORDER = 2.25  # of convergence of a waveform in the element size; measured 1.9 to 3.5
-AIM = 0.6  # of the tolerance: safety factor, so that one more mesh is enough
-STRIDE = 1.6  # between two sizes at most: coarse meshes overestimate their errors
+SAFETY = 0.6  # of the tolerance: safety factor, so that one more mesh is enough
+LARGEST_FACTOR = 1.6  # between two sizes at most: coarse meshes overestimate their errors
 FINEST = 0.4  # of the default element size: the finest that is tried
 
 
@@ -75,7 +75,7 @@ def refined(
             body, scene.probe_points, progress, h=size,
             tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=solver,
         )  # fmt: skip
-        return prepared, counted(prepared, scene, answer(prepared, scene))
+        return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
     sizes = ladder(body)
@@ -87,13 +87,13 @@ def refined(
         if coarse.effort.dofs == prepared.effort.dofs:  # two sizes beyond the body's own: one mesh
             error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
         else:
-            error = error_left(other, found, coarser_by(body, before, size))
+            error = richardson_error(other, found, coarser_by(body, before, size))
         if h or not error > tolerance or size == sizes[-1]:  # no number if a file has one mesh
             return Refined(h=size, error=error, compared=before, prepared=prepared)
-        wanted = size * (AIM * tolerance / error) ** (1 / ORDER)
+        wanted = size * (SAFETY * tolerance / error) ** (1 / ORDER)
         before, coarse, other = size, prepared, found
         finer = _finer(sizes, size)
-        size = finer[abs(np.log(finer / max(wanted, size / STRIDE))).argmin()]
+        size = finer[abs(np.log(finer / max(wanted, size / LARGEST_FACTOR))).argmin()]
 
 
 def ladder(body: Body) -> Floats:
@@ -147,7 +147,7 @@ def coarser_by(body: Body, other: float, h: float) -> float:
     return min(other / h, down, key=lambda ratio: abs(np.log(ratio)))
 
 
-def counted(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
+def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
     """Quantity of interest of a response: waveforms (t, p); of an unconstrained body the lines
     (f, p) without the mean, because rigid-body drift would hide the rest.
     """
@@ -158,9 +158,9 @@ def counted(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
     return lines[frequencies > 0] @ prepared.read.T
 
 
-def error_left(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
-    """Richardson estimate of the relative error of a quantity of interest (k, p), see `counted`, by
-    that of another mesh with elements `ratio` times as large.
+def richardson_error(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
+    """Richardson estimate of the relative error of a quantity of interest (k, p) by that of another
+    mesh with elements `ratio` times as large.
     """
     size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
     change = np.linalg.norm(found - other, axis=0)
@@ -171,5 +171,5 @@ def enough(body: Body, h: float, error: float, tolerance: float) -> float:
     """Element size in metre that meets a tolerance, by the error with h; a slab's cells are at most
     as high as its depth.
     """
-    aim, size = AIM * tolerance, min(h, body.depth if body.kind == "slab" else h)
+    aim, size = SAFETY * tolerance, min(h, body.depth if body.kind == "slab" else h)
     return size * (aim / max(aim, error)) ** (1 / ORDER)

@@ -7,7 +7,7 @@ from fem.materials import rayleigh_damping
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.focus import spot_width
-from skinwave.planning.estimates import mean_gain, motion_lines
+from skinwave.planning.estimates import mean_gain, response_spectrum
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
@@ -20,10 +20,12 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
     """Warnings of linear elements of h in metre, whose relative `error` is expected, or nan."""
     size = 1e3 * enough(scene.body, h, error, tolerance)
     return (
-        *unknown(error),
-        *unheld(scene),
-        *_damping_misfit(scene, tolerance),
-        *exceeds(f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"),
+        *error_unknown(error),
+        *rigid_body_drift(scene),
+        *_scene_damping_misfit(scene, tolerance),
+        *over_tolerance(
+            f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"
+        ),
         *under_resolved(h, spot_width(scene.pressure.height)),
     )
 
@@ -48,7 +50,7 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     )
 
 
-def unknown(error: float) -> tuple[str, ...]:
+def error_unknown(error: float) -> tuple[str, ...]:
     """Warning of an unknown discretisation error: a file with a single mesh."""
     if np.isfinite(error):
         return ()
@@ -58,7 +60,7 @@ def unknown(error: float) -> tuple[str, ...]:
     )
 
 
-def unheld(scene: Scene) -> tuple[str, ...]:
+def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
     """Warning of rigid-body drift under a load with non-zero mean."""
     if scene.body.is_held or not mean_gain(scene):
         return ()
@@ -69,13 +71,13 @@ def unheld(scene: Scene) -> tuple[str, ...]:
     )
 
 
-def _damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
+def _scene_damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
     if not any(solid.loss_factor for _, solid in scene.body.strata):
         return ()  # before the lines are computed
-    return other_loss(scene, *motion_lines(scene, tolerance), tolerance)
+    return damping_misfit(scene, *response_spectrum(scene, tolerance), tolerance)
 
 
-def other_loss(
+def damping_misfit(
     scene: Scene, frequencies: Floats, shares: Floats, tolerance: float
 ) -> tuple[str, ...]:
     """Warning of lines where Rayleigh damping is far from the loss factor that it is fitted to."""
@@ -97,7 +99,7 @@ def other_loss(
     )
 
 
-def exceeds(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
+def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
     """Warning of an expected error above the tolerance."""
     if not error > tolerance:
         return ()

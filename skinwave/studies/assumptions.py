@@ -12,7 +12,7 @@ import numpy as np
 
 from fem.materials import PRESETS, Material
 from simple_model import Trajectory
-from skinwave.planning.estimates import motion_lines
+from skinwave.planning.estimates import response_spectrum
 from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
 
 ASSUMPTIONS = {
@@ -292,7 +292,7 @@ def strongest_line(scene: Scene) -> float:
 
     Damping laws differ from line to line; they are matched at this one.
     """
-    frequencies, shares = motion_lines(scene, 0.05)
+    frequencies, shares = response_spectrum(scene, 0.05)
     moving = frequencies > 0
     if not moving.any():
         return 0.0

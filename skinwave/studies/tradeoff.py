@@ -19,7 +19,7 @@ from skinwave.effort import Progress, apart, peak_memory
 from skinwave.models.bodies import default_size
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
-from skinwave.planning.estimates import is_flat
+from skinwave.planning.estimates import has_wavenumber_solution
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 
@@ -110,7 +110,7 @@ def candidates(scene: Scene) -> list[Candidate]:
     h = default_size(scene.body)
     sizes = [round(h * factor, 6) for factor in REFINEMENTS]
     found = [Candidate(model="point-kernel")]
-    if is_flat(scene):
+    if has_wavenumber_solution(scene):
         found += [Candidate(model=f"flat-body{how}") for how in ("-harmonic", "")]
         if isfinite(scene.body.depth):
             found.append(Candidate(model="flat-body", endless=True))
