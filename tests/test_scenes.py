@@ -13,7 +13,12 @@ from skinwave.studies.paper15 import scenes, tactons
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
-SHOWN = re.findall(r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+SHOWN = [
+    text
+    for page in PAGES
+    for text in re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+]
 
 
 def test_the_paper_has_fifteen_tactons():
@@ -36,7 +41,7 @@ def test_every_example_is_a_scene_that_comes_back(path):
 
 
 @pytest.mark.parametrize("text", SHOWN)
-def test_every_scene_that_the_readme_shows_is_one(text):
+def test_every_scene_that_the_documentation_shows_is_one(text):
     scene = loads(text)
     assert loads(dumps(scene)) == scene
 
