@@ -374,10 +374,19 @@ def test_presets_undo_redo_pin_and_looks(page):
     choose(page, "highest", "600")
 
 
+def at_rest(element):
+    """Where an element is once it stays there: lines above it come and go."""
+    before, now = None, element.bounding_box()
+    while now != before:
+        element.page.wait_for_timeout(500)
+        before, now = now, element.bounding_box()
+    return now
+
+
 def test_a_click_or_a_key_on_the_map_selects(page):
     area = page.locator("#kernel-map")
     for x, y in ((12.3, -7.8), (-31.4, 22.2)):
-        frame = area.locator("rect").bounding_box()  # a line above may have come or gone
+        frame = at_rest(area.locator("rect"))
         at = ((x + 50) / 100 * frame["width"], (50 - y) / 100 * frame["height"])
         page.mouse.click(frame["x"] + at[0], frame["y"] + at[1])
         page.wait_for_function("x => Math.abs(window.trame.state.get('x') - x) < 0.5", arg=x)
