@@ -14,7 +14,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,6 @@ AGREE, MESHED_ANEW = 1e-9, 0.05
 OF_MESHER = {"palm", "flat"}  # words in a name: of a body that the mesher has filled
 NOT_COMPARED = ("seconds", "memory", "versions", "peak", "typed", "arguments")
 SCENES, PLANNED = ("skin-slab", "paper-sheet"), 20
-Numbers = Mapping[str, np.ndarray]
 
 
 def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
@@ -52,9 +51,9 @@ def write_scenes(folder: Path) -> None:
         (folder / f"planned-{k:02}.toml").write_text(text, encoding="utf-8")
 
 
-def run(name: str, scenes: Path, folder: Path, cache: str) -> Path:
+def run(name: str, command: tuple[str, ...], scenes: Path, folder: Path, cache: str) -> Path:
     """Run a part's command; the folder with its files."""
-    command, out = parts()[name][0], folder / name.replace(" ", "-")
+    out = folder / name.replace(" ", "-")
     words = [word.replace("SCENES", str(scenes)) for word in command]
     if command[0] != "plan":
         words += ["--out", str(out), "--quiet"]
@@ -157,12 +156,13 @@ def main() -> None:
         write_scenes(scenes)
     failed = 0
     with tempfile.TemporaryDirectory() as place:
-        for name, (_, files) in parts().items():
+        for name, (command, files) in parts().items():
             if not name.startswith(asked.only):
                 continue
             print(name, flush=True)
             cache = str(Path(place, "cache"))
-            out = run(name, scenes, folder if asked.what == "write" else Path(place), cache)
+            kept = folder if asked.what == "write" else Path(place)
+            out = run(name, command, scenes, kept, cache)
             if asked.what == "compare":
                 for file in files:
                     for said in differences(folder / out.name / file, out / file):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from skinwave import SkinwaveWarning, cli
+from skinwave import SkinwaveWarning, cli, dumps, loads
 
 ROOT = Path(__file__).parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -32,6 +32,12 @@ def test_what_a_page_links_to_is_there(page):
     links = re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8"))
     local = [link for link in links if "://" not in link]
     assert [link for link in local if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("text", shown("toml"))
+def test_every_scene_that_the_documentation_shows_is_one(text):
+    scene = loads(text)
+    assert loads(dumps(scene)) == scene
 
 
 @pytest.mark.parametrize("text", shown("sh"))

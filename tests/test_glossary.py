@@ -15,7 +15,7 @@ REFUSED = {
     r"\bendless": "infinite, laterally infinite layer, half-space",
     r"\bexact waves?\b": "wavenumber integral, Green's function, analytic solution",
     r"\b(sends?|sent|sending|comes?|came|coming) back\b": "reflection, reflected waves",
-    r"\bnothing holds|\bwhat holds\b|\bunheld\b|\bthat nothing holds": "unconstrained body",
+    r"\bnothing holds|\bwhat holds\b|\bunheld\b": "unconstrained body",
     r"\bflies away|\bever further\b": "rigid-body drift",
     r"\btakes? waves away|\blets? (no )?waves? (out|return)": "absorbing layer",
     r"\bacts directly\b|\bthe remedy\b": "mixed u-p split, volumetric locking",

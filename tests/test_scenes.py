@@ -13,12 +13,6 @@ from skinwave.studies.paper15 import scenes, tactons
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
-SHOWN = [
-    text
-    for page in PAGES
-    for text in re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
-]
 
 
 def test_the_paper_has_fifteen_tactons():
@@ -38,12 +32,6 @@ def test_every_preset_comes_back_from_its_file(name):
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_is_a_scene_that_comes_back(path):
     assert loads(dumps(read(path))) == read(path)
-
-
-@pytest.mark.parametrize("text", SHOWN)
-def test_every_scene_that_the_documentation_shows_is_one(text):
-    scene = loads(text)
-    assert loads(dumps(scene)) == scene
 
 
 def test_a_material_of_ones_own_comes_back():

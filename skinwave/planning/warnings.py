@@ -64,10 +64,10 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
     """Warning of rigid-body drift under a load with non-zero mean."""
     if scene.body.is_held or not mean_gain(scene):
         return ()
-    endless = ", or take depth_mm = inf" if scene.body.kind == "slab" else ""
+    half_space = ", or take depth_mm = inf" if scene.body.kind == "slab" else ""
     return (
         "this body is unconstrained and drifts under a pressure with non-zero mean: only motion "
-        f"about the mean counts; clamp its base or its sides{endless}",
+        f"about the mean counts; clamp its base or its sides{half_space}",
     )
 
 
