@@ -162,8 +162,8 @@ class Body:
         for name in ("base", "sides"):
             choose(name, getattr(self, name), BASES)
         for name in ("width", "height", "depth"):
-            length, endless = getattr(self, name), name == "depth" and self.kind == "slab"
-            if not (length > 0 and (isfinite(length) or (endless and length == inf))):
+            length, may_be_infinite = getattr(self, name), name == "depth" and self.kind == "slab"
+            if not (length > 0 and (isfinite(length) or (may_be_infinite and length == inf))):
                 raise ValueError(f"body {name} = {1e3 * length} mm must be finite and above 0")
             if isfinite(length) and length > LARGEST:
                 raise ValueError(

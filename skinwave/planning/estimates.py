@@ -61,6 +61,11 @@ def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> f
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
 
+def is_laterally_infinite(body: Body) -> bool:
+    """Whether a body has no sides that reflect: they absorb, or it is a half-space."""
+    return body.sides == "absorbing" or not isfinite(body.depth)
+
+
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
     return is_plain_layer(scene.body) and scene.pressure.focus == "gaussian"
@@ -79,8 +84,7 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     """
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
-    endless = body.sides == "absorbing" or not isfinite(body.depth)
-    images = [] if endless else _mirrored(probes, half)
+    images = [] if is_laterally_infinite(body) else _mirrored(probes, half)
     if images and _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT

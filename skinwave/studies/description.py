@@ -138,10 +138,9 @@ def extent(body: Body) -> str:
 
 def _body(runs: list[Run]) -> str:
     body = runs[0].scene.body
-    endless = " of which the wavenumber integral takes only the depth," * runs[0].model.startswith(
-        "flat-body"
-    )
-    text = f"{extent(body)},{endless} of {_material(body.solid)}"
+    is_layer = runs[0].model.startswith("flat-body")
+    depth_only = " of which the wavenumber integral takes only the depth," * is_layer
+    text = f"{extent(body)},{depth_only} of {_material(body.solid)}"
     text += above(body)
     if body.kind == "sheet":
         return f"{text}. {_sheet(runs)}"

@@ -15,7 +15,7 @@ from simple_model import Response, named_lines
 from skinwave.effort import Progress, silent
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
-from skinwave.planning.estimates import has_wavenumber_solution
+from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Scene
 from skinwave.simulation import MODELS, answered, check_knobs
@@ -148,8 +148,8 @@ def model_of(scene: Scene, asked: str) -> str:
         return asked
     if scene.body.kind == "none":
         return "point-kernel"
-    endless = scene.body.sides == "absorbing" or not isfinite(scene.body.depth)
-    return "flat-body" if has_wavenumber_solution(scene) and endless else "fem"
+    is_exact = has_wavenumber_solution(scene) and is_laterally_infinite(scene.body)
+    return "flat-body" if is_exact else "fem"
 
 
 def _check(knobs: Knobs) -> None:

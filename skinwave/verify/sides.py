@@ -18,10 +18,10 @@ H, SLAB = 2.5e-3, Body(width=0.05, height=0.05)
 
 def layer_around_a_slab() -> Case:
     """Absorbing layer around a plane slab on a rigid base, whose first mode cuts on at 83 Hz."""
-    endless = _motion(replace(SLAB, width=1.6), layer=True)
+    infinite = _motion(replace(SLAB, width=1.6), layer=True)
     found = {name: _motion(SLAB, layer=name == "layer") for name in ("layer", "dashpots alone")}
     errors = {
-        name: np.abs(u - endless).max(axis=1) / np.abs(endless).max(axis=1)
+        name: np.abs(u - infinite).max(axis=1) / np.abs(infinite).max(axis=1)
         for name, u in found.items()
     }
     return Case(
