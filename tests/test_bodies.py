@@ -30,8 +30,9 @@ LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25, trajectory=
 SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
 
 
-def answered(body, **knobs):
-    return compute(replace(SKIN, body=body), "fem", h=0.006, **knobs).displacement
+def answered(body):
+    probes = ((0.0, 0.0), (0.01, 0.0))
+    return compute(replace(SKIN, body=body, probes=probes), "fem", h=0.006).displacement
 
 
 def test_two_layers_of_one_material_are_one():
@@ -57,7 +58,7 @@ def test_a_layer_ends_on_a_plane_of_the_mesh_and_changes_the_answer():
     assert depth[made.mesh.region == 1].min() == pytest.approx(0.0012)
     assert made.material == {0: fem.PRESETS["fat"], 1: fem.PRESETS["palm"]}
     soft, plain = answered(body), answered(SKIN.body)
-    assert 1.03 < np.ptp(soft[:, 2]) / np.ptp(plain[:, 2]) < 1.3
+    assert 1.03 < np.ptp(soft[:, 1]) / np.ptp(plain[:, 1]) < 1.3
 
 
 def test_planes_take_the_place_of_grid_lines_that_are_close():
@@ -168,7 +169,7 @@ def test_the_layer_around_a_body_damps_nothing_in_it():
 @pytest.mark.slow
 def test_a_body_of_half_the_size_answers_alike():
     """Only the waves that its sides reflect differ."""
-    scene = replace(SKIN, probes=((0.0, 0.0), (0.01, 0.0), (0.015, 0.0)))
+    scene = replace(SKIN, probes=((0.0, 0.0), (0.015, 0.0)))
     whole, half = (
         compute(replace(scene, body=Body(width=side, height=side)), "fem", h=0.004)
         for side in (0.1, 0.05)
@@ -388,7 +389,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
         edge_radius=0.001,
     )  # fmt: skip
-    palm = compute(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.0035)
+    palm = compute(replace(SKIN, body=Body(kind="palm", relief=flat, **size)), "fem", h=0.004)
 
     def with_ends(body, h, symmetry):
         made = build(body, h, symmetry)
@@ -396,7 +397,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
 
     monkeypatch.setattr("skinwave.models.full.build_body", with_ends)
-    slab = compute(replace(SKIN, body=Body(kind="slab", sides="free", **size)), "fem", h=0.0022)
+    slab = compute(replace(SKIN, body=Body(kind="slab", sides="free", **size)), "fem", h=0.0025)
     assert compare(slab, palm).relative_l2.max() < 0.02
 
 
