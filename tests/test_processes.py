@@ -122,7 +122,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     for name, arguments in asked.items():
         threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
         code = 2 if name == "film" else 0  # no report is there
-        timeout = 6 if name in ("report", "relax", "tradeoff", "verify") else None
+        timeout = 4 if name in ("report", "relax", "tradeoff", "verify") else None
         run_there(hostile, name, *arguments, threads=threads, code=code, timeout=timeout)
 
 
