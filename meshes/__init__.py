@@ -1,13 +1,14 @@
 """Tetrahedral meshes of bodies: structured, from files, and of a parametric palm."""
 
-from meshes.curved import curved
-from meshes.facets import named, seen_from_above
-from meshes.files import read, write
-from meshes.intake import body_from_file
-from meshes.palm import Palm, palm_mesh
-from meshes.quality import dihedral_angles, edge_lengths, jacobian_ratios
-from meshes.ready import ready
-from meshes.structured import (
+import warnings
+from typing import Any
+
+from meshes.facets import seen_from_above, tag_boundary
+from meshes.files.import_body import body_from_file
+from meshes.files.mesh_files import read, write
+from meshes.files.surface_files import read_surface
+from meshes.shapes.palm import Palm
+from meshes.shapes.structured import (
     Grading,
     block,
     extrude,
@@ -16,8 +17,8 @@ from meshes.structured import (
     middle_plane,
     sheet,
 )
-from meshes.surface import Surface, repaired
-from meshes.surface_files import read_surface
+from meshes.surface.repair import repaired
+from meshes.surface.triangulation import Surface
 from meshes.tetmesh import (
     MeshError,
     TetMesh,
@@ -28,7 +29,11 @@ from meshes.tetmesh import (
     part,
     quadratic,
 )
-from meshes.tetrahedralise import graded, tetrahedralise
+from meshes.volume.builtin import builtin
+from meshes.volume.curving import curve_boundary
+from meshes.volume.palm_mesh import palm_mesh
+from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
+from meshes.volume.tetrahedralise import graded, tetrahedralise
 
 __all__ = [
     "Grading",
@@ -39,8 +44,9 @@ __all__ = [
     "block",
     "body_from_file",
     "boundary_facets",
+    "builtin",
     "corner_volumes",
-    "curved",
+    "curve_boundary",
     "dihedral_angles",
     "edge_lengths",
     "extrude",
@@ -51,16 +57,26 @@ __all__ = [
     "half",
     "jacobian_ratios",
     "middle_plane",
-    "named",
     "palm_mesh",
     "part",
     "quadratic",
     "read",
     "read_surface",
-    "ready",
     "repaired",
     "seen_from_above",
     "sheet",
+    "tag_boundary",
     "tetrahedralise",
     "write",
 ]
+
+# Names of version 0.2, which load for one release.
+_RENAMED = {"curved": "curve_boundary", "named": "tag_boundary", "ready": "builtin"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _RENAMED:
+        raise AttributeError(f"module 'meshes' has no attribute '{name}'")
+    new = _RENAMED[name]
+    warnings.warn(f"meshes.{name} is now meshes.{new}", DeprecationWarning, stacklevel=2)
+    return globals()[new]

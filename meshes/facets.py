@@ -1,4 +1,4 @@
-"""Names for parts of a boundary: by where facets are and how they look."""
+"""Facet sets of a boundary, by the place and direction of their facets."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +17,9 @@ def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
     return (a + b + c) / 3, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def named(mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.ndarray) -> TetMesh:
+def tag_boundary(
+    mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.ndarray
+) -> TetMesh:
     """The mesh with its boundary as the facet set `surface`, and parts of it by name.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Run by `meshes.child`: a script that ends as soon as the process that started it is gone, and
+"""Run by `subprocess_call`: a script that ends as soon as the process that started it is gone, and
 that gets so many bytes of memory at most, where the platform knows such limits; 0 is no limit.
 
     python watched.py BYTES SCRIPT ARGUMENT...

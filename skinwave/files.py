@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, astuple, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ from skinwave import outputs, record
 from skinwave.plain_text import cell
 from skinwave.run import Run
 from skinwave.scene_file import dumps
-from skinwave.studies.claims import Verdict
 
 LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
@@ -90,7 +89,7 @@ def write_responses(path: Path, runs: Mapping[str, Run]) -> None:
 
 def write_lines(path: Path, runs: Iterable[Run]) -> None:
     """Every line's amplitude per Tacton, body, model and probe."""
-    _write_csv(path, LINE_COLUMNS, (row for run in runs for row in line_rows(run)))
+    write_csv(path, LINE_COLUMNS, (row for run in runs for row in line_rows(run)))
 
 
 def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
@@ -110,18 +109,13 @@ def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
                 yield (*where, _short(frequency), um, mm_s, "")
 
 
-def write_claims(path: Path, verdicts: Iterable[Verdict]) -> None:
-    """Every assessed claim per body and model."""
-    rows = ((*astuple(v)[:4], _short(v.value), v.bar, v.sentence) for v in verdicts)
-    _write_csv(path, [field.name for field in fields(Verdict)], rows)
-
-
 def write_effort(path: Path, effort: Effort) -> None:
     """Cost of a response, as JSON."""
     path.write_text(json.dumps(asdict(effort), indent=1), encoding="utf-8")
 
 
-def _write_csv(path: Path, columns: Iterable[str], rows: Iterable[tuple[object, ...]]) -> None:
+def write_csv(path: Path, columns: Iterable[str], rows: Iterable[tuple[object, ...]]) -> None:
+    """A table, each value as a spreadsheet may show it."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)

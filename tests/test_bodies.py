@@ -12,8 +12,8 @@ import fem
 import meshes
 import skinwave
 from meshes import graded_axis
-from meshes.palm import level_set
-from meshes.structured import Grading, with_planes
+from meshes.shapes.palm import level_set
+from meshes.shapes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare
@@ -220,7 +220,7 @@ CLAMPED = Body(width=0.06, height=0.06, sides="clamped")
 @pytest.fixture
 def slab_file(tmp_path):
     """A slab of 60 x 60 x 15 mm that the mesher made, in a file."""
-    meshes.write(tmp_path / "slab.vtu", meshes.ready("slab"))
+    meshes.write(tmp_path / "slab.vtu", meshes.builtin("slab"))
     return tmp_path / "slab.vtu"
 
 
@@ -279,17 +279,17 @@ def built(folder, mesh):
 
 def test_a_mesh_in_a_file_keeps_its_own_bottom(dome, tmp_path):
     """Half of what looks downwards, and a side; also below a top of its own."""
-    own = meshes.named(
+    own = meshes.tag_boundary(
         dome, bottom=lambda at, normals: (at[:, 0] < -0.0101) & (normals[:, 2] < 0.5)
     )
     count = len(own.facets["bottom"])
-    top = meshes.named(own, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
+    top = meshes.tag_boundary(own, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
     for mesh in (own, top):
         assert len(built(tmp_path, mesh).facets["bottom"]) == count
 
 
 def test_a_mesh_without_a_bottom_of_its_own_rests_on_what_looks_downwards(dome, tmp_path):
-    top = meshes.named(dome, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
+    top = meshes.tag_boundary(dome, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
     # What is read and written again has the bottom that reading gave it.
     meshes.write(tmp_path / "first.vtu", dome)
     again = meshes.body_from_file(tmp_path / "first.vtu", 0.005)
@@ -375,7 +375,7 @@ def test_a_palm_without_relief_is_a_slab_with_round_edges():
     palm = Body(kind="palm", relief=relief).palm
     inside = np.array([[0.0, 0.0, -1e-3], [0.02, 0.01, -1e-3], [0.0, -0.02, -0.014]])
     np.testing.assert_allclose(level_set(palm, inside), -1e-3, rtol=1e-12)
-    flat = meshes.ready("flat-palm")
+    flat = meshes.builtin("flat-palm")
     top = flat.points[np.unique(flat.facets["top"])]
     middle = np.linalg.norm(top[:, :2], axis=1) < 0.025
     assert np.abs(top[middle, 2]).max() < 1e-9
@@ -393,7 +393,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
 
     def with_ends(body, h, symmetry):
         made = build(body, h, symmetry)
-        mesh = meshes.named(made.mesh, ends=lambda _, normals: np.abs(normals[:, 1]) > 0.7)
+        mesh = meshes.tag_boundary(made.mesh, ends=lambda _, normals: np.abs(normals[:, 1]) > 0.7)
         return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
 
     monkeypatch.setattr("skinwave.models.full.build_body", with_ends)

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 
 import meshes
-from meshes import palm
+from meshes.shapes import palm
 from skinwave import read
 
 pytestmark = [

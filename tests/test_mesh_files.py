@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 import meshes
-from meshes import MeshError, TetMesh, files
-from meshes.palm import Palm, level_set
-from meshes.surface import Surface, check, volume
+from meshes import MeshError, TetMesh
+from meshes.shapes.palm import Palm, level_set
+from meshes.surface import alignment
+from meshes.surface.repair import check
+from meshes.surface.triangulation import Surface, volume
 from skinwave.cli import main
 from skinwave.models.prepared import prepare
 from skinwave.scene import Body
@@ -61,7 +63,7 @@ def test_a_mesh_is_read_as_it_was_written(tmp_path, suffix, order):
 
 @pytest.mark.parametrize("suffix", [".vtu", ".msh"])
 def test_curved_elements_are_read_as_they_were_written(tmp_path, suffix):
-    for mesh in (curved_ball(), meshes.ready("palm")):
+    for mesh in (curved_ball(), meshes.builtin("palm")):
         meshes.write(tmp_path / f"body{suffix}", mesh)
         same(mesh, meshes.read(tmp_path / f"body{suffix}"))
 
@@ -290,11 +292,11 @@ def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch):
 
 
 def test_only_one_module_knows_meshio():
-    folder = files.__file__.rsplit("/", 1)[0]
+    folder = meshes.__path__[0]
     found = subprocess.run(
         ["grep", "-rl", "--include=*.py", "import meshio", folder], capture_output=True, text=True
     )
-    assert found.stdout.split() == [f"{folder}/files.py"]
+    assert found.stdout.split() == [f"{folder}/files/mesh_files.py"]
 
 
 # Surfaces in files
@@ -400,13 +402,13 @@ def test_a_hand_with_seams_is_the_same_from_every_kind_of_file(tmp_path, suffix)
     np.testing.assert_allclose(surface.points.max(axis=0), plain.points.max(axis=0), atol=1e-6)
 
 
-@pytest.mark.parametrize("up", meshes.placing.TURNS)
+@pytest.mark.parametrize("up", alignment.TURNS)
 def test_up_is_a_turn_that_takes_the_axis_to_z(up):
     axis = np.zeros((3, 3))
     axis[0, "xyz".index(up[1])] = 1 if up[0] == "+" else -1
-    turned = meshes.placing.turned(Surface(points=axis, triangles=[[0, 1, 2]]), up)
+    turned = alignment.turned(Surface(points=axis, triangles=[[0, 1, 2]]), up)
     assert turned.points[0].tolist() == [0, 0, 1]
-    assert np.linalg.det(meshes.placing.TURNS[up]) == 1
+    assert np.linalg.det(alignment.TURNS[up]) == 1
 
 
 @pytest.mark.parametrize(
@@ -570,7 +572,7 @@ def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys, a
 
 def test_reading_and_meshing_are_imported_only_when_used():
     code = (
-        "import sys, meshes, skinwave.cli; meshes.ready('slab')\n"
+        "import sys, meshes, skinwave.cli; meshes.builtin('slab')\n"
         "assert not {'pyvista', 'vtkmodules', 'meshio', 'pytetwild'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

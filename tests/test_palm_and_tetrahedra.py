@@ -14,15 +14,18 @@ import pytest
 
 import fem
 import meshes
-from meshes import MeshError, Palm, Surface, placing, ready
-from meshes import palm as shape
-from meshes.crossings import self_crossings
-from meshes.smoothing import smoothed
-from meshes.surface import area, check, repaired, volume
+from meshes import MeshError, Palm, Surface, builtin
+from meshes.shapes import palm as shape
+from meshes.surface.alignment import height_at
+from meshes.surface.repair import check, repaired
+from meshes.surface.self_intersection import self_intersections
+from meshes.surface.triangulation import area, volume
 from meshes.tetmesh import TetMesh
+from meshes.volume import builtin as builtin_module
+from meshes.volume import tetrahedralise as tetra
+from meshes.volume.smoothing import smoothed
 from skinwave.scene import BODIES
 
-tetra = sys.modules["meshes.tetrahedralise"]
 FLAT = Palm(cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0)
 
 
@@ -85,8 +88,8 @@ def test_the_palm_is_closed_of_its_size_with_its_middle_at_the_origin():
     check(surface)
     np.testing.assert_allclose(np.ptp(surface.points, axis=0), [0.085, 0.1, 0.028], rtol=0.02)
     assert abs(shape.level_set(Palm(), [[0, 0, 0]])) < 1e-12
-    assert placing.height_at(surface, 0.0, 0.0) == pytest.approx(0.0, abs=5e-5)
-    thenar, hollow = placing.height_at(surface, 0.02, -0.02), placing.height_at(surface, 0.0, 0.0)
+    assert height_at(surface, 0.0, 0.0) == pytest.approx(0.0, abs=5e-5)
+    thenar, hollow = height_at(surface, 0.02, -0.02), height_at(surface, 0.0, 0.0)
     assert thenar > hollow + 0.004
 
 
@@ -125,8 +128,8 @@ def test_no_grid_is_made_of_absurd_cells(h):
 
 
 @pytest.mark.parametrize("name", ["palm", "flat-palm", "slab"])
-def test_ready_meshes_are_good(name):
-    mesh = meshes.ready(name)
+def test_builtin_meshes_are_good(name):
+    mesh = meshes.builtin(name)
     assert mesh.order == 2
     assert meshes.dihedral_angles(mesh).min() > 15
     assert meshes.jacobian_ratios(mesh.points, mesh.tets).min() > 0.3
@@ -137,36 +140,35 @@ def test_ready_meshes_are_good(name):
     assert again.shape == (2, mesh.n_dofs)
 
 
-def test_the_ready_palm_lies_on_its_true_surface():
-    mesh = meshes.ready("palm")
+def test_the_builtin_palm_lies_on_its_true_surface():
+    mesh = meshes.builtin("palm")
     nodes = np.unique(mesh.facets["surface"])
     off = np.abs(shape.level_set(Palm(), mesh.points[nodes]))
     assert (off > 1e-9).mean() < 0.005  # edges that stay straight
     assert off.max() < 5e-4
     true = volume(shape.surface(Palm(), 1e-3))
     assert enclosed(mesh) == pytest.approx(true, rel=2e-3)
-    assert enclosed(meshes.ready("slab")) == pytest.approx(0.06 * 0.06 * 0.015, rel=1e-9)
+    assert enclosed(meshes.builtin("slab")) == pytest.approx(0.06 * 0.06 * 0.015, rel=1e-9)
 
 
-def test_a_spoilt_or_unknown_ready_mesh_is_refused(tmp_path, monkeypatch):
+def test_a_spoilt_or_unknown_builtin_mesh_is_refused(tmp_path, monkeypatch):
     said = "no built-in mesh 'fist'; there are: flat-palm, palm, slab"
     with pytest.raises(MeshError, match=said):
-        meshes.ready("fist")
-    module = sys.modules["meshes.ready"]
-    shutil.copytree(module.HOME, tmp_path / "data")
-    monkeypatch.setattr(module, "HOME", tmp_path / "data")
+        meshes.builtin("fist")
+    shutil.copytree(builtin_module.HOME, tmp_path / "data")
+    monkeypatch.setattr(builtin_module, "HOME", tmp_path / "data")
     content = bytearray((tmp_path / "data/palm.npz").read_bytes())
     content[5000] ^= 1
     (tmp_path / "data/palm.npz").write_bytes(content)
     with pytest.raises(MeshError, match="not what its checksum says; install"):
-        ready("palm")
+        builtin("palm")
 
 
 # Curved elements
 
 
 def test_edges_that_would_fold_an_element_stay_straight():
-    mesh = meshes.ready("flat-palm")
+    mesh = meshes.builtin("flat-palm")
 
     def rough(points):
         return shape.level_set(FLAT, points) + 0.8e-3 * np.sin(points[:, 0] / 0.4e-3)
@@ -176,7 +178,7 @@ def test_edges_that_would_fold_an_element_stay_straight():
         change[:, 0] += 2 * np.cos(points[:, 0] / 0.4e-3)
         return change
 
-    found = meshes.curved(mesh, rough, slope)
+    found = meshes.curve_boundary(mesh, rough, slope)
     assert meshes.jacobian_ratios(found.points, found.tets).min() >= 0.3
     assert meshes.corner_volumes(found.points, found.tets).min() > 0
     middles = np.unique(mesh.facets["surface"][:, 3:])
@@ -186,7 +188,7 @@ def test_edges_that_would_fold_an_element_stay_straight():
 
 def test_four_node_elements_are_not_curved():
     with pytest.raises(MeshError, match="meshes.quadratic"):
-        meshes.curved(meshes.block((1, 1, 1), 1, order=1), len, len)
+        meshes.curve_boundary(meshes.block((1, 1, 1), 1, order=1), len, len)
 
 
 # Names of facets
@@ -197,7 +199,7 @@ def test_what_is_hidden_from_above_is_not_the_top():
     block = meshes.extrude(*lines, order=1)
     x, _, z = block.points[block.tets].mean(axis=1).T
     hook = TetMesh(points=block.points, tets=block.tets[~((x > 0.01) & (abs(z - 0.015) < 0.005))])
-    mesh = meshes.named(hook, rest="below", top=meshes.seen_from_above(hook))
+    mesh = meshes.tag_boundary(hook, rest="below", top=meshes.seen_from_above(hook))
     assert set(mesh.points[mesh.facets["top"]][..., 2].ravel()) == {0.03}
     assert len(mesh.facets["top"]) == 4
     assert len(mesh.facets["below"]) == len(mesh.facets["surface"]) - 4
@@ -367,9 +369,9 @@ def test_a_strip_with_one_side_is_no_surface_of_a_body():
 
 def test_sound_surfaces_do_not_cross_themselves():
     for surface in (SPHERE, cube(), shape.surface(Palm(), 4e-3)):
-        assert not len(self_crossings(surface))
+        assert not len(self_intersections(surface))
         far = Surface(points=surface.points + 1e3, triangles=surface.triangles)
-        assert not len(self_crossings(far))
+        assert not len(self_intersections(far))
 
 
 def test_crossings_are_those_that_trying_every_pair_finds():
@@ -393,7 +395,7 @@ def test_crossings_are_those_that_trying_every_pair_finds():
         if pierces(points[i], points[j]) or pierces(points[j], points[i])
     ]
     assert len(expected) > 10
-    assert [tuple(pair) for pair in self_crossings(soup).tolist()] == expected
+    assert [tuple(pair) for pair in self_intersections(soup).tolist()] == expected
 
 
 def test_one_point_drawn_through_the_body_is_found_where_it_is():
@@ -406,7 +408,7 @@ def test_one_point_drawn_through_the_body_is_found_where_it_is():
 
 def test_overlap_in_one_plane_is_a_crossing():
     pair = together(cube(), cube(at=(0.02, 0.005, 0.003)))
-    found = self_crossings(pair)
+    found = self_intersections(pair)
     across = pair.points[pair.triangles[found]][..., 0]
     assert (np.abs(across - 0.01) < 1e-12).all(axis=(1, 2)).sum() >= 3
 
@@ -414,7 +416,7 @@ def test_overlap_in_one_plane_is_a_crossing():
 def test_large_triangles_among_small_ones_are_no_burden():
     far = Surface(points=SPHERE.points * 1e-3 + 0.02, triangles=SPHERE.triangles)
     started = time.perf_counter()
-    assert not len(self_crossings(together(cube(), far)))
+    assert not len(self_intersections(together(cube(), far)))
     assert time.perf_counter() - started < 5
 
 
@@ -545,7 +547,7 @@ def test_the_palm_as_planned_is_meshed_within_its_bars(monkeypatch, palm):
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks processes up")
 def test_an_interrupt_ends_the_mesher_too(tmp_path):
     code = (
-        "import meshes; from meshes import palm; p = meshes.Palm()\n"
+        "import meshes; from meshes.shapes import palm; p = meshes.Palm()\n"
         "meshes.tetrahedralise(palm.surface(p, 1e-3), 1.5e-3, epsilon=1.5e-5)"
     )
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}

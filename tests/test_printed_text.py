@@ -13,9 +13,8 @@ from rich.console import Console
 
 from skinwave.cli import main
 from skinwave.commands import common
-from skinwave.files import write_claims
 from skinwave.plain_text import cell, printable, say
-from skinwave.studies.claims import Verdict
+from skinwave.studies.claims import Verdict, write_claims
 from skinwave.sweeps import dataset
 
 HOSTILE = "a\x1b[2Jb\x07c\x9bd\x7fe\u202ef\u2066g\x00h\ud800i"

@@ -13,7 +13,7 @@ import pytest
 import tomli_w
 
 import meshes
-from meshes import MeshError, cache, child, reading
+from meshes import MeshError, cache, reading, subprocess_call
 from skinwave.cli import main
 from skinwave.fitting import PLAN, effort_of, fitting
 from skinwave.pictures.motion import check_values
@@ -74,10 +74,10 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
     path.write_text(f"{node}*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n")
     with pytest.raises(MeshError, match="a.inp cannot be read"):
         meshes.read(path)
-    monkeypatch.setattr(child, "LEAST_SECONDS", 0.05)
+    monkeypatch.setattr(subprocess_call, "LEAST_SECONDS", 0.05)
     with pytest.raises(MeshError, match="reading it took longer than 0 s"):
         meshes.read(path)
-    monkeypatch.setattr(child, "LARGEST", 10)
+    monkeypatch.setattr(subprocess_call, "LARGEST", 10)
     with pytest.raises(MeshError, match="larger .* than the limit"):
         meshes.read(path)
 
@@ -86,8 +86,8 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
 def test_the_limit_of_memory_holds(tmp_path):
     (tmp_path / "hungry.py").write_text("x = bytearray(2_000_000_000)\n")
     with pytest.raises(MeshError, match="MemoryError"):
-        child.run(str(tmp_path / "hungry.py"), folder=tmp_path, timeout=60, memory=500e6)
-    child.run(str(tmp_path / "hungry.py"), folder=tmp_path, timeout=60, memory=4e9)
+        subprocess_call.run(tmp_path / "hungry.py", folder=tmp_path, timeout=60, memory=500e6)
+    subprocess_call.run(tmp_path / "hungry.py", folder=tmp_path, timeout=60, memory=4e9)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from meshes import body_from_file, dihedral_angles, write
-    from meshes.files import WRITTEN
+    from meshes.files.mesh_files import WRITTEN
     from skinwave.outputs import output_path
 
     out = options.out or Path(f"{options.file.stem}-mesh.vtu")

@@ -14,9 +14,11 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
+from skinwave.commands import compare, report
+from skinwave.commands import run as run_command
 from skinwave.commands.common import add_output, progress_of, summarise
 
-REPEATED = ("run", "compare", "report")
+REPEATED = {"run": run_command, "compare": compare, "report": report}
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -79,7 +81,7 @@ def _command_again(
     if name not in REPEATED:
         raise ValueError(f"the record's command '{name}' is none of {', '.join(REPEATED)}")
     words = [word for key, value in asked.items() if key != place for word in _words(key, value)]
-    again = _parsed([name, *words, *([] if given is None else ["--", str(given)])])
+    again = _parsed(name, [*words, *([] if given is None else ["--", str(given)])])
     if strange := [key for key in asked if key != "scheduler" and key not in vars(again)]:
         raise ValueError(f"the record's option '{strange[0][:40]}' is none; make the result anew")
     for key in ("overwrite", "quiet", "json", "debug"):
@@ -88,7 +90,7 @@ def _command_again(
         again.out, again.typed = out, shlex.split(kept["command"]["typed"])[1:]
     except ValueError:
         raise ValueError("the record's command cannot be split; make the result anew") from None
-    return int(again.command(again))
+    return int(REPEATED[name].run(again))
 
 
 def _words(key: str, value: Any) -> Iterator[str]:
@@ -109,14 +111,14 @@ def _words(key: str, value: Any) -> Iterator[str]:
         yield f"{flag}={','.join(map(str, value)) if isinstance(value, list) else value}"
 
 
-def _parsed(words: list[str]) -> argparse.Namespace:
-    """Parse words that come from a file, without printing the usage."""
-    from skinwave.cli import parser
-
-    said = io.StringIO()
+def _parsed(name: str, words: list[str]) -> argparse.Namespace:
+    """Parse the words of a command that come from a file, without printing the usage."""
+    parser, said = argparse.ArgumentParser(prog=f"skinwave {name}"), io.StringIO()
+    REPEATED[name].options(parser)
+    parser.set_defaults(command_name=name, version=False)  # as in the record of any command
     try:
         with redirect_stderr(said), redirect_stdout(said):
-            return parser().parse_args(words)
+            return parser.parse_args(words)
     except SystemExit:
         reason = said.getvalue().strip().splitlines()[-1:] or ["it asks for help"]
         raise ValueError(

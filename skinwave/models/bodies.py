@@ -13,8 +13,8 @@ from fem.boundary import Support
 from fem.load_and_probe import facet_normals, facet_points, load_operator, probe_operator
 from fem.materials import Material, rayleigh_damping
 from meshes import Grading, TetMesh, extrude, graded_axis, half, sheet
-from meshes.intake import FINE_RADIUS
-from meshes.structured import check_size, round_up, with_planes
+from meshes.files.import_body import FINE_RADIUS
+from meshes.shapes.structured import check_size, round_up, with_planes
 from meshes.tetmesh import Floats, Ints
 from simple_model import flat_body, steady_state
 from simple_model.compliance import AIR_DENSITY, Compliance, half_space, slab, thin_sheet

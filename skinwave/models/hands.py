@@ -16,8 +16,8 @@ from meshes import (
     quadratic,
 )
 from meshes.facets import seen_from_above
-from meshes.intake import GROWTH
-from meshes.palm import gradient
+from meshes.files.import_body import GROWTH
+from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats, Ints
 from skinwave.scene import Body
 

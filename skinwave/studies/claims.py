@@ -5,12 +5,14 @@ Nothing here knows which model should fulfil which.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
+from skinwave.files import write_csv
 from skinwave.numbers import decibel
 from skinwave.run import Run
 
@@ -57,6 +59,12 @@ def evaluate(runs: Iterable[Run]) -> list[Verdict]:
                     )
                 )  # fmt: skip
     return verdicts
+
+
+def write_claims(path: Path, verdicts: Iterable[Verdict]) -> None:
+    """Every assessed claim per body and model."""
+    rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in verdicts)
+    write_csv(path, [field.name for field in fields(Verdict)], rows)
 
 
 Judgement = tuple[bool, float, float, str]

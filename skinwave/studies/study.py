@@ -10,7 +10,7 @@ from pathlib import Path
 
 from skinwave import document
 from skinwave.effort import Progress, helper, one_thread, peak_memory
-from skinwave.files import write_claims, write_lines, write_responses, write_run
+from skinwave.files import write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
@@ -26,7 +26,7 @@ from skinwave.studies.changes import (
     quick_maps,
     shown,
 )
-from skinwave.studies.claims import evaluate
+from skinwave.studies.claims import evaluate, write_claims
 from skinwave.studies.study_page import (
     Outcome,
     again,

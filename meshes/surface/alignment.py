@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from meshes.facets import Predicate
-from meshes.surface import Surface, compact, n_pieces, pieces, repaired
+from meshes.surface.repair import repaired
+from meshes.surface.triangulation import Surface, compact, n_pieces, pieces
 from meshes.tetmesh import Floats, MeshError
 
 # The rows are the new x, y and z. Each is a turn about one axis.
@@ -27,7 +28,7 @@ def turned(surface: Surface, up: str) -> Surface:
     return Surface(points=surface.points @ np.array(TURNS[up]).T, triangles=surface.triangles)
 
 
-def placed(surface: Surface) -> tuple[Surface, Floats]:
+def aligned(surface: Surface) -> tuple[Surface, Floats]:
     """The surface moved so that its palm's middle is the origin, and by how much (3,), metre.
 
     The middle is that of the widest circle within the outline seen from above: in a hand, the
@@ -128,7 +129,7 @@ def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]
 
 
 def on_planes(box: Sequence[float], tolerance: float) -> Predicate:
-    """A predicate of facets that lie on the sides of a box (metre), for `named`."""
+    """A predicate of facets that lie on the sides of a box (metre), for `tag_boundary`."""
 
     def cut(centroids: Floats, normals: Floats) -> np.ndarray:
         found = np.zeros(len(centroids), bool)

@@ -1,4 +1,4 @@
-"""Build the meshes that come with the package: `python -m meshes.remake FOLDER`.
+"""Build the meshes that come with the package: `python -m meshes.volume.build_builtin FOLDER`.
 
 They differ from run to run, by what the mesher finds.
 """
@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.palm import EPSILON, Palm, surface
-from meshes.ready import CHECKSUMS
-from meshes.structured import block
-from meshes.surface import repaired
+from meshes.shapes.palm import EPSILON, Palm, surface
+from meshes.shapes.structured import block
+from meshes.surface.repair import repaired
 from meshes.tetmesh import TetMesh, boundary_facets
-from meshes.tetrahedralise import tetrahedralise
+from meshes.volume.builtin import CHECKSUMS
+from meshes.volume.tetrahedralise import tetrahedralise
 
 FLAT = Palm(cup_depth=0.0, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
 PALMS = {"palm": (Palm(), 5e-3), "flat-palm": (FLAT, 5e-3)}  # and their element sizes, metre

@@ -1,4 +1,4 @@
-"""Run by `meshes.surface_files` and `meshes.files` in a process of its own: VTK's readers.
+"""Run by `surface_files` and `mesh_files` in a process of its own: VTK's readers.
 
     python vtk_child.py FILE OUTPUT
 

@@ -20,7 +20,7 @@ class Refused(MeshError):
     """Refusal of a file by a script that ended with `REFUSED`, with its message."""
 
 
-def read(script: str, path: Path, *arguments: object, folder: str | os.PathLike[str]) -> None:
+def read(script: Path, path: Path, *arguments: object, folder: str | os.PathLike[str]) -> None:
     """Run a script that reads a file, with time and memory by the file's size; raises what `run`
     does, and MeshError where it takes too long or the file is too large.
     """
@@ -37,13 +37,13 @@ def read(script: str, path: Path, *arguments: object, folder: str | os.PathLike[
 
 
 def run(
-    script: str,
+    script: Path,
     *arguments: object,
     folder: str | os.PathLike[str],
     timeout: float,
     memory: float = math.inf,
 ) -> None:
-    """Run a script of this package in a folder; it ends with this process, however that ends.
+    """Run a script in a folder; it ends with this process, however that ends.
 
     Raises
     ------
@@ -54,9 +54,9 @@ def run(
 
     Where the platform knows such limits, it gets no more than `memory` in bytes.
     """
-    scripts = [str(Path(__file__).parent / name) for name in ("watched.py", script)]
+    watcher = str(Path(__file__).with_name("watched.py"))
     limit = str(int(memory)) if math.isfinite(memory) else "0"
-    command = [sys.executable, "-P", scripts[0], limit, scripts[1], *map(str, arguments)]
+    command = [sys.executable, "-P", watcher, limit, str(script), *map(str, arguments)]
     watched, held = os.pipe()  # `watched.py` ends when this process no longer holds its other end
     try:
         ended = subprocess.run(
@@ -64,7 +64,7 @@ def run(
             errors="replace", check=False, stdin=watched,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise TimeoutError(f"{script} was stopped after {timeout:g} s") from None
+        raise TimeoutError(f"{script.name} was stopped after {timeout:g} s") from None
     finally:
         os.close(watched)
         os.close(held)

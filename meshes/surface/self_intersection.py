@@ -6,7 +6,7 @@ Candidates are triangles whose bounding boxes share a cell of a grid.
 
 import numpy as np
 
-from meshes.surface import Surface
+from meshes.surface.triangulation import Surface
 from meshes.tetmesh import Floats, Ints
 
 ROUND_OFF = 1e-9  # of the size of both triangles: nearer to a plane is on it
@@ -14,7 +14,7 @@ MOST_CELLS = 400_000  # of the grid that one triangle may be listed in before ce
 CHUNK = 200_000  # pairs tested at once
 
 
-def self_crossings(surface: Surface) -> Ints:
+def self_intersections(surface: Surface) -> Ints:
     """Pairs (m, 2) of triangles that intersect or overlap; contact at shared corners is neither."""
     corners = surface.points[surface.triangles] - surface.points.mean(axis=0)
     pairs = _candidates(corners)

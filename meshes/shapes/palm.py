@@ -18,8 +18,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.surface import Surface, repaired
-from meshes.tetmesh import Floats, MeshError, TetMesh
+from meshes.surface.level_set import project_to_level_set
+from meshes.surface.repair import repaired
+from meshes.surface.triangulation import Surface
+from meshes.tetmesh import Floats, MeshError
 
 Field = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
 EPSILON = 0.2  # of h: how far the straight mesh may lie from the surface
@@ -113,67 +115,16 @@ def surface(palm: Palm, h: float) -> Surface:
     values = level_set(palm, np.asarray(grid.points, np.float64))
     contour = grid.contour([0.0], scalars=values, method="flying_edges")
     triangles = np.asarray(contour.faces).reshape(-1, 4)[:, 1:]
-    points = onto(np.asarray(contour.points, np.float64), *_functions(palm))
+    points = project_to_level_set(
+        np.asarray(contour.points, np.float64), *level_set_and_gradient(palm)
+    )
     return repaired(points, triangles)[0]
 
 
-def palm_mesh(
+def level_set_and_gradient(
     palm: Palm,
-    h: float,
-    *,
-    sizing: Callable[[Floats], Floats] | None = None,
-    timeout: float = 120.0,
-) -> TetMesh:
-    """Ten-node tetrahedra of a palm whose boundary nodes lie on its true surface.
-
-    The facet sets are `surface` (all of it), `top` (what the device sees), `wrist` and `fingers`
-    (the ends, which look along the hand) and `back`, the rest.
-
-    Parameters
-    ----------
-    h, sizing, timeout : as for `tetrahedralise`.
-    """
-    from meshes.smoothing import smoothed
-    from meshes.tetrahedralise import tetrahedralise
-
-    # Facets of the contour must be finer than elements, or the mesher keeps its corners.
-    body = surface(palm, min(h / 1.5, palm.thickness / 8))
-    # Coarser than the surface of a file may be, because boundary nodes are moved onto it.
-    epsilon = EPSILON * min(h, palm.thickness / 4)
-    mesh = tetrahedralise(body, h, sizing=sizing, timeout=timeout, epsilon=epsilon)
-    even = smoothed(mesh, sizing, lambda points: onto(points, *_functions(palm)))
-    return shaped(palm, even)
-
-
-def shaped(palm: Palm, mesh: TetMesh) -> TetMesh:
-    """The same palm of straight tetrahedra with curved ones, and the facet sets named."""
-    from meshes.curved import curved
-    from meshes.facets import named, seen_from_above
-    from meshes.tetmesh import quadratic
-
-    mesh = curved(quadratic(mesh), *_functions(palm))
-    ends = {
-        "wrist": lambda centroids, normals: normals[:, 1] < -(0.5**0.5),
-        "fingers": lambda centroids, normals: normals[:, 1] > 0.5**0.5,
-    }
-    return named(mesh, rest="back", top=seen_from_above(mesh), **ends)
-
-
-def onto(
-    points: Floats,
-    level_set: Callable[[Floats], Floats],
-    gradient: Callable[[Floats], Floats],
-    steps: int = 4,
-) -> Floats:
-    """Points (n, 3) near a level set, moved onto it by Newton steps along its gradient."""
-    for _ in range(steps):
-        slope = gradient(points)
-        steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
-        points = points - (level_set(points) / steepness)[:, None] * slope
-    return points
-
-
-def _functions(palm: Palm) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
+) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
+    """`level_set` and `gradient` of this palm, as functions of points (n, 3)."""
     return lambda points: level_set(palm, points), lambda points: gradient(palm, points)
 
 

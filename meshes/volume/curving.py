@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.quality import edge_lengths, jacobian_ratios
+from meshes.surface.level_set import project_to_level_set
 from meshes.tetmesh import (
     EDGES,
     Floats,
@@ -16,6 +16,7 @@ from meshes.tetmesh import (
     boundary_facets,
     corner_volumes,
 )
+from meshes.volume.quality import edge_lengths, jacobian_ratios
 
 log = logging.getLogger(__name__)
 
@@ -25,7 +26,7 @@ FURTHEST = 0.5  # of the edges around: what lies further from the level set is n
 Function = Callable[[Floats], Floats]
 
 
-def curved(
+def curve_boundary(
     mesh: TetMesh, level_set: Function, gradient: Function, facets: Ints | None = None
 ) -> TetMesh:
     """The mesh with the nodes of boundary facets moved onto a level set.
@@ -43,8 +44,6 @@ def curved(
     MeshError
         If the elements have four nodes.
     """
-    from meshes.palm import onto
-
     if mesh.order != 2:
         raise MeshError("elements of 4 nodes have no curved edges; make them `meshes.quadratic`")
     chosen = boundary_facets(mesh.tets) if facets is None else facets
@@ -53,7 +52,7 @@ def curved(
 
     def target(points: Floats, nodes: Ints) -> Floats:
         """Where nodes are on the level set; where they are if it is too far or not found."""
-        moved = onto(points[nodes], level_set, gradient)
+        moved = project_to_level_set(points[nodes], level_set, gradient)
         way = np.linalg.norm(moved - points[nodes], axis=1)
         found = (way < reach[nodes]) & (np.abs(level_set(moved)) < 1e-3 * reach[nodes])
         return np.where(found[:, None], moved, points[nodes])

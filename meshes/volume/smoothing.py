@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.quality import angles_between_faces
 from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volumes
+from meshes.volume.quality import angles_between_faces
 
 Sizing = Callable[[Floats], Floats]
+Projection = Callable[[Floats], Floats]
 
 STEPS, SHARE = 12, 0.7  # of the way that a node goes in each
 SHARP = 0.85  # of the mean normal at a node: an edge of 63 degrees
@@ -24,7 +25,7 @@ GOOD = 25.0  # degrees: smaller angles may not shrink, larger ones not below it
 
 
 def smoothed(
-    mesh: TetMesh, sizing: Sizing | None = None, onto: Callable[[Floats], Floats] | None = None
+    mesh: TetMesh, sizing: Sizing | None = None, project: Projection | None = None
 ) -> TetMesh:
     """The 4-node mesh with its inner nodes moved; no least angle below 25 degrees gets less, and
     those that there are get larger where one node's move can do it.
@@ -32,34 +33,34 @@ def smoothed(
     Parameters
     ----------
     sizing : function of points (n, 3) in metre to edge lengths (n,) asked for; None if equal.
-    onto : function that moves points (n, 3) near the surface onto it, along which its nodes then
+    project : function that moves points (n, 3) near the surface onto it, along which its nodes then
         slide, each to the mean of its facets; without it, and on sharp edges, they stay.
     """
     points, tets = np.array(mesh.points), mesh.tets
     facets = boundary_facets(tets)
     outer = np.isin(np.arange(len(points)), facets)
-    sliding = outer & (_evenness(points, facets) > SHARP) if onto else np.zeros_like(outer)
+    sliding = outer & (_evenness(points, facets) > SHARP) if project else np.zeros_like(outer)
     for _ in range(STEPS):
         moved = _means(points, tets, corner_volumes(points, tets), sizing)
         moved[outer] = points[outer]
-        if onto:
+        if project:
             means = _means(points, facets, _areas(points, facets)[1], sizing)
-            moved[sliding] = onto(means[sliding])
+            moved[sliding] = project(means[sliding])
         points = _no_worse(tets, points, points + SHARE * (moved - points))
     for node in np.unique(tets[_least_angles(points, tets) < GOOD]):
         if sliding[node] or not outer[node]:
             patch = tets[(tets == node).any(axis=1)]
-            _widen(points, patch, node, onto if outer[node] else None)
+            _widen(points, patch, node, project if outer[node] else None)
     return replace(mesh, points=points)
 
 
-def _widen(points: Floats, patch: Ints, node: int, onto: Callable[[Floats], Floats] | None) -> None:
+def _widen(points: Floats, patch: Ints, node: int, project: Projection | None) -> None:
     """Move a node to where the least angle of the elements at it is largest, by trial."""
     best = _least_angles(points, patch).min()
     length = np.linalg.norm(np.ptp(points[patch], axis=1), axis=1).mean()
     for reach in length * TRIED:
         tried = points[node] + reach * DIRECTIONS
-        for place in onto(tried) if onto else tried:
+        for place in project(tried) if project else tried:
             before = points[node].copy()
             points[node] = place
             least = _least_angles(points, patch).min()

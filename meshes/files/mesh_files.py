@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes import child
-from meshes.cells import (
+from meshes import subprocess_call
+from meshes.files.cells import (
     facet_sets,
     gmsh_names,
     gmsh_tags,
@@ -32,6 +32,7 @@ from meshes.tetmesh import MeshError, TetMesh
 
 VOLUME_FORMATS = (".vtu", ".msh", ".inp", ".vtk")
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused by gmsh itself
+VTK_CHILD, MESH_CHILD = (Path(__file__).parent / f"{name}_child.py" for name in ("vtk", "mesh"))
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 
 
@@ -56,9 +57,9 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
         try:
             if path.suffix.lower() == ".vtk":  # of whose newer versions meshio knows nothing
                 source = Path(folder, "mesh.vtu")
-                child.read("vtk_child.py", path, source, folder=folder)
-            child.read("mesh_child.py", source, unit, target, folder=folder)
-        except child.Refused as error:
+                subprocess_call.read(VTK_CHILD, path, source, folder=folder)
+            subprocess_call.read(MESH_CHILD, source, unit, target, folder=folder)
+        except subprocess_call.Refused as error:
             raise MeshError(str(error).replace(str(source.resolve()), str(path))) from None
         except MeshError as error:
             raise _unreadable(path, error) from None

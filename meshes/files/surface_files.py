@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes import child
-from meshes.files import existing, scale_of
-from meshes.placing import turned
-from meshes.surface import Surface
+from meshes import subprocess_call
+from meshes.files.mesh_files import VTK_CHILD, existing, scale_of
+from meshes.surface.alignment import turned
+from meshes.surface.triangulation import Surface
 from meshes.tetmesh import MeshError
 
 SURFACE_FORMATS = (".stl", ".ply", ".obj", ".glb", ".vtp")
@@ -33,7 +33,7 @@ def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z
     with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
         target = Path(folder, "surface.npz")
         try:
-            child.read("vtk_child.py", path, target, folder=folder)
+            subprocess_call.read(VTK_CHILD, path, target, folder=folder)
         except MeshError as error:
             raise MeshError(
                 f"{path} cannot be read ({error}); save it again from the program that it is from"

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes import files, surface_files
-from meshes.facets import geometry, named, seen_from_above
-from meshes.placing import clipped, on_planes, placed
-from meshes.quality import dihedral_angles, edge_lengths
-from meshes.structured import Grading
-from meshes.surface import Surface, check, repaired, volume
+from meshes.facets import geometry, seen_from_above, tag_boundary
+from meshes.files import mesh_files, surface_files
+from meshes.shapes.structured import Grading
+from meshes.surface.alignment import aligned, clipped, on_planes
+from meshes.surface.repair import check, repaired
+from meshes.surface.triangulation import Surface, volume
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
-from meshes.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
+from meshes.volume.quality import dihedral_angles, edge_lengths
+from meshes.volume.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
 
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h
 SMALLEST, LARGEST = 5e-3, 2.0  # m: diagonal of what can be a hand, or part of one
@@ -61,14 +62,14 @@ def body_from_file(
         If the mesher takes longer.
     """
     progress(f"reading {Path(path).name}", 0.0)
-    if Path(path).suffix.lower() in files.VOLUME_FORMATS:
+    if Path(path).suffix.lower() in mesh_files.VOLUME_FORMATS:
         if clip is not None or up != "+z":
             raise MeshError(f"{path} is a mesh already; only surfaces can be clipped and turned")
-        mesh = files.read(path, unit=unit)
+        mesh = mesh_files.read(path, unit=unit)
         say(f"read {len(mesh.tets):,} tetrahedra of {(4, 10)[mesh.order - 1]} nodes")
         return _described(_with_sides(mesh), say)
     surface = sound_surface(path, unit=unit, up=up, say=say)
-    surface, shift = placed(surface)
+    surface, shift = aligned(surface)
     say(
         "moved by ({:.1f}, {:.1f}, {:.1f}) mm, the palm's middle to the origin".format(*1e3 * shift)
     )
@@ -120,7 +121,7 @@ def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 
     if planes:
         is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))
         sides = {"cut": is_cut, "top": seen & ~is_cut}
-    made = named(mesh, rest="bottom", **sides)
+    made = tag_boundary(mesh, rest="bottom", **sides)
     return TetMesh(
         points=mesh.points,
         tets=mesh.tets,

@@ -1,6 +1,6 @@
 """Built-in meshes, so that nothing ordinary needs the mesher, which differs from run to run.
 
-`python -m meshes.remake FOLDER` makes them anew, with their checksums.
+`python -m meshes.volume.build_builtin FOLDER` makes them anew, with their checksums.
 """
 
 import hashlib
@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.facets import named, seen_from_above
-from meshes.palm import Palm, shaped
+from meshes.facets import seen_from_above, tag_boundary
+from meshes.shapes.palm import Palm
 from meshes.tetmesh import MeshError, TetMesh, quadratic
+from meshes.volume.palm_mesh import curved_palm
 
-HOME = Path(__file__).parent / "data"
+HOME = Path(__file__).parent.parent / "data"
 CHECKSUMS = "SHA256SUMS"
 
 
-def ready(name: str) -> TetMesh:
+def builtin(name: str) -> TetMesh:
     """Built-in mesh of 10-node tetrahedra, which comes with the package.
 
     `palm` and `flat-palm` (elements of 5 mm) have the facet sets of `palm_mesh`; `slab` (60 x 60 x
@@ -42,11 +43,11 @@ def ready(name: str) -> TetMesh:
     with np.load(io.BytesIO(content)) as stored:
         mesh = TetMesh(points=stored["points"], tets=stored["tets"])
         palm = json.loads(str(stored["palm"]))
-    return shaped(Palm(**palm), mesh) if palm else _with_box_sides(quadratic(mesh))
+    return curved_palm(Palm(**palm), mesh) if palm else _with_box_sides(quadratic(mesh))
 
 
 def _with_box_sides(mesh: TetMesh) -> TetMesh:
-    return named(
+    return tag_boundary(
         mesh,
         top=seen_from_above(mesh),
         bottom=lambda centroids, normals: normals[:, 2] < -0.5,

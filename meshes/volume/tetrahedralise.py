@@ -15,15 +15,18 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes import cache, child
-from meshes.facets import named
-from meshes.quality import dihedral_angles
-from meshes.smoothing import smoothed
-from meshes.structured import Grading, extrude
-from meshes.surface import Surface, area, check, n_pieces, repaired, thinnest, volume
+from meshes import cache, subprocess_call
+from meshes.facets import tag_boundary
+from meshes.shapes.structured import Grading, extrude
+from meshes.surface.repair import check, repaired
+from meshes.surface.triangulation import Surface, area, n_pieces, thinnest, volume
 from meshes.tetmesh import Floats, MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.volume.quality import dihedral_angles
+from meshes.volume.smoothing import smoothed
 
 log = logging.getLogger(__name__)
+
+MESHER = Path(__file__).with_name("tetwild_child.py")
 
 Sizing = Callable[[Floats], Floats]
 
@@ -174,7 +177,7 @@ def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndar
         source, target = Path(folder, "input.npz"), Path(folder, "output.npz")
         np.savez(source, **inputs)  # type: ignore[arg-type]
         try:
-            child.run("tetwild_child.py", source, target, timeout, folder=folder, timeout=timeout)
+            subprocess_call.run(MESHER, source, target, timeout, folder=folder, timeout=timeout)
         except TimeoutError:
             raise TimeoutError(
                 f"the mesher was stopped after {timeout:g} s; take larger elements or a longer "
@@ -194,7 +197,7 @@ def _accepted(surface: Surface, epsilon: float, points: Floats, tets: np.ndarray
             "thicker one or a smaller epsilon"
         )
     used, numbers = np.unique(tets, return_inverse=True)
-    mesh = named(TetMesh(points=points[used], tets=numbers.reshape(-1, 4)))
+    mesh = tag_boundary(TetMesh(points=points[used], tets=numbers.reshape(-1, 4)))
     boundary = boundary_facets(mesh.tets)
     outside, _ = repaired(mesh.points, boundary)  # which refuses open and crowded edges
     if (n := n_pieces(outside)) != 1 or len(outside.triangles) != len(boundary):

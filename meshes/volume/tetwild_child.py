@@ -1,4 +1,4 @@
-"""Run by `meshes.tetrahedralise` in a process of its own: arrays in, arrays out.
+"""Run by `tetrahedralise` in a process of its own: arrays in, arrays out.
 
     python tetwild_child.py INPUT.npz OUTPUT.npz SECONDS
 

@@ -1,4 +1,4 @@
-"""Run by `meshes.files` in a process of its own: meshio's readers, and what they make of a file.
+"""Run by `mesh_files` in a process of its own: meshio's readers, and what they make of a file.
 
     python mesh_child.py FILE UNIT OUTPUT.npz
 
@@ -15,15 +15,16 @@ import numpy as np
 
 def main() -> int:
     """Write the mesh in FILE to OUTPUT.npz; 1 if there is none."""
-    from meshes import child, files
+    from meshes import subprocess_call
+    from meshes.files import mesh_files
     from meshes.tetmesh import MeshError
 
     source, unit, target = sys.argv[1:]
     try:
-        mesh = files.read_here(Path(source), files.scale_of(unit))
+        mesh = mesh_files.read_here(Path(source), mesh_files.scale_of(unit))
     except MeshError as error:
         print(error, file=sys.stderr)
-        return child.REFUSED
+        return subprocess_call.REFUSED
     names = sorted(mesh.facets)
     facets: dict[str, Any] = {f"facets{k}": mesh.facets[name] for k, name in enumerate(names)}
     listed = np.array(names, np.str_)
@@ -32,5 +33,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # where this package is
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # where this package is
     sys.exit(main())

@@ -1,0 +1,1 @@
+"""Shapes of bodies: structured grids of sheets and blocks, and the level set of a palm."""

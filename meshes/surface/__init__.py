@@ -1,0 +1,1 @@
+"""Triangulated surfaces: checks, repair, self-intersection, alignment and level sets."""

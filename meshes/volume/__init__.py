@@ -1,0 +1,1 @@
+"""Tetrahedra within a closed surface: meshing, quality, smoothing, curving, built-in meshes."""
