@@ -4,8 +4,9 @@ One file an entry, named by a hash of everything that it depends on. Entries are
 temporary file and renamed, so that two processes cannot corrupt each other's. Each contains a
 digest of its name and contents: an entry that cannot be read, was altered or has another's name is
 a cache miss, and rebuilt. Above `LIMIT` the least recently used entries are removed; a file whose
-name is not of the cache never is. `SKINWAVE_CACHE` names another folder; empty, it turns the cache
-off.
+name is not of the cache never is. It is in the platform's folder of caches, on Linux
+`$XDG_CACHE_HOME/skinwave`; `SKINWAVE_CACHE` names another, and empty turns the cache off. It is in
+this package because meshes are the lowest that need it: all that is cached elsewhere is above.
 """
 
 import contextlib
@@ -43,11 +44,13 @@ def folder() -> Path | None:
     """Folder of the cache; None if the cache is off."""
     if (named := os.environ.get("SKINWAVE_CACHE")) is not None:
         return Path(named) if named else None
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    from platformdirs import user_cache_path
+
     try:
-        return Path(base or Path.home() / ".cache") / "skinwave"
+        found = user_cache_path("skinwave", appauthor=False)
     except RuntimeError:  # nobody has a home here
         return None
+    return found if found.is_absolute() else None  # the same, of older platformdirs
 
 
 def key(*parts: object) -> str:

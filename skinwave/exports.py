@@ -1,9 +1,8 @@
 """Results for other programs: tables, sound, and fields that ParaView opens."""
 
-import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from simple_model import Response
 from simple_model.response import step
 from skinwave.files import folder_name
 from skinwave.pictures.views import View
+from skinwave.plain_text import csv_table
 
 FIELD_FRAMES = 8  # of a period, written for ParaView
 FULL_SCALE = 32767
@@ -24,18 +24,17 @@ def write_probes(stem: Path, response: Response) -> None:
     """
     kind = "pressure" if response.unit == "Pa" else "displacement"
     places = [f"({1e3 * x:g}, {1e3 * y:g}) mm" for x, y in response.probes]
-    with open(stem.with_suffix(".csv"), "w", newline="", encoding="utf-8") as file:
-        header = ["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)]
-        write_table(file, header, [response.times, *response.displacement.T])
+    header = ["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)]
+    table = waveform_table(header, [response.times, *response.displacement.T])
+    stem.with_suffix(".csv").write_bytes(table)
     arrays = {"t": response.times, "probes": response.probes, kind: response.displacement}
     np.savez(stem.with_suffix(".npz"), **arrays)  # type: ignore[arg-type]
 
 
-def write_table(file: TextIO, header: Iterable[str], columns: Sequence[Floats]) -> None:
+def waveform_table(header: Iterable[str], columns: Sequence[Floats]) -> bytes:
     """Columns (t,) as CSV to nine digits, below their names."""
-    writer = csv.writer(file)
-    writer.writerow(header)
-    writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+    rows = zip(*columns, strict=True)
+    return csv_table(header, ([f"{value:.9g}" for value in row] for row in rows))
 
 
 def sampled(response: Response, probe: int) -> tuple[NDArray[np.int16], float]:

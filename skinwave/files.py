@@ -1,6 +1,5 @@
 """Files of a run in its folder."""
 
-import csv
 import json
 import os
 import re
@@ -14,7 +13,7 @@ import numpy as np
 
 from simple_model import Effort
 from skinwave import outputs, record
-from skinwave.plain_text import cell
+from skinwave.plain_text import csv_table
 from skinwave.run import Run
 from skinwave.scene_file import dumps
 
@@ -89,7 +88,8 @@ def write_responses(path: Path, runs: Mapping[str, Run]) -> None:
 
 def write_lines(path: Path, runs: Iterable[Run]) -> None:
     """Every line's amplitude per Tacton, body, model and probe."""
-    write_csv(path, LINE_COLUMNS, (row for run in runs for row in line_rows(run)))
+    rows = (row for run in runs for row in line_rows(run))
+    path.write_bytes(csv_table(LINE_COLUMNS, rows))
 
 
 def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
@@ -112,14 +112,6 @@ def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
 def write_effort(path: Path, effort: Effort) -> None:
     """Cost of a response, as JSON."""
     path.write_text(json.dumps(asdict(effort), indent=1), encoding="utf-8")
-
-
-def write_csv(path: Path, columns: Iterable[str], rows: Iterable[tuple[object, ...]]) -> None:
-    """A table, each value as a spreadsheet may show it."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(map(cell, row) for row in rows)
 
 
 def _short(value: float) -> str:

@@ -3,7 +3,10 @@
 Of pages, `skinwave.document` takes care.
 """
 
+import csv
+import io
 import sys
+from collections.abc import Iterable
 from typing import TextIO
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for the start of one
@@ -26,6 +29,17 @@ def cell(value: object) -> object:
     """A value of a CSV row; text that a spreadsheet would compute gets an apostrophe before it."""
     is_formula = isinstance(value, str) and value.startswith(FORMULA) and not is_number(value)
     return f"'{value}" if is_formula else value
+
+
+def csv_table(
+    header: Iterable[str], rows: Iterable[Iterable[object]], newline: str = "\r\n"
+) -> bytes:
+    """A table in CSV, UTF-8, each value as its `cell`; None is an empty one."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator=newline)
+    writer.writerow(map(cell, header))
+    writer.writerows(map(cell, row) for row in rows)
+    return text.getvalue().encode()
 
 
 def _escape(letter: str) -> str:

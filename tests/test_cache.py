@@ -196,6 +196,17 @@ def test_the_command_says_where_and_how_large_and_clears(home, capsys, monkeypat
     assert asked(capsys) == {"folder": None}
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the folder of another platform")
+def test_it_is_in_the_folder_of_caches_where_version_0_2_had_it(tmp_path, monkeypatch):
+    monkeypatch.delenv("SKINWAVE_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("LOCALAPPDATA", "C:/")  # of no meaning here
+    assert cache.folder() == tmp_path / "skinwave"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache.folder() == tmp_path / ".cache" / "skinwave"
+
+
 def test_a_folder_that_cannot_be_read_is_said(home, capsys):
     home.write_text("a file")
     for more in ([], ["--clear"]):

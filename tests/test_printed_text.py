@@ -4,16 +4,19 @@ import csv
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from argparse import Namespace
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+import skinwave
 from skinwave.cli import main
 from skinwave.commands import common
-from skinwave.plain_text import cell, printable, say
+from skinwave.plain_text import cell, csv_table, printable, say
 from skinwave.studies.claims import Verdict, write_claims
 from skinwave.sweeps import dataset
 
@@ -136,3 +139,14 @@ def test_text_that_a_spreadsheet_would_compute_is_marked(tmp_path):
     dataset.write_csv(tmp_path, [{"key": "@a", "error": "=b", "level": -3.0}])
     (row,) = csv.DictReader((tmp_path / "rows.csv").read_text().splitlines())
     assert list(row.values()) == ["'@a", "'=b", "-3.0"]
+
+
+def test_tables_have_one_writer():
+    written = csv_table(["=a", "b"], [["-x", None], [-1.0, 'two\nlines, "quoted"']], "\n")
+    assert written == b'\'=a,b\n\'-x,\n-1.0,"two\nlines, ""quoted"""\n'
+    assert csv_table(["a"], [[0.1]]) == b"a\r\n0.1\r\n"
+    home = Path(skinwave.__file__).parent
+    writers = [
+        p.name for p in home.rglob("*.py") if re.search(r"csv\.(w|DictW)rite", p.read_text())
+    ]
+    assert writers == ["plain_text.py"]

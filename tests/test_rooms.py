@@ -135,6 +135,7 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
         "pymetis",
         "dask",
         "pyarrow",
+        "platformdirs",
     }
     assert not loaded & heavy
     assert {"numpy"} <= loaded

@@ -17,7 +17,7 @@ from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
 from simple_model.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
-from skinwave.plain_text import is_number
+from skinwave.plain_text import csv_table, is_number
 from skinwave.scene import Scene
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
@@ -111,23 +111,21 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     tacton, path = scene.tacton, scene.tacton.trajectory
     t = np.arange(max(2, round(tacton.duration * rate))) / rate
     amplitude = loudness(scene.pressure, t)
-    height = f"{scene.pressure.height!r}"
     columns = []
     for ahead in tacton.foci:
         phase = np.mod(path.phase(t) + ahead, 1.0)
         levels = amplitude * np.sqrt(scene.pressure.weight(phase))
         columns.append((path.at_phase(phase).tolist(), levels.tolist()))
-    file = io.StringIO()
-    file.write(",".join(COLUMNS) + "\n")
-    for k, time in enumerate(t.tolist()):
-        for point, (places, levels) in enumerate(columns):
-            x, y = places[k]
-            file.write(f"{time!r},{point},{x!r},{y!r},{height},{levels[k]!r}\n")
+    rows = (
+        (time, point, *places[k], scene.pressure.height, levels[k])
+        for k, time in enumerate(t.tolist())
+        for point, (places, levels) in enumerate(columns)
+    )
     notes = (
         f"{len(t):,} samples of {len(tacton.foci)} focal points at {rate:g} Hz",
         "intensity is the sound pressure over that at full drive: the root of the load",
     )
-    return file.getvalue().encode(), notes
+    return csv_table(COLUMNS, rows, "\n"), notes
 
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:

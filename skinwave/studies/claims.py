@@ -12,8 +12,8 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
-from skinwave.files import write_csv
 from skinwave.numbers import decibel
+from skinwave.plain_text import csv_table
 from skinwave.run import Run
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
@@ -64,7 +64,7 @@ def evaluate(runs: Iterable[Run]) -> list[Verdict]:
 def write_claims(path: Path, verdicts: Iterable[Verdict]) -> None:
     """Every assessed claim per body and model."""
     rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in verdicts)
-    write_csv(path, [field.name for field in fields(Verdict)], rows)
+    path.write_bytes(csv_table([field.name for field in fields(Verdict)], rows))
 
 
 Judgement = tuple[bool, float, float, str]

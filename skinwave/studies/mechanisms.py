@@ -6,7 +6,6 @@ stretches as it bends; and at a quarter, a half and the whole of the amplitude, 
 the load keeps its ratio to f_AM when the drive is turned down, and a line of the sheet does not.
 """
 
-import csv
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -21,7 +20,7 @@ from skinwave import document
 from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
-from skinwave.plain_text import cell
+from skinwave.plain_text import csv_table
 from skinwave.run import JUDGED
 from skinwave.scene import BODIES, PROBES, Body, Scene
 from skinwave.simulation import compute
@@ -207,12 +206,12 @@ def sentences(found: Findings) -> list[str]:
 def write(folder: Path, found: Findings) -> None:
     """index.html, amplitude.png, lines.csv and mechanisms.json."""
     (folder / "mechanisms.json").write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
-    with open(folder / "lines.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["tacton", "body", "mechanism", "line", "frequency_hz", "displacement_um"])
-        for x in found.lines:
-            cells = [x.tacton, x.body, x.mechanism, x.line]
-            writer.writerow([*map(cell, cells), f"{x.frequency:.6g}", f"{1e6 * x.amplitude:.6g}"])
+    header = ["tacton", "body", "mechanism", "line", "frequency_hz", "displacement_um"]
+    rows = (
+        [x.tacton, x.body, x.mechanism, x.line, f"{x.frequency:.6g}", f"{1e6 * x.amplitude:.6g}"]
+        for x in found.lines
+    )
+    (folder / "lines.csv").write_bytes(csv_table(header, rows))
     drawn = png(figure(found.ratios), dpi=130)
     (folder / "amplitude.png").write_bytes(drawn)
     parts = [

@@ -1,8 +1,7 @@
 """Effects of dropping assumptions, as a page, a picture and tables."""
 
-import csv
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,9 +13,14 @@ from skinwave import document
 from skinwave.comparison import compare
 from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import png
-from skinwave.plain_text import cell
+from skinwave.plain_text import csv_table
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Effect, Ladder, Rung, followed_lines
+
+LINE_COLUMNS = (
+    "rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_rung_before_db",
+    "from_richest_db",
+)  # fmt: skip
 
 
 def sentence(e: Effect) -> str:
@@ -41,7 +45,7 @@ def write(folder: Path, found: Ladder) -> None:
         "rungs": [_record(rung) for rung in found.every],
     }
     (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
-    _write_lines(folder / "relax.csv", found)
+    (folder / "relax.csv").write_bytes(csv_table(LINE_COLUMNS, _line_rows(found)))
     answered = [r for r in found.every if r.response]
     arrays = {r.name: r.response.displacement for r in answered if r.response}
     first = next(r.response for r in answered if r.response)
@@ -121,22 +125,17 @@ def _record(rung: Rung) -> dict[str, object]:
     return {name: getattr(rung, name) for name in kept} | {"effort": effort}
 
 
-def _write_lines(path: Path, found: Ladder) -> None:
+def _line_rows(found: Ladder) -> Iterator[list[object]]:
     """Every line's change at each probe, from the step before and from the richest."""
-    answered = [r for r in found.rungs if r.response]
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz",
-                         "from_rung_before_db", "from_richest_db"])  # fmt: skip
-        for before, rung in found.pairs():
-            assert rung.response
-            names = followed_lines(found.scene, rung.response)
-            ratios = [_ratios(rung, other, names) for other in (before, answered[-1])]
-            for k, (name, f) in enumerate(names.items()):
-                for p, (x, y) in enumerate(found.scene.probes):
-                    changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
-                    row = [rung.name, rung.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
-                    writer.writerow(map(cell, row))
+    richest = [r for r in found.rungs if r.response][-1]
+    for before, rung in found.pairs():
+        assert rung.response
+        names = followed_lines(found.scene, rung.response)
+        ratios = [_ratios(rung, other, names) for other in (before, richest)]
+        for k, (name, f) in enumerate(names.items()):
+            for p, (x, y) in enumerate(found.scene.probes):
+                changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
+                yield [rung.name, rung.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
 
 
 def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:

@@ -4,8 +4,6 @@ Each file is written aside and renamed, so that what is there is whole; none is 
 two sweeps into one folder only add to it. A folder with other files among the rows is refused.
 """
 
-import csv
-import io
 import json
 import os
 import secrets
@@ -16,7 +14,7 @@ from typing import Any
 from meshes import reading
 from skinwave import marks, record
 from skinwave.outputs import output_file, unwritable
-from skinwave.plain_text import cell
+from skinwave.plain_text import csv_table
 
 ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
 OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
@@ -163,13 +161,10 @@ def write_csv(out: Path, rows: Iterable[Row]) -> None:
     flat = [dict(each for name, value in row.items() for each in _cells(name, value))
             for row in rows]  # fmt: skip
     columns = list(dict.fromkeys(name for row in flat for name in row))
-    text = io.StringIO()
-    lines = csv.DictWriter(text, columns)
-    lines.writerow({name: cell(name) for name in columns})
-    lines.writerows({name: cell(value) for name, value in row.items()} for row in flat)
+    table = csv_table(columns, ([row.get(name) for name in columns] for row in flat))
     refuse_changed(out, CSV)
     with output_file(out / CSV, overwrite=True) as file:
-        file.write(text.getvalue().encode())
+        file.write(table)
     enter(out, CSV)
 
 

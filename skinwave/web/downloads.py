@@ -4,7 +4,7 @@ import asyncio
 import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from io import BytesIO, StringIO
+from io import BytesIO
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +12,7 @@ from typing import Any
 
 from simple_model.choices import choose
 from simple_model.response import step
-from skinwave.exports import sampled, write_table
+from skinwave.exports import sampled, waveform_table
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
@@ -92,10 +92,8 @@ def csv_of(answers: Sequence[Answer]) -> bytes:
         f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
         for a in answers
     ]
-    text = StringIO()
     columns = [answers[0].response.times, *(a.response.displacement[:, 0] for a in answers)]
-    write_table(text, header, columns)
-    return text.getvalue().encode()
+    return waveform_table(header, columns)
 
 
 def wav_of(answer: Answer) -> bytes:
