@@ -2,30 +2,64 @@
 complex stiffness of the generalised Maxwell branches.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
-from fem.maxwell import relaxing_stiffness
+from fem.maxwell import MaxwellBranch, relaxing_stiffness
 from meshes.tetmesh import Floats
+
+
+def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[MaxwellBranch], s: Any) -> Any:
+    """Dynamic stiffness K + s C + s^2 M and that of Maxwell branches.
+
+    Parameters
+    ----------
+    K, C, M : (n, n), sparse or dense, N/m, N s/m, kg
+    branches : of (n, n) each
+    s : complex frequency in rad/s; of a shape (f, 1, 1) for dense matrices
+
+    Returns
+    -------
+    (n, n) or (f, n, n), N/m
+
+    Raises
+    ------
+    ValueError
+        If the matrices are of different sizes.
+    """
+    return K + s * C + s**2 * M + relaxing_stiffness(branches, s)
 
 
 def harmonic(
     operators: Operators, force: Floats, frequencies: ArrayLike, *, solver: str = "auto"
 ) -> NDArray[np.complex128]:
-    """Frequency response: complex displacement (f, 3 n) in metre, one factorisation per frequency.
+    """Frequency response by one factorisation per frequency.
 
     Parameters
     ----------
-    force : (3 n,) float or complex, N, the same at each frequency
+    operators : Operators, of the body
+    force : (3 n,) or (3 n, k), float or complex, N, the same at each frequency
     frequencies : (f,) float, Hz
+    solver : of `linear_solver.factorise`
+
+    Returns
+    -------
+    (f, 3 n) or (f, 3 n, k) complex, metre
+
+    Raises
+    ------
+    ValueError
+        If an unconstrained body is asked for at 0 Hz.
     """
-    K, C, M = operators.K, operators.C, operators.M
-    answers = []
+    K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
+    fields = []
     for w in 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64)):
-        Z = K + 1j * w * C - w**2 * M + relaxing_stiffness(operators.branches, 1j * w)
-        factor = factorise(Z, backend=solver)
+        factor = factorise(dynamic_stiffness(K, C, M, branches, 1j * w), backend=solver)
         u = factor.solve(force[operators.free].astype(np.complex128))
-        answers.append(operators.expand(u))
-    return np.array(answers)
+        fields.append(operators.expand(u))
+    return np.array(fields)

@@ -1,14 +1,22 @@
 """Reduced-order model of the probes' response to any surface load, by Krylov moment matching.
 
-By reciprocity the response of probe p to a load f is f^T y_p with (K + s C + s^2 M) y_p = s_p,
-where K stands for K + sum_j s tau_j / (1 + s tau_j) K_j if there are generalised Maxwell branches.
-Those y_p(s) are approximated by Galerkin projection onto the second-order Krylov space of the
-probe vectors about one real expansion point, which costs one real factorisation. The space is built
-by the two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195,
-2016): with proportional damping the plain recurrence loses all accuracy after a few dozen moments.
-The dashpot stretches of Maxwell branches, y / (1 + s tau_j), are further parts of the linearised
-vectors: their moments lie in the same space, so that the moments matched are those of the exact
-constitutive law.
+With A(s) = K + s C + s^2 M (and s tau_j / (1 + s tau_j) K_j for each generalised Maxwell branch),
+symmetric, the transfer function from a load f to a probe s_p is, by reciprocity,
+
+    H(s) = s_p^T A(s)^-1 f = f^T y(s),   A(s) y(s) = s_p
+
+and Galerkin projection onto a basis V gives H_r(s) = f^T V (V^T A V)^-1 V^T s_p = f^T V c. As the
+residual A (y - V c) is orthogonal to V, the error is, for any coefficients g,
+
+    H(s) - H_r(s) = (A(s)^-1 f - V g)^T A(s) (y(s) - V c)
+
+V holds the first n moments of y, its Taylor coefficients about one real expansion point s_0: then
+those of H and of H_r are the same (Bai and Su, SIAM J Sci Comput 26:1692, 2005), which costs one
+real factorisation. V is built by the two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai,
+SIAM J Matrix Anal Appl 37:195, 2016): with proportional damping the plain recurrence loses all
+accuracy after a few dozen moments. The dashpot stretches of Maxwell branches, y / (1 + s tau_j),
+are further parts of the linearised vectors: their moments lie in the same space, so that the
+moments matched are those of the exact constitutive law.
 The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
 Added mass of a fluid is dense and can only be applied: with it the expansion point is 0, where no
 mass is factorised.
@@ -21,6 +29,7 @@ unknown, because convergence may become steep or stall at any moment.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,20 +38,21 @@ from scipy.sparse.linalg import aslinearoperator
 
 from fem.added_mass import AddedMass
 from fem.assembly import Operators
+from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
-from fem.maxwell import MaxwellBranch, relaxing_stiffness
+from fem.maxwell import MaxwellBranch
 from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
 
-SHIFT = 2 * np.pi * 200.0  # expansion point, rad/s: best at 200 to 400 Hz for a band of 1 to 2 kHz
+EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: best at 200 to 400 Hz for a band of 1 to 2 kHz
 # Expansion point over the band with Maxwell branches: waves of high frequency lose little then, and
 # many of them count. Best between 0.8 and 1.6; the one above takes nearly twice as many moments.
-RELAXING_SHIFT = 1.0
+RELAXING_POINT = 1.0
 # Moments between two error estimates: at least so many, which give it to a factor of 4, and this
 # share of all, because estimating the error of a large model costs more than its moments.
-AHEAD = 3
-SHARE_AHEAD = 1 / 16
+FEWEST_BETWEEN = 3
+SHARE_BETWEEN = 1 / 16
 MOST_MOMENTS = 200
 SMALLEST = np.finfo(np.float64).tiny
 DISTINCT = 1e-6  # of the largest singular value: probes that differ by less count as dependent
@@ -85,7 +95,7 @@ def reduce(
 
     Parameters
     ----------
-    operators : Operators
+    operators : Operators, of the full body
     probes : (p, 3 n) sparse, from `probe_operator`; for whole fields the rows of a
         `load_subspace` as well, without `loads`
     band : float, Hz, highest frequency at which the tolerance must be met
@@ -93,104 +103,61 @@ def reduce(
     loads : (3 n, k), typical nodal forces that the error is estimated for; without any it is
         that of the probes' adjoint fields in the whole body, which takes far more moments
     added : added mass of a fluid, as `added_mass` gives it; the body must be constrained then
+    solver : of `linear_solver.factorise`
     progress : called with the fraction done, as the error estimate approaches the tolerance
+
+    Returns
+    -------
+    ReducedModel
+        With an `estimate` of at most the tolerance.
 
     Raises
     ------
     ValueError
         If the tolerance is out of reach, or no probe can move.
     """
-    free, branches = operators.free, operators.branches
-    seeds = probes[:, free].toarray().T
-    if not seeds.any():
+    free, report = operators.free, progress or (lambda fraction: None)
+    start_vectors = probes[:, free].toarray().T
+    if not start_vectors.any():
         raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
-    # Probes on a clamped edge do not move; those in one element may be linearly dependent.
-    directions, strengths, _ = np.linalg.svd(seeds, full_matrices=False)
-    moving = directions[:, strengths > DISTINCT * strengths[0]]
-    shift = 2 * np.pi * RELAXING_SHIFT * band if branches else SHIFT
-    if added is not None:
-        shift, operators = 0.0, _with_added(operators, added)
-    K, C, M = operators.K, operators.C, operators.M
-    shifted = K + shift * C + shift**2 * M + relaxing_stiffness(branches, shift) if shift else K
-    factor = factorise(shifted, backend=solver)
-    if progress:
-        progress(0.0)
-    others = [C, *(branch.K for branch in branches)]
-    space = _Space([M, *others], moving.shape[1] * (MOST_MOMENTS + 1))
-    small = [np.empty((0, 0)) for _ in [K, *others]]
-    grown = _moments(space, operators, shift, factor, moving)
-    looked, size, before = 0, 0, None
+    point, operators = _expansion(operators, added, band)
+    factor = factorise(_stiffness_at(operators, point), backend=solver)
+    report(0.0)
+
+    independent = _independent(start_vectors)
+    space = KrylovBasis(operators, independent.shape[1] * (MOST_MOMENTS + 1))
+    moments, size, before = 0, 0, None
     errors: list[float] = []
-    for moment in range(1, MOST_MOMENTS + 1):
-        next(grown)
-        basis, images = space.basis, space.images
-        new = slice(len(small[0]), None)
-        moved = [K @ basis[:, new], *(image[:, new] for image in images[1:])]
-        small = [_bordered(part, basis.T @ f) for part, f in zip(small, moved, strict=True)]
-        if moment < looked + max(AHEAD, SHARE_AHEAD * moment):
+    for moment in _moments(space, operators, point, factor, independent):
+        if moment < moments + max(FEWEST_BETWEEN, SHARE_BETWEEN * moment):
             continue
-        weights = None if loads is None else basis.T @ loads[free]
-        model = (small[0], small[1], _branches(small[2:], branches))
-        now = _probe_response(*model, basis.T @ seeds, weights, band)
-        errors += [] if before is None else [_change(before, now)]
-        if errors and errors[-1] <= tolerance:
-            break
-        if errors and progress:
-            progress(max(0.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
-        looked, size, before = moment, space.size, now
+        weights = None if loads is None else space.basis.T @ loads[free]
+        now = _band_response(space, space.basis.T @ start_vectors, weights, band)
+        if before is not None:
+            errors.append(_largest_change(before, now))
+            if errors[-1] <= tolerance:
+                break
+            report(max(0.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
+        moments, size, before = moment, space.size, now
     else:
         raise ValueError(
             f"{MOST_MOMENTS} moments leave an error of {errors[-1]:.2g}, above the tolerance "
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )
+
     basis = space.basis[:, :size]
-    K, C, *relaxing = (part[:size, :size].copy() for part in small)
+    K, C, *relaxing = (part[:size, :size].copy() for part in space.projected)
     return ReducedModel(
         basis=operators.expand(basis),
         K=K,
         C=C,
         R=basis.T @ (operators.R @ basis),
-        outputs=seeds.T @ basis,
-        moments=looked,
+        outputs=start_vectors.T @ basis,
+        moments=moments,
         estimate=errors[-1],
         solver=factor.backend,
-        branches=_branches(relaxing, branches),
+        branches=_branches(relaxing, operators.branches),
     )
-
-
-def _with_added(operators: Operators, added: AddedMass) -> Operators:
-    """Operators of a body with an added mass, of which C and M can only be applied."""
-    C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
-    return replace(operators, C=C + added.rate * added.M, M=M + added.M)
-
-
-def _moments(
-    space: "_Space", operators: Operators, shift: float, factor: Factor, seeds: Floats
-) -> Iterator[None]:
-    """Extend the Krylov space by the next moment of start vectors (n, p) at each turn."""
-    branches = operators.branches
-    lags = [branch.time / (1 + shift * branch.time) for branch in branches]
-    scale = shift or SHIFT
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
-    # rows of `taken` are orthonormal, so that nothing grows however many moments are taken.
-    taken = np.zeros((2 + len(lags), 0, 0))
-    upper = space.extend(factor.solve(seeds))
-    relaxed = [(1 - shift * lag) * upper for lag in lags]
-    newest = np.stack([upper, np.zeros_like(upper), *relaxed])
-    while True:
-        yield
-        taken, newest = _append(taken, newest)
-        y, y_before, *y_relaxed = newest
-        M, C, *K_relaxing = space.images  # times the basis, whose coordinates these are
-        rest = C @ y + M @ (2 * shift * y + scale * y_before)
-        for K, lag, part in zip(K_relaxing, lags, y_relaxed, strict=True):
-            rest += K @ (lag * part)
-        upper = space.extend(-factor.solve(rest))
-        lower, _, *before = (_padded(part, len(upper)) for part in newest)
-        relaxed = [
-            (1 - shift * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
-        ]
-        newest = np.stack([upper, lower / scale, *relaxed])
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
@@ -205,80 +172,172 @@ def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
 
 
 def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Complex:
-    """Transfer function: probe displacement (f, p, k) in metre per unit of the reduced forces
-    (r, k), at frequencies (f,) in Hz.
+    """Transfer function of a reduced-order model.
+
+    Parameters
+    ----------
+    forces : (r, k) float, N kg^-1/2, reduced forces
+    frequencies : (f,) float, Hz
+
+    Returns
+    -------
+    (f, p, k) complex, metre, displacement of the probes under each of the forces
+
+    Raises
+    ------
+    LinAlgError
+        If the model has no loss and a natural frequency among the frequencies.
     """
-    w = 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))
-    Z = _impedance(model.K, model.C, model.branches, w)
-    return model.outputs @ np.linalg.solve(Z, np.broadcast_to(forces, (len(w), *forces.shape)))
+    s = 2j * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))[:, None, None]
+    A = dynamic_stiffness(model.K, model.C, np.eye(len(model.K)), model.branches, s)
+    fields: Complex = np.linalg.solve(A, np.broadcast_to(forces, (len(s), *forces.shape)))
+    return model.outputs @ fields
 
 
-class _Space:
-    """Mass-orthonormal Krylov basis (n, size) that grows, and its `images`, the products of M and
-    other matrices with it, each formed once; memory is touched only as far as it is used.
+class KrylovBasis:
+    """Mass-orthonormal basis that grows; its `products` with M, C and the K_j of the Maxwell
+    branches, each formed once, and the `projected` K, C and K_j (size, size).
+
+    Memory is touched only as far as it is used.
     """
 
-    def __init__(self, matrices: list[sparse.csr_array], most: int) -> None:
-        self._matrices = matrices
-        shape = (matrices[0].shape[0], most)
-        self._columns = [np.empty(shape, order="F") for _ in [None, *matrices]]
+    def __init__(self, operators: Operators, most: int) -> None:
+        self._branches = operators.branches
+        self._K, self._M = operators.K, operators.M
+        self._others = [operators.C, *(branch.K for branch in operators.branches)]
+        shape = (len(operators.free), most)
+        self._columns = [np.empty(shape, order="F") for _ in [None, self._M, *self._others]]
+        self.projected = [np.empty((0, 0)) for _ in [self._K, *self._others]]
         self.size = 0
 
     @property
     def basis(self) -> Floats:
+        """Vectors (n, size)."""
         return self._columns[0][:, : self.size]
 
     @property
-    def images(self) -> list[Floats]:
+    def products(self) -> list[Floats]:
+        """Products (n, size) of the basis with M, C and the K_j."""
         return [columns[:, : self.size] for columns in self._columns[1:]]
+
+    @property
+    def model(self) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
+        """Projected K, C, M and Maxwell branches."""
+        K, C, *relaxing = self.projected
+        return K, C, np.eye(self.size), _branches(relaxing, self._branches)
 
     def extend(self, block: Floats) -> Floats:
         """Add the linearly independent directions of a block (n, k); its coordinates (size, k)."""
-        M, *others = self._matrices
-        Q, MQ = self.basis, self.images[0]
+        M, Q, MQ = self._M, self.basis, self.products[0]
         scale = _norms(block, M @ block)
         block, overlap = block / scale, np.zeros((self.size, len(scale)))
         for _ in range(2):  # twice is enough
             coordinates = MQ.T @ block
             block = block - Q @ coordinates
             overlap = overlap + coordinates
-        image = M @ block
-        left = _norms(block, image)
+        product = M @ block
+        left = _norms(block, product)
         fresh = left > ROUND_OFF  # of 1: a space of all of a body's dofs has no new direction
-        block, image = (np.where(fresh, x / left, 0.0) for x in (block, image))
-        squares, directions = np.linalg.eigh(block.T @ image)
+        block, product = (np.where(fresh, x / left, 0.0) for x in (block, product))
+        squares, directions = np.linalg.eigh(block.T @ product)
         new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
         for _ in range(2):
             new = new - Q @ (MQ.T @ new)
-            image = M @ new
-            upright = np.linalg.inv(np.linalg.cholesky(new.T @ image)).T
-            new, image = new @ upright, image @ upright
-        grown = slice(self.size, self.size + new.shape[1])
-        parts = [new, image, *(other @ new for other in others)]
+            product = M @ new
+            upright = np.linalg.inv(np.linalg.cholesky(new.T @ product)).T
+            new, product = new @ upright, product @ upright
+        self._append(new, product)
+        return np.vstack([overlap, (product.T @ block) * left]) * scale
+
+    def _append(self, new: Floats, product: Floats) -> None:
+        """Append vectors (n, k) and their products."""
+        added = slice(self.size, self.size + new.shape[1])
+        parts = [new, product, *(other @ new for other in self._others)]
         for columns, part in zip(self._columns, parts, strict=True):
-            columns[:, grown] = part
-        self.size = grown.stop
-        return np.vstack([overlap, (image.T @ block) * left]) * scale
+            columns[:, added] = part
+        self.size = added.stop
+        products = [self._K @ self.basis[:, added], *(x[:, added] for x in self.products[1:])]
+        self.projected = [
+            _bordered(small, self.basis.T @ x)
+            for small, x in zip(self.projected, products, strict=True)
+        ]
 
 
-def _norms(block: Floats, image: Floats) -> Floats:
-    """Mass norms (k,) of columns with their image under M.
+def _expansion(
+    operators: Operators, added: AddedMass | None, band: float
+) -> tuple[float, Operators]:
+    """Expansion point in rad/s, and the operators with an added mass, of which C and M can only be
+    applied.
+    """
+    if added is None:
+        relaxing = 2 * np.pi * RELAXING_POINT * band
+        return relaxing if operators.branches else EXPANSION_POINT, operators
+    C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
+    return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M)
+
+
+def _stiffness_at(operators: Operators, point: float) -> sparse.csr_array:
+    K, C, M = operators.K, operators.C, operators.M
+    return dynamic_stiffness(K, C, M, operators.branches, point) if point else K
+
+
+def _independent(start_vectors: Floats) -> Floats:
+    """Orthonormal basis of vectors (n, p): probes on a clamped edge do not move, and those in one
+    element may be linearly dependent.
+    """
+    directions, strengths, _ = np.linalg.svd(start_vectors, full_matrices=False)
+    return directions[:, strengths > DISTINCT * strengths[0]]
+
+
+def _moments(
+    space: KrylovBasis, operators: Operators, point: float, factor: Factor, start_vectors: Floats
+) -> Iterator[int]:
+    """Numbers, from 1, of the moments of start vectors (n, p), by each of which the space has
+    been extended.
+    """
+    branches = operators.branches
+    lags = [branch.time / (1 + point * branch.time) for branch in branches]
+    scale = point or EXPANSION_POINT
+    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
+    # those of all moments are orthonormalised, so that nothing grows however many there are.
+    earlier = np.zeros((2 + len(lags), 0, 0))
+    upper = space.extend(factor.solve(start_vectors))
+    relaxed = [(1 - point * lag) * upper for lag in lags]
+    latest = np.stack([upper, np.zeros_like(upper), *relaxed])
+    for moment in range(1, MOST_MOMENTS + 1):
+        yield moment
+        earlier, latest = _orthonormalised(earlier, latest)
+        y, y_before, *y_relaxed = latest
+        M, C, *K_relaxing = space.products  # with the basis, whose coordinates these are
+        rest = C @ y + M @ (2 * point * y + scale * y_before)
+        for K, lag, part in zip(K_relaxing, lags, y_relaxed, strict=True):
+            rest += K @ (lag * part)
+        upper = space.extend(-factor.solve(rest))
+        lower, _, *before = (_padded(part, len(upper)) for part in latest)
+        relaxed = [
+            (1 - point * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
+        ]
+        latest = np.stack([upper, lower / scale, *relaxed])
+
+
+def _norms(block: Floats, product: Floats) -> Floats:
+    """Mass norms (k,) of columns with their product with M.
 
     At rest every second moment of a body without loss is 0, which is no direction.
     """
-    return np.maximum(np.sqrt(np.einsum("nk,nk->k", block, image)), SMALLEST)
+    return np.maximum(np.sqrt(np.einsum("nk,nk->k", block, product)), SMALLEST)
 
 
 def _padded(coordinates: Floats, size: int) -> Floats:
     return np.vstack([coordinates, np.zeros((size - len(coordinates), coordinates.shape[1]))])
 
 
-def _append(taken: Floats, newest: Floats) -> tuple[Floats, Floats]:
-    """The previous vectors (l, size, k) with the newest orthonormalised to them; and the newest."""
-    parts, size, width = newest.shape
-    grown = np.zeros((parts, size, taken.shape[2]))
-    grown[:, : taken.shape[1]] = taken
-    W, X = grown.reshape(parts * size, -1), newest.reshape(parts * size, width)
+def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
+    """Earlier vectors (parts, size, k) with the latest, orthonormalised to them; and the latest."""
+    parts, size, width = latest.shape
+    padded = np.zeros((parts, size, earlier.shape[2]))
+    padded[:, : earlier.shape[1]] = earlier
+    W, X = padded.reshape(parts * size, -1), latest.reshape(parts * size, width)
     X = X / np.linalg.norm(X, axis=0)
     for _ in range(2):
         X = X - W @ (W.T @ X)
@@ -289,11 +348,11 @@ def _append(taken: Floats, newest: Floats) -> tuple[Floats, Floats]:
 def _bordered(small: Floats, columns: Floats) -> Floats:
     """Symmetric matrix bordered by its last columns (r, k) and rows."""
     r, k = columns.shape
-    grown = np.empty((r, r))
-    grown[: r - k, : r - k] = small
-    grown[:, r - k :] = columns
-    grown[r - k :] = columns.T
-    return grown
+    whole = np.empty((r, r))
+    whole[: r - k, : r - k] = small
+    whole[:, r - k :] = columns
+    whole[r - k :] = columns.T
+    return whole
 
 
 def _branches(small: list[Floats], large: tuple[MaxwellBranch, ...]) -> tuple[MaxwellBranch, ...]:
@@ -301,28 +360,21 @@ def _branches(small: list[Floats], large: tuple[MaxwellBranch, ...]) -> tuple[Ma
     return tuple(MaxwellBranch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
 
 
-def _impedance(K: Floats, C: Floats, branches: tuple[MaxwellBranch, ...], w: Floats) -> Complex:
-    s = 1j * w[:, None, None]
-    return np.asarray(K + s * C + s**2 * np.eye(len(K)) + relaxing_stiffness(branches, s))
-
-
-def _probe_response(
-    K: Floats,
-    C: Floats,
-    branches: tuple[MaxwellBranch, ...],
-    seeds: Floats,
-    loads: Floats | None,
-    band: float,
+def _band_response(
+    space: KrylovBasis, start_vectors: Floats, loads: Floats | None, band: float
 ) -> Complex:
     """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
     # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
-    w = 2 * np.pi * np.linspace(1e-3 * band, band, 41)
+    s = 2j * np.pi * np.linspace(1e-3 * band, band, 41)
     # One by one: all at once would be as large as the body's own factors.
-    fields = (np.linalg.solve(_impedance(K, C, branches, at)[0], seeds) for at in w[:, None])
+    K, C, M, branches = space.model
+    fields: Iterator[Any] = (
+        np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors) for at in s
+    )
     return np.array([x if loads is None else loads.T @ x for x in fields])
 
 
-def _change(before: Complex, now: Complex) -> float:
+def _largest_change(before: Complex, now: Complex) -> float:
     """Largest relative change at any frequency."""
     change = now.copy()
     change[:, : before.shape[1]] -= before
