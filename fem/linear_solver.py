@@ -35,7 +35,7 @@ def available(*, complex_valued: bool = False) -> tuple[str, ...]:
     """Installed backends for real or for complex matrices, the fastest first."""
     # CHOLMOD has no complex symmetric factorisation, only the Hermitian one.
     cholmod = _cholmod() is not None and not complex_valued
-    found = {"pardiso": _mkl() is not None, "cholmod": cholmod, "superlu": True}
+    found = {"pardiso": mkl() is not None, "cholmod": cholmod, "superlu": True}
     return tuple(name for name in BACKENDS if found[name])
 
 
@@ -176,7 +176,7 @@ def _cholmod_solve(A: sparse.csr_array) -> Callable[[Array], Array]:
 
 
 @cache
-def _mkl() -> ctypes.CDLL | None:
+def mkl() -> ctypes.CDLL | None:
     """The MKL runtime of the `mkl` wheel, if it is installed."""
     for folder in ("lib", "Library/bin"):
         for path in sorted(Path(sys.prefix, folder).glob("*mkl_rt*")):
@@ -205,7 +205,7 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
         x = np.zeros_like(b, order="F")
         error = ctypes.c_int32(0)
         pointer = ctypes.c_void_p
-        _mkl().pardiso(  # type: ignore[union-attr]
+        mkl().pardiso(  # type: ignore[union-attr]
             handle.ctypes.data_as(pointer), *_integers(1, 1, kind, phase, n),
             values.ctypes.data_as(pointer), indptr.ctypes.data_as(pointer),
             indices.ctypes.data_as(pointer), None, *_integers(right),

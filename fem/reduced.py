@@ -41,6 +41,7 @@ from fem.assembly import Operators
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
 from fem.maxwell import MaxwellBranch
+from fem.products import product
 from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
@@ -203,8 +204,9 @@ class KrylovBasis:
 
     def __init__(self, operators: Operators, most: int) -> None:
         self._branches = operators.branches
-        self._K, self._M = operators.K, operators.M
-        self._others = [operators.C, *(branch.K for branch in operators.branches)]
+        self._K, self._M = product(operators.K), product(operators.M)
+        others = [operators.C, *(branch.K for branch in operators.branches)]
+        self._others = [product(other) for other in others]
         shape = (len(operators.free), most)
         self._columns = [np.empty(shape, order="F") for _ in [None, self._M, *self._others]]
         self.projected = [np.empty((0, 0)) for _ in [self._K, *self._others]]
@@ -229,34 +231,34 @@ class KrylovBasis:
     def extend(self, block: Floats) -> Floats:
         """Add the linearly independent directions of a block (n, k); its coordinates (size, k)."""
         M, Q, MQ = self._M, self.basis, self.products[0]
-        scale = _norms(block, M @ block)
+        scale = _norms(block, M(block))
         block, overlap = block / scale, np.zeros((self.size, len(scale)))
         for _ in range(2):  # twice is enough
             coordinates = MQ.T @ block
             block = block - Q @ coordinates
             overlap = overlap + coordinates
-        product = M @ block
-        left = _norms(block, product)
+        moved = M(block)
+        left = _norms(block, moved)
         fresh = left > ROUND_OFF  # of 1: a space of all of a body's dofs has no new direction
-        block, product = (np.where(fresh, x / left, 0.0) for x in (block, product))
-        squares, directions = np.linalg.eigh(block.T @ product)
+        block, moved = (np.where(fresh, x / left, 0.0) for x in (block, moved))
+        squares, directions = np.linalg.eigh(block.T @ moved)
         new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
         for _ in range(2):
             new = new - Q @ (MQ.T @ new)
-            product = M @ new
-            upright = np.linalg.inv(np.linalg.cholesky(new.T @ product)).T
-            new, product = new @ upright, product @ upright
-        self._append(new, product)
-        return np.vstack([overlap, (product.T @ block) * left]) * scale
+            moved = M(new)
+            upright = np.linalg.inv(np.linalg.cholesky(new.T @ moved)).T
+            new, moved = new @ upright, moved @ upright
+        self._append(new, moved)
+        return np.vstack([overlap, (moved.T @ block) * left]) * scale
 
-    def _append(self, new: Floats, product: Floats) -> None:
+    def _append(self, new: Floats, moved: Floats) -> None:
         """Append vectors (n, k) and their products."""
         added = slice(self.size, self.size + new.shape[1])
-        parts = [new, product, *(other @ new for other in self._others)]
+        parts = [new, moved, *(times(new) for times in self._others)]
         for columns, part in zip(self._columns, parts, strict=True):
             columns[:, added] = part
         self.size = added.stop
-        products = [self._K @ self.basis[:, added], *(x[:, added] for x in self.products[1:])]
+        products = [self._K(new), *(x[:, added] for x in self.products[1:])]
         self.projected = [
             _bordered(small, self.basis.T @ x)
             for small, x in zip(self.projected, products, strict=True)

@@ -1,5 +1,6 @@
 """Every solver has the same solution, and the reduced-order model that of the full one."""
 
+import gc
 import sys
 from dataclasses import replace
 from itertools import islice
@@ -11,7 +12,7 @@ from scipy import sparse
 import fem
 import meshes
 import skinwave
-from fem import linear_solver
+from fem import linear_solver, products
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.fields import field
 from skinwave.models.bodies import build as build_body
@@ -66,7 +67,7 @@ def test_without_mkl_and_metis_superlu_carries_it(stiff, monkeypatch):
     _, A, b = stiff
     monkeypatch.setitem(sys.modules, "pymetis", None)
     monkeypatch.setitem(sys.modules, "sksparse.cholmod", None)
-    monkeypatch.setattr(linear_solver, "_mkl", lambda: None)
+    monkeypatch.setattr(linear_solver, "mkl", lambda: None)
     factor = fem.factorise(A)
     assert factor.backend == "superlu"
     assert np.abs(A @ factor.solve(b) - b).max() < 1e-9 * np.abs(b).max()
@@ -90,6 +91,20 @@ def test_the_ordering_is_a_permutation_that_saves_fill(stiff, monkeypatch, metis
         return sparse.linalg.splu(permuted, **options).L.nnz
 
     assert fill(order) < 0.6 * fill(np.arange(A.shape[0]))
+
+
+@pytest.mark.parametrize("with_mkl", [True, False])
+def test_products_with_blocks_are_scipys(stiff, monkeypatch, with_mkl):
+    if not with_mkl:
+        monkeypatch.setattr(products, "mkl", lambda: None)
+    A = stiff[1]
+    times, rng = products.product(A), np.random.default_rng(0)
+    gc.collect()
+    for shape in ((A.shape[0],), *((A.shape[0], k) for k in (1, 2, 5, 12))):
+        block = np.asarray(rng.normal(size=shape), order="F")  # as MKL does not take it
+        np.testing.assert_allclose(times(block), A @ block, rtol=0, atol=1e-14 * abs(A).max())
+    applied = sparse.linalg.aslinearoperator(A)
+    np.testing.assert_array_equal(products.product(applied)(block), applied @ block)
 
 
 def test_unknown_or_missing_solvers_are_named():
