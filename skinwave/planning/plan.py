@@ -8,7 +8,8 @@ from simple_model.sampling import resolving_step
 from skinwave.effort import Progress
 from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
-from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
+from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
+from skinwave.models.reduction import BAND
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
 from skinwave.planning.estimates import (
     cutoff_frequency,

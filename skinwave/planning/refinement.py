@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import fem
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.effort import Progress
@@ -26,7 +25,8 @@ from skinwave.models.bodies import (
     coarsest_size,
     default_size,
 )
-from skinwave.models.prepared import Prepared, answer, prepare, reduced_lines, reduction_tolerance
+from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.models.reduction import oscillating, read_at, respond
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
@@ -153,9 +153,8 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
     """
     if scene.body.is_held:
         return found.displacement
-    frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
-    lines, _ = fem.line_response(prepared.poles, forces, frequencies)
-    return lines[frequencies > 0] @ prepared.read.T
+    motion = oscillating(respond(prepared.body, scene.pressure))
+    return read_at(motion, prepared.read).lines
 
 
 def richardson_error(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
