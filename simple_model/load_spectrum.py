@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from simple_model.focus import spot_width
+from simple_model.focus import spot_reach, spot_width
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.tacton import Tacton, modulation_at_phases, tones
 from simple_model.trajectory import Floats
@@ -84,6 +84,35 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
         coefficients=c[kept],
         strengths=strength[kept],
     )
+
+
+def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
+    """Load spectrum in reduced coordinates.
+
+    Parameters
+    ----------
+    points : (k, 2 or 3) float, metre, of the surface
+    load : (k, r) float, reduced forces of unit pressure at each point
+
+    Returns
+    -------
+    frequencies : (f,) float, Hz, of the distinct lines
+    forces : (f, r) complex, reduced forces of the lines
+
+    Raises
+    ------
+    ValueError
+        As `pressure.check_lines` does.
+    """
+    lines = load_lines(pressure)
+    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.focus)
+    forces = []
+    for part in np.array_split(knots, len(knots) // 64 + 1):
+        low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
+        near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
+        forces.append(pressure.spot(points[near], part) @ load[near])
+    weighted = np.vstack(forces) * path_weights(pressure)[:, None]
+    return lines.gather(path_fourier(weighted.T).T)
 
 
 def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:

@@ -10,7 +10,8 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from skinwave.effort import Progress, SkinwaveWarning
-from skinwave.pictures.motion import Waves, check_values, from_rest, probe_response, waves
+from skinwave.models.reduction import from_rest, oscillating, read_at
+from skinwave.pictures.motion import Waves, check_values, probe_response, waves
 from skinwave.planning.assessment import told
 from skinwave.scene import Scene
 
@@ -51,7 +52,7 @@ def field(
     """
     moved = waves(scene, tolerance, progress, h=h, solver=solver)
     check_values(len(times), len(moved.mesh.points))
-    displacement = (from_rest(moved, times) @ moved.basis.T).reshape(len(times), -1, 3)
+    displacement = (from_rest(moved.motion, times) @ moved.basis.T).reshape(len(times), -1, 3)
     at_probes = assessed_probes(scene, moved, h, tolerance, solver)
     for sentence in at_probes.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
@@ -69,5 +70,5 @@ def assessed_probes(
     if scene.body.is_held:
         return told(scene, found, found.displacement, h, tolerance, solver)
     read = fem.probe_operator(moved.mesh, scene.probe_points) @ moved.basis
-    lines = moved.lines[moved.frequencies > 0] @ read.T
+    lines = read_at(oscillating(moved.motion), read).lines
     return told(scene, found, lines, h, tolerance, solver)

@@ -124,7 +124,7 @@ def test_a_sheet_without_loss_is_reduced_too():
     solid = replace(SHEET.solid, loss_factor=0.0)
     prepared = prepare(replace(SHEET, material=solid), SCENE.probe_points, h=H)
     lossy = prepare(SHEET, SCENE.probe_points, h=H)
-    lowest = [np.abs(p.poles.values).min() for p in (prepared, lossy)]
+    lowest = [np.abs(p.body.poles.values).min() for p in (prepared, lossy)]
     assert lowest[0] == pytest.approx(lowest[1], rel=1e-6)
 
 
@@ -165,7 +165,7 @@ def test_a_sheet_that_hardly_stretches_answers_as_the_linear_one():
 
 def test_the_loss_factor_is_the_material_s_in_air_too():
     prepared = prepare(SHEET, SCENE.probe_points, h=H)
-    poles = prepared.poles.values[prepared.poles.values.imag > 0]
+    poles = prepared.body.poles.values[prepared.body.poles.values.imag > 0]
     w = np.abs(poles)
     by_mass, by_stiffness = rayleigh_damping(SHEET.solid.loss_factor, LOSS_BAND)
     bending = w < 2 * np.pi * 1500

@@ -535,9 +535,9 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
         facets = {"sides": block.facets[held], "top": {**block.facets, "part": part}[pushed]}
         meshes.write(body.file, replace(block, facets=facets))
         read.append(prepare(body, np.array([(-0.004, 0.001)]), h=0.005))
-    stiffness = [np.abs(prepared.poles.values[:3]).sum() for prepared in read]
+    stiffness = [np.abs(prepared.body.poles.values[:3]).sum() for prepared in read]
     assert stiffness[0] != pytest.approx(stiffness[1], rel=1e-3)
-    assert len(read[1].points) == 2 * len(read[2].points)
+    assert len(read[1].body.points) == 2 * len(read[2].body.points)
 
 
 @pytest.mark.parametrize(

@@ -16,12 +16,12 @@ from simple_model.compliance import half_space, slab
 from simple_model.drive import DRIVES
 from simple_model.flat_body import steady_lines
 from simple_model.focus import FOCI
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples
+from simple_model.load_spectrum import load_lines, path_fourier, path_samples, reduced_lines
 from simple_model.rhythm import ROLES
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import Body, Scene, SkinwaveWarning, dumps, loads
-from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
 from skinwave.scene import BASES
 from skinwave.simulation import MODELS, compute, simulate
@@ -293,8 +293,8 @@ def test_a_body_turned_by_half_a_turn_answers_a_circle_the_same(tacton, kind, di
     body = Body(kind=kind, width=0.03, height=0.03, depth=0.006, sides="clamped")
     probes = turned(distance, np.array([angle, angle + np.pi]))
     prepared = prepare(body, probes, h=0.006)
-    hertz, forces = reduced_lines(load, prepared.points, prepared.load)
-    motion = fem.line_response(prepared.poles, forces, hertz)[0]
+    hertz, forces = reduced_lines(load, prepared.body.points, prepared.body.load)
+    motion = fem.line_response(prepared.body.poles, forces, hertz)[0]
     lines = np.abs(motion @ prepared.read.T)
     np.testing.assert_allclose(lines[:, 0], lines[:, 1], rtol=0, atol=2e-3 * lines.max())
 

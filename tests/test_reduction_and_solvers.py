@@ -14,11 +14,12 @@ import meshes
 import skinwave
 from fem import linear_solver, products
 from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.load_spectrum import reduced_lines
 from skinwave.fields import field
 from skinwave.models.bodies import build as build_body
 from skinwave.models.bodies import operators
 from skinwave.models.full import energy_balance
-from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.models.prepared import prepare
 from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes
 

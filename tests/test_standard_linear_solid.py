@@ -12,9 +12,10 @@ import skinwave
 from meshes import cache
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import complex_modulus, half_space, slab, thin_sheet
+from simple_model.load_spectrum import reduced_lines
 from skinwave import scene_file
 from skinwave.models.bodies import compliance
-from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.models.prepared import prepare
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.simulation import compute
 

@@ -28,7 +28,15 @@ from skinwave.planning.estimates import (
     response_spectrum,
 )
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import coarser_by, compared_with, ladder, refined
+from skinwave.planning.refinement import (
+    Convergence,
+    SizeController,
+    coarser_by,
+    compared_with,
+    convergence,
+    ladder,
+    refined,
+)
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import damping_misfit
 from skinwave.scene import Body, Layer
@@ -189,6 +197,45 @@ def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
     found = refined(scene, scene.body, 0.01)
     assert found.h == pytest.approx(2.1 * default_size(scene.body))
     assert found.error > 0.01
+    assert found.convergence is Convergence.NOT_REACHED
+
+
+def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolated_exactly():
+    controller = SizeController(order=2.0, safety=0.5, largest_factor=1.6)
+    limit = np.array([[3.0, -2.0], [4.0, 1.0]])
+
+    def found(h):  # of which the change is the error itself
+        return limit * (1 + h**2)
+
+    fine, true = found(0.1), 0.1**2 / (1 + 0.1**2)
+    assert controller.error(found(0.15), fine, 1.5) == pytest.approx(true, rel=1e-12)
+    assert controller.error(found(0.05), fine, 0.5) == pytest.approx(true, rel=1e-12)
+    size = controller.size(0.1, 0.1**2, 0.08)
+    assert size**2 == pytest.approx(0.04)  # half of what is asked for is left
+    sizes = np.array([0.1, 0.08, 0.0625, 0.05])
+    assert controller.nearest(sizes, 0.1, 1e-2, 0.0124) == 0.08
+    assert controller.nearest(sizes, 0.1, 1.0, 0.01) == 0.0625  # by the largest factor at most
+
+
+@pytest.mark.parametrize(
+    ("kind", "same", "tolerance", "expected"),
+    [
+        ("slab", False, 0.5, Convergence.REACHED),
+        ("slab", False, 1e-6, Convergence.NOT_REACHED),
+        ("slab", True, 0.5, Convergence.SAME_MESH),
+    ],
+)
+def test_two_meshes_have_one_of_four_outcomes(kind, same, tolerance, expected):
+    body = loads(f"[body]\nkind = '{kind}'").body
+    found = np.ones((3, 1)), np.full((3, 1), 1.1)
+    sizes = compared_with(body, 5e-3), 5e-3
+    outcome, error = convergence(body, sizes, found, tolerance, same=same)
+    assert outcome is expected
+    assert (error == 1.0) == same
+    of_file = replace(body, kind="mesh", file="hand.msh")
+    outcome, error = convergence(of_file, sizes, found, tolerance, same=True)
+    assert outcome is Convergence.SINGLE_MESH
+    assert np.isnan(error)
 
 
 @pytest.mark.parametrize("h", [0.0075, 0.0062, 0.0049])

@@ -1,4 +1,4 @@
-"""Reduced body (offline stage), and its response to any Tacton (online stage)."""
+"""Reduced body of probes, cached, and its response to any Tacton."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -8,20 +8,28 @@ import numpy as np
 import fem
 from meshes import cache
 from meshes.tetmesh import Floats
-from simple_model import Effort, MovingPressure, Response
-from simple_model.focus import spot_reach, spot_width
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
+from simple_model import Effort, Response
+from simple_model.focus import spot_width
 from simple_model.sampling import shown
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
-from skinwave.models.bodies import Build, air, default_size, surface_load, surface_motion
-from skinwave.models.full import assembled, energy_balance, meshed
+from skinwave.models.bodies import Build, default_size, surface_load, surface_motion
+from skinwave.models.full import assembled, meshed
+from skinwave.models.reduction import (
+    BAND,
+    ReducedBody,
+    from_rest,
+    read_at,
+    reduce_body,
+    respond,
+    select_lines,
+)
 from skinwave.scene import SAMPLE_RATE, Body, Scene
 
-BAND = 1000.0  # Hz up to which the reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
 FORMAT = 2  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
-ARRAYS = ("damping", "radiation", "relaxing", "relaxation_times", "read", "load", "points")
+ARRAYS = ("damping", "radiation", "load", "points")
+OTHERS = ("relaxing", "relaxation_times", "read")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
 
 
@@ -37,30 +45,18 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
-    """Reduced body: the model of its probes' response to any Tacton.
-
-    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
-    `radiation` (r, r) in it, and `relaxing` stiffness (j, r, r) with its `relaxation_times` (j,);
-    `read` (p, r): displacement of the probes; `load` (k, r): reduced forces of unit pressure at
-    the surface points (k, 3).
+    """Reduced body of probes (p, 2) in metre, whose displacement is `read` (p, r) of its
+    coordinates, in metre.
     """
 
     probes: Floats
-    poles: fem.Poles
-    damping: Floats
-    radiation: Floats
-    relaxing: Floats
-    relaxation_times: Floats
     read: Floats
-    load: Floats
-    points: Floats
-    effort: Effort
+    body: ReducedBody
 
     @property
-    def branches(self) -> tuple[fem.MaxwellBranch, ...]:
-        """Generalised Maxwell branches of the reduced model."""
-        both = zip(self.relaxing, self.relaxation_times.tolist(), strict=True)
-        return tuple(fem.MaxwellBranch(K=K, time=time) for K, time in both)
+    def effort(self) -> Effort:
+        """Cost of the offline stage."""
+        return self.body.effort
 
 
 def prepare(
@@ -106,15 +102,15 @@ def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance
 
 def _from_cache(entry: dict[str, Any], h: float, probes: Floats, clock: Clock) -> Prepared | None:
     """The reduced body of an entry; None if its arrays do not fit each other."""
-    if not {*POLES, *ARRAYS} <= set(entry):
+    if not {*POLES, *ARRAYS, *OTHERS} <= set(entry):
         return None
     modes, unknowns = len(entry["values"]), entry["read"].shape[-1]
-    surface, branches = len(entry["points"]), len(entry["relaxation_times"])
+    surface, terms = len(entry["points"]), len(entry["relaxation_times"])
     square = (unknowns, unknowns)
     expected = {
         "values": (modes,), "inputs": (modes, unknowns), "outputs": (unknowns, modes),
-        "damping": square, "radiation": square, "relaxing": (branches, *square),
-        "relaxation_times": (branches,),
+        "damping": square, "radiation": square, "relaxing": (terms, *square),
+        "relaxation_times": (terms,),
         "read": (len(probes), unknowns), "load": (surface, unknowns), "points": (surface, 3),
     }  # fmt: skip
     if any(entry[field].shape != shape for field, shape in expected.items()):
@@ -124,12 +120,14 @@ def _from_cache(entry: dict[str, Any], h: float, probes: Floats, clock: Clock) -
         effort = Effort(**{**entry["meta"], "h": h})
     except TypeError:  # that of another version
         return None
-    return Prepared(
-        probes=probes,
+    branches = zip(entry["relaxing"], entry["relaxation_times"].tolist(), strict=True)
+    reduced = ReducedBody(
         poles=fem.Poles(**{name: entry[name] for name in POLES}),
         effort=replace(effort, seconds=clock.seconds, peak_memory=peak_memory()),
+        branches=tuple(fem.MaxwellBranch(K=K, time=time) for K, time in branches),
         **{name: entry[name] for name in ARRAYS},
     )
+    return Prepared(probes=probes, read=entry["read"], body=reduced)
 
 
 def _prepared_anew(
@@ -147,37 +145,28 @@ def _prepared_anew(
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         P, points = surface_load(build)
-        model = fem.reduce(
-            operators,
-            surface_motion(body, build, _mirrored(probes, build.symmetry)),
-            BAND,
-            tolerance,
-            loads=P @ typical_spots(body, points),
-            added=air(body, build, operators),
-            solver=solver,
-            progress=lambda fraction: report("reduce", fraction),
-        )
-    with clock("diagonalise"):
-        poles = fem.poles(model, outputs=np.eye(len(model.K)))
-        arrays = {
-            "damping": model.C, "radiation": model.R, "read": model.outputs,
-            "relaxing": np.array([b.K for b in model.branches]).reshape(-1, *model.K.shape),
-            "relaxation_times": np.array([b.time for b in model.branches]),
-            "load": P.T @ model.basis, "points": points,
-        }  # fmt: skip
-    effort = Effort(
-        seconds=clock.seconds,
-        dofs=len(operators.free),
-        reduced_dofs=len(model.K),
-        peak_memory=peak_memory(),
-        h=h,
+        outputs = surface_motion(body, build, _mirrored(probes, build.symmetry))
+        reduced, model = reduce_body(
+            body, build, operators, outputs, tolerance, surface=(P, points),
+            loads=P @ typical_spots(body, points), solver=solver, report=report,
+        )  # fmt: skip
+    effort = spent(reduced.effort, clock, build, h)
+    arrays = {
+        "read": model.outputs,
+        "relaxing": np.array([b.K for b in model.branches]).reshape(-1, *model.K.shape),
+        "relaxation_times": np.array([b.time for b in model.branches]),
+        **{name: getattr(reduced, name) for name in ARRAYS},
+    }
+    cache.store(name, asdict(effort), **asdict(reduced.poles), **arrays)
+    return Prepared(probes=probes, read=model.outputs, body=replace(reduced, effort=effort))
+
+
+def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
+    """Cost of an offline stage with its time, memory and mesh, of elements of h in metre."""
+    return replace(
+        effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
         mesh=cache.digest(build.mesh.points, build.mesh.tets),
-        solver=model.solver,
-        estimate=model.estimate,
-        versions=versions(),
-    )
-    cache.store(name, asdict(effort), **asdict(poles), **arrays)
-    return Prepared(probes=probes, poles=poles, effort=effort, **arrays)
+    )  # fmt: skip
 
 
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
@@ -196,24 +185,18 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
     if progress:
         progress("lines", 0.0)
     with clock("lines"):
-        frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
-        motion, start = fem.line_response(prepared.poles, forces, frequencies)
-        damping = prepared.damping, prepared.radiation
-        power = fem.mean_power(*damping, forces, motion, frequencies, prepared.branches)
-        imbalance, radiated = energy_balance(power)
-        lines, start = motion @ prepared.read.T, start @ prepared.read.T
+        motion = read_at(respond(prepared.body, scene.pressure), prepared.read)
         # Lines are not weighed against the mean: that of an unconstrained body has no bound.
-        strength, mean = np.abs(lines).max(axis=1), frequencies == 0
+        strength, mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
-        heard &= shown(scene.pressure, frequencies, times)
-        rates = np.concatenate([2j * np.pi * frequencies[heard], prepared.poles.values])
-        displacement = fem.exponential_sum(rates, np.vstack([lines[heard], start]), times)
+        heard &= shown(scene.pressure, motion.frequencies, times)
+        displacement = from_rest(select_lines(motion, heard), times)
     effort = replace(
         prepared.effort,
         seconds={**prepared.effort.seconds, **clock.seconds},
         steps=int(heard.sum()),
-        energy_imbalance=imbalance,
-        radiated=radiated,
+        energy_imbalance=motion.imbalance,
+        radiated=motion.radiated,
         peak_memory=peak_memory(),
     )
     return Response(
@@ -223,21 +206,6 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         displacement=displacement,
         effort=effort,
     )
-
-
-def reduced_lines(
-    pressure: MovingPressure, points: Floats, load: Floats
-) -> tuple[Floats, fem.Complex]:
-    """Reduced load spectrum: frequencies (f,) in Hz of its lines, and their forces (f, r)."""
-    lines = load_lines(pressure)
-    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.focus)
-    forces = []
-    for part in np.array_split(knots, len(knots) // 64 + 1):
-        low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
-        near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
-        forces.append(pressure.spot(points[near], part) @ load[near])
-    weighted = np.vstack(forces) * path_weights(pressure)[:, None]
-    return lines.gather(path_fourier(weighted.T).T)
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:

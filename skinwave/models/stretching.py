@@ -20,12 +20,17 @@ from fem import nonlinear
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
+from simple_model.load_spectrum import (
+    load_lines,
+    path_fourier,
+    path_samples,
+    path_weights,
+    reduced_lines,
+)
 from simple_model.sampling import resolving_step
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models.bodies import Build, air, build, surface_load, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
-from skinwave.models.prepared import reduced_lines
 from skinwave.models.speeds import bending_wavenumber
 from skinwave.scene import Body, Scene
 

@@ -19,6 +19,7 @@ from simple_model import Effort, MovingPressure, sensation_level
 from simple_model.load_spectrum import load_lines, merge_lines, path_fourier, path_samples
 from simple_model.response import UNITS
 from skinwave.fitting import effort_of, fitting
+from skinwave.models.reduction import oscillating
 from skinwave.models.speeds import repeated, shown_part, strongest_tone, surface_speed
 from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
 from skinwave.run import is_skin
@@ -110,10 +111,10 @@ class View:
 
 def fastest_line(moved: Waves) -> float:
     """The highest line in Hz that moves a body by `STRONG` of what its strongest one does."""
-    moving = moved.frequencies > 0
-    lines = moved.lines[moving]
+    moving = oscillating(moved.motion)
+    lines = moving.lines
     power = np.einsum("fm,mn,fn->f", lines.conj(), moved.basis.T @ moved.basis, lines).real
-    return _fastest(moved.frequencies[moving], power)
+    return _fastest(moving.frequencies, power)
 
 
 def _fastest(frequencies: Floats, power: Floats) -> float:

@@ -16,12 +16,7 @@ from simple_model import Response
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import (
-    coarser_by,
-    compared_with,
-    quantity_of_interest,
-    richardson_error,
-)
+from skinwave.planning.refinement import compared_with, convergence, quantity_of_interest
 from skinwave.planning.warnings import beyond_linear, of_elements
 from skinwave.scene import Body, Scene
 
@@ -66,11 +61,9 @@ def told(
     """
     body, size = scene.body, h or default_size(scene.body)
     other, coarse = compared or coarser_body(scene, h, tolerance, solver)
-    if coarse.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
-        error = np.nan if body.kind == "mesh" else 1.0
-    else:
-        found = quantity_of_interest(coarse, scene, answer(coarse, scene))
-        error = richardson_error(found, fine, coarser_by(body, other, size))
+    same = coarse.effort.dofs == response.effort.dofs
+    found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
+    _, error = convergence(body, (other, size), (found, fine), tolerance, same=same)
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)

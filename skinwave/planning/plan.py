@@ -8,7 +8,8 @@ from simple_model.sampling import resolving_step
 from skinwave.effort import Progress
 from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
-from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
+from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
+from skinwave.models.reduction import BAND
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
 from skinwave.planning.estimates import (
     cutoff_frequency,
@@ -17,7 +18,7 @@ from skinwave.planning.estimates import (
     response_spectrum,
 )
 from skinwave.planning.extent import Row, extent, left_out, symmetry
-from skinwave.planning.refinement import Refined, refined
+from skinwave.planning.refinement import Convergence, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import of_elements, over_tolerance
 from skinwave.scene import FLAT, Body, Scene
@@ -221,7 +222,7 @@ def _element_rows(
             reason=f"{_why_size(found, tolerance, h)}: those of "
             f"{1e3 * found.compared:.2f} mm differ by so much that an error of "
             f"{100 * found.error:.2g} % is left"
-            if np.isfinite(found.error)
+            if found.convergence is not Convergence.SINGLE_MESH
             else "the file's own, without another to compare it with",
         ),
         Row(
@@ -241,7 +242,7 @@ def _element_rows(
 def _why_size(found: Refined, tolerance: float, h: float | None) -> str:
     if h:
         return "as asked"
-    if found.error > tolerance:
+    if found.convergence is not Convergence.REACHED:
         return "the finest that is tried"
     return f"refined until less than {100 * tolerance:g} % is left"
 

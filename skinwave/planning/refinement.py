@@ -2,18 +2,18 @@
 
 Near a resonance a mesh that is a little too stiff changes the waveform by many times as much as
 elsewhere, and soft or thin bodies need more elements than stiff ones. The error of each mesh in a
-sequence is extrapolated from its change to the one before, at the order of convergence of all of
-them. All axes are refined alike: a slab has few layers of cells, and one more changes as much as
-all that is between.
+sequence is extrapolated from its change to the one before, and a controller chooses the next size.
+All axes are refined alike: a slab has few layers of cells, and one more changes as much as all that
+is between.
 """
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import fem
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.effort import Progress
@@ -26,24 +26,75 @@ from skinwave.models.bodies import (
     coarsest_size,
     default_size,
 )
-from skinwave.models.prepared import Prepared, answer, prepare, reduced_lines, reduction_tolerance
+from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.models.reduction import oscillating, read_at, respond
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands
-ORDER = 2.25  # of convergence of a waveform in the element size; measured 1.9 to 3.5
-SAFETY = 0.6  # of the tolerance: safety factor, so that one more mesh is enough
-LARGEST_FACTOR = 1.6  # between two sizes at most: coarse meshes overestimate their errors
 FINEST = 0.4  # of the default element size: the finest that is tried
+
+
+@dataclass(frozen=True, kw_only=True)
+class SizeController:
+    """Controller of the element size h by Richardson extrapolation of an error ~ h^order.
+
+    The error of a mesh is its relative change from one with elements r times as large, over
+    r^order - 1; the next size is h (safety tolerance / error)^(1/order). Roache, Annu Rev Fluid
+    Mech 29:123 (1997); ASME V&V 20 (2009), section 2.
+
+    `order` of convergence of a waveform, measured 1.9 to 3.5; `safety` factor on the tolerance, so
+    that one more mesh is enough; `largest_factor` between two sizes, because coarse meshes
+    overestimate their errors.
+    """
+
+    order: float = 2.25
+    safety: float = 0.6
+    largest_factor: float = 1.6
+
+    def error(self, other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
+        """Relative error of a quantity of interest (k, p) by that of another mesh with elements
+        `ratio` times as large.
+        """
+        size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
+        change = np.linalg.norm(found - other, axis=0)
+        return float((change / size).max() / abs(ratio**self.order - 1))
+
+    def size(self, h: float, error: float, tolerance: float) -> float:
+        """Element size in metre that meets a tolerance, by the error with h."""
+        return h * (self.safety * tolerance / error) ** (1 / self.order)
+
+    def nearest(self, sizes: Floats, h: float, error: float, tolerance: float) -> float:
+        """Next of a sequence of sizes in metre after h."""
+        wanted = max(self.size(h, error, tolerance), h / self.largest_factor)
+        return float(sizes[np.abs(np.log(sizes / wanted)).argmin()])
+
+
+CONTROLLER = SizeController()
+
+
+class Convergence(Enum):
+    """Outcome of the comparison of two element sizes."""
+
+    REACHED = "the error is within the tolerance"
+    NOT_REACHED = "the error is above the tolerance"
+    SAME_MESH = "both sizes are beyond the body's own, and make one mesh"
+    SINGLE_MESH = "a file has one mesh, which both sizes take"
+
+
+# Relative errors where there is none to extrapolate.
+UNESTIMATED = {Convergence.SAME_MESH: 1.0, Convergence.SINGLE_MESH: np.nan}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Refined mesh: element size `h` in metre, the expected relative `error` with it, the size in
-    metre that it was `compared` with, and the reduced body, `prepared` with it.
+    """Refined mesh: element size `h` in metre, the `convergence` and the expected relative `error`
+    with it, the size in metre that it was `compared` with, and the reduced body, `prepared` with
+    it.
     """
 
     h: float
+    convergence: Convergence
     error: float
     compared: float
     prepared: Prepared
@@ -84,16 +135,15 @@ def refined(
     coarse, other = answered(before)
     while True:
         prepared, found = answered(size)
-        if coarse.effort.dofs == prepared.effort.dofs:  # two sizes beyond the body's own: one mesh
-            error = 1.0 if scene.body.kind != "mesh" else np.nan  # or one in the file
-        else:
-            error = richardson_error(other, found, coarser_by(body, before, size))
-        if h or not error > tolerance or size == sizes[-1]:  # no number if a file has one mesh
-            return Refined(h=size, error=error, compared=before, prepared=prepared)
-        wanted = size * (SAFETY * tolerance / error) ** (1 / ORDER)
+        same = coarse.effort.dofs == prepared.effort.dofs
+        outcome, error = convergence(body, (before, size), (other, found), tolerance, same=same)
+        refinable = outcome in (Convergence.NOT_REACHED, Convergence.SAME_MESH)
+        if h or not refinable or size == sizes[-1]:
+            return Refined(
+                h=size, convergence=outcome, error=error, compared=before, prepared=prepared
+            )
         before, coarse, other = size, prepared, found
-        finer = _finer(sizes, size)
-        size = finer[abs(np.log(finer / max(wanted, size / LARGEST_FACTOR))).argmin()]
+        size = CONTROLLER.nearest(_finer(sizes, size), size, error, tolerance)
 
 
 def ladder(body: Body) -> Floats:
@@ -153,23 +203,31 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
     """
     if scene.body.is_held:
         return found.displacement
-    frequencies, forces = reduced_lines(scene.pressure, prepared.points, prepared.load)
-    lines, _ = fem.line_response(prepared.poles, forces, frequencies)
-    return lines[frequencies > 0] @ prepared.read.T
+    motion = oscillating(respond(prepared.body, scene.pressure))
+    return read_at(motion, prepared.read).lines
 
 
-def richardson_error(other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
-    """Richardson estimate of the relative error of a quantity of interest (k, p) by that of another
-    mesh with elements `ratio` times as large.
+def convergence(
+    body: Body,
+    sizes: tuple[float, float],
+    found: tuple[NDArray[Any], NDArray[Any]],
+    tolerance: float,
+    *,
+    same: bool,
+) -> tuple[Convergence, float]:
+    """Outcome and relative error of the second of two element sizes in metre, by the quantities of
+    interest (k, p) that were found with both; or they make the `same` mesh.
     """
-    size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
-    change = np.linalg.norm(found - other, axis=0)
-    return float((change / size).max() / abs(ratio**ORDER - 1))
+    if same:
+        outcome = Convergence.SINGLE_MESH if body.kind == "mesh" else Convergence.SAME_MESH
+        return outcome, UNESTIMATED[outcome]
+    error = CONTROLLER.error(*found, coarser_by(body, *sizes))
+    return Convergence.NOT_REACHED if error > tolerance else Convergence.REACHED, error
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
     """Element size in metre that meets a tolerance, by the error with h; a slab's cells are at most
     as high as its depth.
     """
-    aim, size = SAFETY * tolerance, min(h, body.depth if body.kind == "slab" else h)
-    return size * (aim / max(aim, error)) ** (1 / ORDER)
+    size = min(h, body.depth if body.kind == "slab" else h)
+    return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

@@ -11,8 +11,9 @@ import numpy as np
 
 import fem
 from meshes.tetmesh import Floats
+from simple_model.load_spectrum import reduced_lines
 from skinwave.models.bodies import coarsest_size, default_size
-from skinwave.models.prepared import prepare, reduced_lines
+from skinwave.models.prepared import prepare
 from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene
 
@@ -38,14 +39,14 @@ def sensitivity(scene: Scene) -> Sensitivity:
     """Sensitivity from two responses of a coarse reduced model, seconds once per body."""
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
     coarse = prepare(scene.body, scene.probe_points, h=h)
-    values = coarse.poles.values * (1 - DETUNING)
-    frequencies, forces = reduced_lines(scene.pressure, coarse.points, coarse.load)
+    values = coarse.body.poles.values * (1 - DETUNING)
+    frequencies, forces = reduced_lines(scene.pressure, coarse.body.points, coarse.body.load)
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE
 
     def parts(moved: float) -> tuple[Floats, Floats]:
         """Steady state and transient (t, p) where all natural frequencies are higher by so much."""
         higher = np.asarray(values * (1 + moved), np.complex128)
-        poles = replace(coarse.poles, values=higher)
+        poles = replace(coarse.body.poles, values=higher)
         lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
         return (
             fem.exponential_sum(np.asarray(2j * np.pi * frequencies), lines, times),

@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 
 import fem
 from meshes.tetmesh import Floats, Ints, TetMesh
-from simple_model import Effort, MovingPressure, Response, sensation_level
+from simple_model import MovingPressure, Response, sensation_level
 from simple_model.load_spectrum import (
     foci_harmonics,
     harmonics,
@@ -32,15 +32,22 @@ from simple_model.load_spectrum import (
 from simple_model.response import step
 from skinwave.effort import Progress
 from skinwave.models.bodies import (
-    air,
     build,
     default_size,
     has_exact_waves,
     operators,
     surface_load,
 )
-from skinwave.models.full import energy_balance
-from skinwave.models.prepared import reduced_lines, sample_times
+from skinwave.models.prepared import sample_times
+from skinwave.models.reduction import (
+    BAND,
+    ReducedBody,
+    from_rest,
+    read_at,
+    reduce_body,
+    respond,
+    select_lines,
+)
 from skinwave.planning.assessment import sentences
 from skinwave.run import is_skin
 from skinwave.scene import Body, Scene
@@ -65,7 +72,6 @@ MAPPED = 60  # lines that a map is made of, the strongest
 TOLERANCE = 0.02  # of a reduction
 MANY = 264  # knots, of which every second spans the same pressures
 NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
-BAND = 1000.0  # Hz
 # Metre. Coarser than in `compare`: an error of some per cent, for a response within seconds.
 SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
 # As in `skinwave.steps`; a body that is cached begins with the third.
@@ -75,23 +81,18 @@ KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reduced:
-    """A body reduced to the pressure along one path: reduced forces `load` (k, r) of the surface
-    `points` (k, 3), displacement `read` (q, r) of the places `within` (SIDE^2,) the area, and
-    displacement `rows` (n, 3, r) of the `nodes` (n,) of its mesh that are seen as `shape`.
+    """A body reduced to the pressure along one path: displacement `read` (q, r) of the places
+    `within` (SIDE^2,) the area, and displacement `rows` (n, 3, r) of the `nodes` (n,) of its mesh
+    that are seen as `shape`.
     """
 
-    poles: fem.Poles
-    damping: tuple[Floats, Floats]
-    branches: tuple[fem.MaxwellBranch, ...]
-    load: Floats
-    points: Floats
+    body: ReducedBody
     read: Floats
     within: NDArray[np.bool_]
     mesh: TetMesh
     shape: Shape
     nodes: Ints
     rows: NDArray[np.float32]
-    effort: Effort
 
 
 class Waves:
@@ -120,7 +121,7 @@ class Waves:
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
         made, ops = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
-        return reduced(made, ops, scene.body, scene.pressure, progress)
+        return reduced_to_path(made, ops, scene.body, scene.pressure, progress)
 
     def _keep(self, kind: str, key: Any, make: Callable[[], Any]) -> Any:
         kept = self._kept[kind]
@@ -248,7 +249,7 @@ def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     return made, operators(made)
 
 
-def reduced(
+def reduced_to_path(
     made: Any, ops: Any, body: Body, pressure: MovingPressure, progress: Progress
 ) -> Reduced:
     """A meshed and assembled body, reduced to a pressure's path."""
@@ -259,26 +260,18 @@ def reduced(
     near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
     # As columns: taken out of coordinates they take longer than the factorisation.
     P, points, spots = P.tocsc()[:, near], points[near], spots[:, near]
-    seeds = fem.load_subspace(P @ spots.T, TOLERANCE / 5)
-    model = fem.reduce(
-        ops, sparse.csr_array(seeds.T), BAND, TOLERANCE, added=air(body, made, ops),
-        progress=lambda done: progress("reduce", done),
-    )  # fmt: skip
+    subspace = sparse.csr_array(fem.load_subspace(P @ spots.T, TOLERANCE / 5).T)
+    reduced, model = reduce_body(
+        body, made, ops, subspace, TOLERANCE, surface=(P, points), report=progress
+    )
     progress("read the surface", 1.0)
     inwards = (1 - 1e-6) * places()  # a body may end where the area does
     within = fem.on_surface(made.mesh, inwards)
     read = fem.probe_operator(made.mesh, inwards[within]) @ model.basis
     shape, nodes = skin_of(made, body)
     return Reduced(
-        poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=(model.C, model.R),
-        branches=model.branches,
-        load=P.T @ model.basis, points=points, read=read, within=within, mesh=made.mesh,
-        shape=shape, nodes=nodes,
+        body=reduced, read=read, within=within, mesh=made.mesh, shape=shape, nodes=nodes,
         rows=model.basis.reshape(-1, 3, len(model.K))[nodes].astype(np.float32),
-        effort=Effort(
-            dofs=len(ops.free), reduced_dofs=len(model.K), solver=model.solver,
-            estimate=model.estimate,
-        ),
     )  # fmt: skip
 
 
@@ -291,25 +284,19 @@ def _probe(body: Reduced, at: Floats) -> Floats:
 
 def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
     """Motion from rest of a scene's probe, and RMS motion of the area."""
-    times = sample_times(scene)
-    frequencies, forces = reduced_lines(scene.pressure, body.points, body.load)
-    motion, start = fem.line_response(body.poles, forces, frequencies)
-    energy_balance(fem.mean_power(*body.damping, forces, motion, frequencies, body.branches))
-    probe = _probe(body, scene.probe_points)
-    rates = np.concatenate([2j * np.pi * frequencies, body.poles.values])
-    displacement = fem.exponential_sum(rates, np.vstack([motion @ probe.T, start @ probe.T]), times)
+    times, motion = sample_times(scene), respond(body.body, scene.pressure)
     response = Response(
-        model="fem", times=times, probes=scene.probe_points, displacement=displacement,
-        effort=body.effort,
+        model="fem", times=times, probes=scene.probe_points, effort=body.body.effort,
+        displacement=from_rest(read_at(motion, _probe(body, scene.probe_points)), times),
     )  # fmt: skip
     if scene.tacton.rhythm:
-        frequencies, forces = reduced_lines(_steady(scene.pressure), body.points, body.load)
-        motion, _ = fem.line_response(body.poles, forces, frequencies)
-    heard = (frequencies > 1e-6) & (frequencies <= BAND)
-    area = np.full((int(heard.sum()), SIDE**2), np.nan, np.complex128)
-    area[:, body.within] = motion[heard] @ body.read.T
+        motion = respond(body.body, _steady(scene.pressure))
+    f = motion.frequencies
+    heard = select_lines(motion, (f > 1e-6) & (f <= BAND))
+    area = np.full((len(heard.lines), SIDE**2), np.nan, np.complex128)
+    area[:, body.within] = heard.lines @ body.read.T
     seen = None
     if moving:
-        upwards = motion[heard] @ body.rows[:, 2].T
-        seen = moving_of(body.shape, scene.pressure, frequencies[heard], upwards)
-    return answer_of(scene, response, motion_map(scene, frequencies[heard], area), seen)
+        upwards = heard.lines @ body.rows[:, 2].T
+        seen = moving_of(body.shape, scene.pressure, heard.frequencies, upwards)
+    return answer_of(scene, response, motion_map(scene, heard.frequencies, area), seen)

@@ -1,0 +1,141 @@
+"""Reduce and respond: the offline and the online stage of every body that is reduced.
+
+    reduce_body: body, outputs, surface load -> ReducedBody
+    respond:     ReducedBody, moving pressure -> ReducedResponse
+
+    u(t) = Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)
+
+A body is reduced to its probes, for a few waveforms of any load; or to the subspace of one path's
+load, for the motion of all of it.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+import fem
+from meshes.tetmesh import Floats
+from simple_model import Effort, MovingPressure
+from simple_model.load_spectrum import reduced_lines
+from skinwave.effort import Progress, silent
+from skinwave.models.bodies import Build, air
+from skinwave.models.full import energy_balance
+from skinwave.scene import Body
+
+BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedBody:
+    """Reduced body and the load on its surface.
+
+    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
+    `radiation` (r, r) in it and its Maxwell `branches` of (r, r); `load` (k, r): reduced forces of
+    unit pressure at the surface points (k, 3) in metre.
+    """
+
+    poles: fem.Poles
+    damping: Floats
+    radiation: Floats
+    branches: tuple[fem.MaxwellBranch, ...]
+    load: Floats
+    points: Floats
+    effort: Effort
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedResponse:
+    """Response from rest, in reduced coordinates or, in metre, at outputs of them.
+
+    Steady state: complex `lines` (f, q) at `frequencies` (f,) in Hz; free vibration of the start:
+    complex `start` (m, q) at `poles` (m,) in 1/s. The relative error of the energy balance is
+    `imbalance`, and `radiated` the share of the losses that absorbing boundaries took.
+    """
+
+    frequencies: Floats
+    lines: fem.Complex
+    poles: fem.Complex
+    start: fem.Complex
+    imbalance: float
+    radiated: float
+
+
+def reduce_body(
+    body: Body,
+    build: Build,
+    operators: fem.Operators,
+    outputs: sparse.csr_array,
+    tolerance: float,
+    *,
+    surface: tuple[sparse.csr_array, Floats],
+    loads: Floats | None = None,
+    solver: str = "auto",
+    report: Progress = silent,
+) -> tuple[ReducedBody, fem.ReducedModel]:
+    """Reduced body, and its model with the basis (offline stage).
+
+    Parameters
+    ----------
+    outputs : (p, 3 n) sparse, as `fem.reduce` takes them
+    surface : load operator (3 n, k) and points (k, 3), of `bodies.surface_load` or a part of them
+    loads : (3 n, j), as `fem.reduce` takes them
+    """
+    P, points = surface
+    model = fem.reduce(
+        operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators),
+        solver=solver, progress=partial(report, "reduce"),
+    )  # fmt: skip
+    reduced = ReducedBody(
+        poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=model.C, radiation=model.R,
+        branches=model.branches, load=P.T @ model.basis, points=points,
+        effort=Effort(
+            dofs=len(operators.free), reduced_dofs=len(model.K), solver=model.solver,
+            estimate=model.estimate,
+        ),
+    )  # fmt: skip
+    return reduced, model
+
+
+def respond(reduced: ReducedBody, pressure: MovingPressure) -> ReducedResponse:
+    """Response of a reduced body to a moving pressure, in its coordinates (online stage).
+
+    Raises
+    ------
+    Diverged
+        If its energy balance is violated.
+    """
+    frequencies, forces = reduced_lines(pressure, reduced.points, reduced.load)
+    lines, start = fem.line_response(reduced.poles, forces, frequencies)
+    damping = reduced.damping, reduced.radiation
+    power = fem.mean_power(*damping, forces, lines, frequencies, reduced.branches)
+    imbalance, radiated = energy_balance(power)
+    return ReducedResponse(
+        frequencies=frequencies, lines=lines, poles=reduced.poles.values, start=start,
+        imbalance=imbalance, radiated=radiated,
+    )  # fmt: skip
+
+
+def read_at(motion: ReducedResponse, outputs: Floats) -> ReducedResponse:
+    """Response at outputs (p, r) of the reduced coordinates."""
+    return replace(motion, lines=motion.lines @ outputs.T, start=motion.start @ outputs.T)
+
+
+def select_lines(motion: ReducedResponse, chosen: NDArray[np.bool_]) -> ReducedResponse:
+    """Response with some of the lines alone, those (f,) that are chosen."""
+    return replace(motion, frequencies=motion.frequencies[chosen], lines=motion.lines[chosen])
+
+
+def oscillating(motion: ReducedResponse) -> ReducedResponse:
+    """Response without the mean."""
+    return select_lines(motion, motion.frequencies > 0)
+
+
+def from_rest(motion: ReducedResponse, times: Floats) -> Floats:
+    """Displacement or coordinates (t, q) after a start from rest at equally spaced times (t,) in s
+    from 0.
+    """
+    rates = np.concatenate([2j * np.pi * motion.frequencies, motion.poles])
+    return fem.exponential_sum(rates, np.vstack([motion.lines, motion.start]), times)
