@@ -1,9 +1,14 @@
-"""Subprocesses with limits of time and memory, for work that may crash or never end."""
+"""Programs in a process of their own, with limits of time and memory, for work that may crash,
+never end or change its process: readers of files, the mesher, what draws.
+
+`skinwave.processes` calls Python functions in processes.
+"""
 
 import math
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from meshes.reading import on_disk
@@ -42,17 +47,23 @@ def run(
     folder: str | os.PathLike[str],
     timeout: float,
     memory: float = math.inf,
-) -> None:
-    """Run a script in a folder; it ends with this process, however that ends.
+    environment: Mapping[str, str] | None = None,
+) -> str:
+    """Run a script in a folder; what it printed. It ends with this process, however that ends,
+    imports nothing from the folder, and finds these packages.
+
+    Parameters
+    ----------
+    timeout : float, second.
+    memory : float, byte, where the platform knows such limits.
+    environment : variables that it has beside those of this process.
 
     Raises
     ------
     MeshError
         If it fails; with the last line that it wrote.
     TimeoutError
-        If it takes longer than `timeout` in second.
-
-    Where the platform knows such limits, it gets no more than `memory` in bytes.
+        If it takes longer than `timeout`.
     """
     watcher = str(Path(__file__).with_name("watched.py"))
     limit = str(int(memory)) if math.isfinite(memory) else "0"
@@ -62,6 +73,7 @@ def run(
         ended = subprocess.run(
             command, cwd=folder, timeout=timeout, capture_output=True, text=True,
             errors="replace", check=False, stdin=watched,
+            env={**os.environ, **(environment or {})},
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise TimeoutError(f"{script.name} was stopped after {timeout:g} s") from None
@@ -73,3 +85,4 @@ def run(
     if ended.returncode != 0:
         said = ended.stderr.strip().splitlines()[-1:] or ["it said nothing"]
         raise MeshError(f"it ended with code {ended.returncode}, {said[0][:200]}")
+    return ended.stdout

@@ -20,6 +20,8 @@ def main() -> None:
     _end_with_parent()
     _limit_memory(int(sys.argv[1]))
     sys.argv = sys.argv[2:]
+    if (home := os.path.dirname(os.path.dirname(os.path.abspath(__file__)))) not in sys.path:
+        sys.path.insert(0, home)  # where these packages are, wherever it was started from
     runpy.run_path(sys.argv[0], run_name="__main__")
 
 

@@ -2,22 +2,13 @@
 
 import os
 import platform
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import parent_process
-from typing import ParamSpec, TypeVar
 
-from skinwave.processes import PATIENCE, end, pool
-
-P = ParamSpec("P")
-T = TypeVar("T")
 SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 Progress = Callable[[str, float], None]  # phase and fraction of it done
@@ -51,19 +42,6 @@ def peak_memory() -> int:
     return int(peak if sys.platform == "darwin" else 1024 * peak)
 
 
-def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """Call a function in a new process, whose memory and caches begin empty."""
-    with pool(1, as_part) as other:
-        return other.submit(function, *args, **kwargs).result()
-
-
-@contextmanager
-def helper() -> Iterator[Executor]:
-    """A process beside this one, on one thread; what it has not done when this ends is given up."""
-    with pool(1, as_worker) as other:
-        yield other
-
-
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Linear algebra on one thread: in small products several wait for each other."""
@@ -71,31 +49,6 @@ def one_thread() -> Iterator[None]:
 
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         yield
-
-
-def as_worker() -> None:
-    """Begin a process as a part of its parent, on one thread."""
-    for name in THREADS:
-        os.environ.setdefault(name, "1")
-    as_part()
-
-
-def as_part() -> None:
-    """Begin a process: interrupts are the parent's, it does not outlive that, and removes what it
-    made aside when it is ended.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, end)
-
-    def watch() -> None:
-        parent = parent_process()
-        if parent is not None:
-            parent.join()
-            os.kill(os.getpid(), signal.SIGTERM)
-            time.sleep(PATIENCE)
-            os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def versions() -> dict[str, str]:

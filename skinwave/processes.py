@@ -1,4 +1,10 @@
-"""Processes that this one starts: none imports from the working folder, none outlives it.
+"""Python functions in processes of their own: none imports from the working folder, none outlives
+the process that started it.
+
+`apart` calls one function, `helper` and `pool` many; `meshes.subprocess_call` runs programs. Three
+more have processes that are none of these, with what they share here: a page's process serves
+pages until it is told to end (`web.processes`), the one that computes for it sends its progress and
+is ended in the middle of it (`web.worker`), and `rerun` has a command go on in the terminal.
 
 Only what Python has loaded anyway is imported here, because the command line begins with it.
 """
@@ -9,14 +15,15 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
     from multiprocessing.process import BaseProcess
 
+P = ParamSpec("P")
 T = TypeVar("T")
 SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # imports nothing from the working folder
 ENDING = ("SIGTERM", "SIGHUP")
@@ -99,6 +106,19 @@ def guarded(work: Callable[..., T], *args: Any, **kwargs: Any) -> T:
         os._exit(error.code if isinstance(error.code, int) else 1)
 
 
+def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """Call a function in a new process, whose memory and caches begin empty."""
+    with pool(1, as_part) as other:
+        return other.submit(function, *args, **kwargs).result()
+
+
+@contextmanager
+def helper() -> "Iterator[Executor]":
+    """A process beside this one, on one thread; what it has not done when this ends is given up."""
+    with pool(1, as_worker) as other:
+        yield other
+
+
 @contextmanager
 def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
     """So many processes, which call `begin` first; what they have not done at the end of this is
@@ -116,7 +136,55 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
             yield executor
         finally:
             executor.shutdown(wait=False, cancel_futures=True)
-            stop(set(active_children()) - others)
+            # A daemon is none of the executor's, but may have been started meanwhile.
+            stop(child for child in set(active_children()) - others if not child.daemon)
+
+
+def as_worker() -> None:
+    """Begin a process as a part of its parent, on one thread."""
+    from skinwave.effort import THREADS
+
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
+    as_part()
+
+
+def as_part() -> None:
+    """Begin a process: interrupts are the parent's, it does not outlive that, and removes what it
+    made aside when it is ended.
+    """
+
+    def leave() -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(PATIENCE)
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, end)
+    when_parent_ends(leave)
+
+
+def when_parent_ends(call: Callable[[], object]) -> None:
+    """Call something in a thread of this process as soon as the one that started it is gone."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            call()
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def end_group(process: int) -> None:
+    """End a process by force, and all of its group if it leads one."""
+    number = getattr(signal, "SIGKILL", signal.SIGTERM)
+    for kill in (getattr(os, "killpg", os.kill), os.kill):
+        with suppress(OSError):  # no group of its own
+            kill(process, number)
+            return
 
 
 def stop(processes: "Iterable[BaseProcess]") -> None:

@@ -438,8 +438,9 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 
 
-def test_a_window_that_ends_its_process_is_found_out(monkeypatch):
-    monkeypatch.setattr("skinwave.pictures.renderer.PROBE", "import os; os.abort()")
+def test_a_window_that_ends_its_process_is_found_out(monkeypatch, tmp_path):
+    (tmp_path / "ends.py").write_text("import os; os.abort()")
+    monkeypatch.setattr("skinwave.pictures.renderer.PROBE", tmp_path / "ends.py")
     found = renderer.__wrapped__()
     assert not found.found
     assert "libegl1 libgl1-mesa-dri" in found.said

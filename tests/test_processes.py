@@ -7,6 +7,7 @@ import subprocess
 import sys
 import sysconfig
 import time
+from multiprocessing import get_context
 from pathlib import Path
 
 import corpus
@@ -14,7 +15,8 @@ import pytest
 from test_ended_anywhere import hand
 
 import skinwave
-from skinwave.processes import ended_by_signals, environment
+from meshes import subprocess_call
+from skinwave.processes import as_part, ended_by_signals, environment, pool
 
 ROOT = Path(skinwave.__file__).parents[1]
 THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich", "PIL", "dask",
@@ -135,7 +137,7 @@ def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path
         (hostile / f"{name}.py").write_text(MARK.format(str(ran)))
     (script.parent / "beside.py").write_text("def two():\n    return 2\n")
     script.write_text(
-        "from skinwave.effort import apart, helper\nimport beside\n"
+        "from skinwave.processes import apart, helper\nimport beside\n"
         "if __name__ == '__main__':\n"
         "    with helper() as aside:\n"
         "        print(apart(beside.two) + aside.submit(beside.two).result())"
@@ -153,6 +155,33 @@ def test_another_programs_working_folder_stays(tmp_path):
     words = [sys.executable, "-m", "mine"]
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     assert subprocess.check_output(words, cwd=tmp_path, env=env, text=True) == "found\n"
+
+
+def test_a_program_finds_these_packages_and_says_what_it_printed(tmp_path):
+    (tmp_path / "meshes.py").write_text("raise SystemExit(1)")
+    (tmp_path / "script.py").write_text(
+        "import meshes, os; print(meshes.__file__, os.environ['A'])"
+    )
+    said = subprocess_call.run(
+        tmp_path / "script.py", folder=tmp_path, timeout=60,
+        environment={"PYTHONPATH": "", "A": "one"},
+    )  # fmt: skip
+    assert said == f"{subprocess_call.__file__.replace('subprocess_call', '__init__')} one\n"
+
+
+def test_a_pool_ends_its_own_processes_only():
+    """A page computes a response while it has a report drawn."""
+    with pool(1, as_part) as other:
+        number = other.submit(os.getpid).result()
+        beside = get_context("spawn").Process(target=time.sleep, args=(60,), daemon=True)
+        beside.start()
+    try:
+        assert beside.is_alive()
+        with pytest.raises(ProcessLookupError):
+            os.kill(number, 0)
+    finally:
+        beside.kill()
+        beside.join()
 
 
 def test_the_environment_is_as_before(monkeypatch):
@@ -258,7 +287,7 @@ def works_at(process, what):
 
 MESHING = "import meshes; meshes.palm_mesh(meshes.Palm(), 3e-3)"
 ASIDE = (
-    "from skinwave.effort import {0}\nfrom skinwave.processes import ended_by_signals\n"
+    "from skinwave.processes import {0}, ended_by_signals\n"
     "import meshes\nif __name__ == '__main__':\n    with ended_by_signals():\n        {1}"
 )
 CALLS = {

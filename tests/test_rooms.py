@@ -1,6 +1,7 @@
 """Who may import whom, what importing costs, and what the project ships."""
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -118,6 +119,17 @@ def test_inner_rooms_import_only_what_they_may(package, graph):
             own = rooms_of(package, {module})
             may = allowed[own.pop()] if own else GROUND[package]
             assert rooms_of(package, used) - rooms_of(package, {module}) <= may, module
+
+
+def test_processes_are_started_where_it_is_told():
+    """Programs by one function, Python functions by another; for the rest see the latter."""
+    starts = r"subprocess\.(run|Popen|check_)|create_subprocess|get_context|os\.(fork|exec|sys)"
+    places = (path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+    found = {str(path.relative_to(ROOT)) for path in places if re.search(starts, path.read_text())}
+    assert found == {
+        "meshes/subprocess_call.py", "skinwave/processes.py", "skinwave/web/worker.py",
+        "skinwave/web/processes.py", "skinwave/commands/rerun.py",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("package", ["fem", "simple_model", "meshes"])

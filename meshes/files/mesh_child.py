@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from meshes import subprocess_call
+from meshes.files import mesh_files
+from meshes.tetmesh import MeshError
+
 
 def main() -> int:
     """Write the mesh in FILE to OUTPUT.npz; 1 if there is none."""
-    from meshes import subprocess_call
-    from meshes.files import mesh_files
-    from meshes.tetmesh import MeshError
-
     source, unit, target = sys.argv[1:]
     try:
         mesh = mesh_files.read_here(Path(source), mesh_files.scale_of(unit))
@@ -33,5 +33,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # where this package is
     sys.exit(main())

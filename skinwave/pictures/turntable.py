@@ -4,13 +4,12 @@ The exporter starts a server of its own, and so it runs in a process of its own.
 """
 
 import asyncio
-import os
-import subprocess
 import sys
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
+from meshes import subprocess_call
 from skinwave.pictures.maps import SIGNED
 from skinwave.pictures.render import add_marks, look, place, prepared, scale
 from skinwave.pictures.views import View, load, save
@@ -27,19 +26,14 @@ def turntable(view: View, frame: int) -> str | None:
     with tempfile.TemporaryDirectory() as folder:
         kept, page = Path(folder, "view.npz"), Path(folder, "page.html")
         save(kept, view)
-        command = [
-            sys.executable,
-            "-P",
-            "-m",
-            "skinwave.pictures.turntable",
-            str(kept),
-            str(frame),
-            str(page),
-        ]
         # An existing folder keeps the exporter from asking a network for what it does not need.
-        quiet = os.environ | {"VTK_WASM_DIR_OVERRIDE": folder}
-        done = subprocess.run(command, capture_output=True, env=quiet, timeout=PATIENCE)
-        if done.returncode != 0:
+        quiet = {"VTK_WASM_DIR_OVERRIDE": folder}
+        try:
+            subprocess_call.run(
+                Path(__file__), kept, frame, page, folder=folder, timeout=PATIENCE,
+                environment=quiet,
+            )  # fmt: skip
+        except (ValueError, TimeoutError):
             return None
         return page.read_text(encoding="utf-8").replace(ICON, "data:,")
 

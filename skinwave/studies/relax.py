@@ -17,9 +17,10 @@ import numpy as np
 
 from simple_model import Response, lines, resolved_lines
 from skinwave.comparison import compare
-from skinwave.effort import Progress, apart, peak_memory
+from skinwave.effort import Progress, peak_memory
 from skinwave.models.bodies import default_size
 from skinwave.planning.assessment import sentences
+from skinwave.processes import apart
 from skinwave.run import JUDGED
 from skinwave.scene import Scene
 from skinwave.simulation import compute

@@ -9,11 +9,12 @@ from functools import lru_cache
 from pathlib import Path
 
 from skinwave import document
-from skinwave.effort import Progress, helper, one_thread, peak_memory
+from skinwave.effort import Progress, one_thread, peak_memory
 from skinwave.files import write_lines, write_responses, write_run
 from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
+from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, with_body
 from skinwave.simulation import check_knobs, compute

@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 from simple_model import Response, lines, resolved_lines
 from skinwave import document
 from skinwave.comparison import compare
-from skinwave.effort import Progress, apart, peak_memory
+from skinwave.effort import Progress, peak_memory
 from skinwave.models.bodies import default_size
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
+from skinwave.processes import apart
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 

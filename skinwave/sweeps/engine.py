@@ -12,8 +12,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
-from skinwave.effort import as_worker
-from skinwave.processes import guarded, pool
+from skinwave.processes import as_worker, guarded, pool
 
 LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker

@@ -1,11 +1,9 @@
 """Files that a page saves: the scene, waveforms as tables and sound, a figure, the report."""
 
 import asyncio
-import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO
-from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,10 +11,10 @@ from typing import Any
 from simple_model.choices import choose
 from simple_model.response import step
 from skinwave.exports import sampled, waveform_table
+from skinwave.processes import apart
 from skinwave.scene import BODIES, Scene, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
-from skinwave.web.worker import end_with_parent
 
 FORMATS = ("svg", "png", "pdf")  # matplotlib knows others, some of which start a program
 
@@ -61,27 +59,10 @@ async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:
     RuntimeError
         If the process ends without it.
     """
-    return await asyncio.to_thread(_elsewhere, make, given)
-
-
-def _elsewhere(make: Callable[..., bytes], given: tuple[Any, ...]) -> bytes:
-    context = multiprocessing.get_context("spawn")
-    mine, other = context.Pipe(duplex=False)
-    process = context.Process(target=_make, args=(other, make, given), daemon=True)
-    process.start()
-    other.close()
     try:
-        return bytes(mine.recv())
-    except EOFError:
-        raise RuntimeError(f"the process of {make.__name__} has ended without it") from None
-    finally:
-        process.join()
-        mine.close()
-
-
-def _make(pipe: Connection, make: Callable[..., bytes], given: tuple[Any, ...]) -> None:
-    end_with_parent()
-    pipe.send(make(*given))
+        return await asyncio.to_thread(apart, make, *given)
+    except Exception as error:
+        raise RuntimeError(f"the process of {make.__name__} has ended without it") from error
 
 
 def csv_of(answers: Sequence[Answer]) -> bytes:

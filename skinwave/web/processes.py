@@ -5,13 +5,12 @@ import contextlib
 import json
 import os
 import shutil
-import signal
 import sys
 import tempfile
 from dataclasses import dataclass
 from typing import Any
 
-from skinwave.processes import SAFE_PATH
+from skinwave.processes import SAFE_PATH, end_group
 from skinwave.web.access import one_line
 
 PATIENCE = 60.0  # s that a session may take to start
@@ -94,14 +93,10 @@ def kill(process: Any) -> None:
     """End a process at once, with what it is about to start; what it has started ends as soon as
     it does.
     """
-    with contextlib.suppress(ProcessLookupError, RuntimeError, OSError):
+    with contextlib.suppress(RuntimeError, OSError):
         process.stdin.close()
-        if process.returncode is not None:
-            return
-        if hasattr(os, "killpg"):  # not `process.kill`, which takes the exit code from asyncio
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
+        if process.returncode is None:
+            end_group(process.pid)  # not `process.kill`, which takes the exit code from asyncio
 
 
 async def gone(page: PageProcess) -> None:

@@ -3,14 +3,13 @@
 import contextlib
 import multiprocessing
 import os
-import signal
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
 from skinwave.effort import THREADS
-from skinwave.processes import environment
+from skinwave.processes import end_group, environment, when_parent_ends
 from skinwave.steps import Step, follower
 
 Told = Callable[[str, int, Any], None]  # what, number of the request, content
@@ -65,23 +64,7 @@ def end_with_parent() -> None:
     """
     with contextlib.suppress(AttributeError, OSError):
         os.setsid()
-    parent = multiprocessing.parent_process()
-
-    def wait() -> None:
-        if parent is not None:
-            parent.join()
-            _end_group(os.getpid())
-
-    threading.Thread(target=wait, daemon=True).start()
-
-
-def _end_group(process: int) -> None:
-    """End a process and all that it has started."""
-    with contextlib.suppress(OSError):
-        if hasattr(os, "killpg") and os.getpgid(process) == process:
-            os.killpg(process, signal.SIGKILL)
-        else:
-            os.kill(process, getattr(signal, "SIGKILL", signal.SIGTERM))
+    when_parent_ends(lambda: end_group(os.getpid()))
 
 
 def _teller(pipe: Connection, number: int) -> Callable[[str, float], None]:
@@ -156,7 +139,7 @@ class Worker:
 
     def _end(self) -> None:
         if self._process is not None:
-            _end_group(self._process.pid)
+            end_group(self._process.pid)
             self._process.join(5)
         self._process = self._pipe = None
 
