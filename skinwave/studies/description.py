@@ -171,11 +171,13 @@ def _material(solid: Material) -> str:
     )
     if solid.loss_factor:
         text += f", loss factor {solid.loss_factor:g}"
-    if solid.relaxing_modulus:
+    for term in solid.prony:
         text += (
-            f", a Maxwell branch of {solid.relaxing_modulus / 1e3:.4g} kPa with relaxation time "
-            f"{1e3 * solid.relaxation_time:g} ms"
+            f", a Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
+            f"{1e3 * term.time:g} ms"
         )
+    if solid.law is not None:
+        text += ", and a complex modulus of its own"
     return text
 
 
