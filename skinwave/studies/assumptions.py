@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Trajectory
+from simple_model import MovingPressure, Trajectory
+from simple_model.drive import PUBLISHED, beyond_published
 from simple_model.material import PRESETS, Material, PronyTerm
 from skinwave.planning.estimates import response_spectrum
 from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
@@ -111,11 +112,11 @@ def relaxed(
     update_rate, points : of the device that draws the path, as `held` takes them
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
-    own = scene.pressure.drive if scene.pressure.drive != "linear" else "pressure_squared"
+    own = beyond_published(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(
         scene.pressure,
         focus="array" if "main lobe only" in dropped else spot,
-        drive=own if "linear drive" in dropped else "linear",
+        drive=own if "linear drive" in dropped else PUBLISHED,
     )
     if "continuous path" in dropped:
         path = held(scene.tacton.trajectory, update_rate, points)
