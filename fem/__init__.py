@@ -2,7 +2,7 @@
 
     M u'' + C u' + K u = P q(t),  probes = S u
 
-(`relaxation` has what generalised Maxwell branches add to K.)
+(`maxwell` has what Prony terms and other modulus laws add to K.)
 
 Operators are built once, factorised once, and then only solved with. Index letters of every
 einsum in this package: e element, q quadrature point, a b element nodes, i j components,
@@ -28,18 +28,19 @@ from fem.load_and_probe import (
     pressure_force,
     probe_operator,
 )
-from fem.materials import PRESETS, Material, from_young
-from fem.maxwell import MaxwellBranch
+from fem.maxwell import DispersiveBranch, MaxwellBranch
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
 from fem.transient import Diverged, State, at_rest, transient
+from simple_model.material import PRESETS, Material, PronyTerm, from_young, tabulated
 
 __all__ = [
     "PRESETS",
     "AddedMass",
     "Complex",
+    "DispersiveBranch",
     "Diverged",
     "Elastic",
     "EnergyBalance",
@@ -49,6 +50,7 @@ __all__ = [
     "Membrane",
     "Operators",
     "Poles",
+    "PronyTerm",
     "ReducedModel",
     "State",
     "StretchingModes",
@@ -80,6 +82,7 @@ __all__ = [
     "static",
     "stored",
     "stretching_modes",
+    "tabulated",
     "transfer",
     "transient",
     "with_energy_balance",

@@ -8,15 +8,16 @@
                 (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
               + int drag rho N_a N_b dV in an absorbing (sponge) layer before them
     K      += int k delta_ij N_a N_b dA where a surface rests on springs of k per area
-    K_j     = (relaxing modulus/mu) K of the elements of one relaxation time: the stiffness of a
-              generalised Maxwell branch, see `relaxation`
+    K_j     = (mu_j/mu) K of the elements with a Prony term of one relaxation time: the stiffness
+              of a generalised Maxwell branch, see `maxwell`
 
 Where nu > 0.45 most of lam acts on a projection of the dilatation, see `dilatation`; without that
 volumetric locking makes displacements some wavelengths away several per cent too small.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +27,7 @@ from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.maxwell import MaxwellBranch, on_free
+from fem.maxwell import Branch, DispersiveBranch, MaxwellBranch, on_free
 from fem.pressure_projection import projected_divergence
 from fem.sparsity import UPPER, Pattern, from_components, from_nodal, slabs
 from meshes import TetMesh, facet_set
@@ -55,7 +56,7 @@ class Operators:
     R: sparse.csr_array
     free: Ints
     n_dofs: int
-    branches: tuple[MaxwellBranch, ...] = ()
+    branches: tuple[Branch, ...] = ()
 
     def expand(self, values: Floats) -> Floats:
         """Values (n_free, ...) on all dofs (n_dofs, ...), 0 where the body is fixed."""
@@ -123,8 +124,8 @@ def _of(materials: list[Material], name: str) -> Floats:
 
 def _volume_operators(
     mesh: TetMesh, pattern: Pattern, materials: list[Material], region: Ints
-) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[MaxwellBranch, ...]]:
-    """K, C, M and a generalised Maxwell branch of each relaxation time, on all dofs."""
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
+    """K, C, M and the branches of all materials, on all dofs."""
     rho, mu, lam = (_of(materials, name) for name in ("density", "shear_modulus", "first_lame"))
     mass_rate, hysteretic_lag = np.array(
         [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
@@ -149,17 +150,37 @@ def _volume_operators(
 
     K = stiffness(np.ones(len(materials)))
     M = _mass(mesh, pattern, rho[region])
-    relaxing, times = (_of(materials, name) for name in ("relaxing_modulus", "relaxation_time"))
-    branches = tuple(
-        MaxwellBranch(K=portion((times == time) * relaxing / mu), time=time)
-        for time in np.unique(times[relaxing > 0])
-    )
+    branches = _branches(materials, portion)
     C = portion(hysteretic_lag + _of(materials, "viscosity") / mu)
     if np.ptp(mass_rate):
         C = C + _mass(mesh, pattern, (mass_rate * rho)[region])
     elif mass_rate[0]:
         C = C + mass_rate[0] * M
     return K, C, M, branches
+
+
+def _branches(
+    materials: list[Material], portion: Callable[[Floats], sparse.csr_array]
+) -> tuple[Branch, ...]:
+    """A Maxwell branch of each relaxation time, and one of each material with a law of its own;
+    `portion` of shares (r,) of the materials' moduli is their stiffness.
+    """
+    terms = [(r, term) for r, m in enumerate(materials) for term in m.prony if term.modulus]
+    shares: dict[float, Floats] = {
+        time: np.zeros(len(materials)) for time in sorted({term.time for _, term in terms})
+    }
+    for r, term in terms:
+        shares[term.time][r] += term.modulus / materials[r].shear_modulus
+    own = [(np.eye(len(materials))[r], m) for r, m in enumerate(materials) if m.law is not None]
+    return (
+        *(MaxwellBranch(K=portion(share), time=time) for time, share in shares.items()),
+        *(DispersiveBranch(K=portion(only), modulus=_relative(m)) for only, m in own),
+    )
+
+
+def _relative(material: Material) -> Callable[[Any], Any]:
+    """Complex modulus over that at rest, as a function of the angular frequency in rad/s."""
+    return lambda w: material.complex_modulus(w) / material.shear_modulus
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:

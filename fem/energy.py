@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.assembly import Operators
-from fem.maxwell import MaxwellBranch
+from fem.maxwell import Branch
 from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
@@ -119,7 +119,7 @@ def mean_power(
     forces: NDArray[np.complex128],
     motion: NDArray[np.complex128],
     frequencies: Floats,
-    branches: Sequence[MaxwellBranch] = (),
+    branches: Sequence[Branch] = (),
 ) -> EnergyBalance:
     """Mean power balance of a load's spectral lines, in W.
 
@@ -143,7 +143,7 @@ def mean_power(
 
     always = np.ones(len(w))
     radiated = taken(R, always)
-    relaxed = sum(taken(b.K, b.time / (1 + (w * b.time) ** 2)) for b in branches)
+    relaxed = sum(taken(b.K, b.lag(w)) for b in branches)
     dissipated = taken(C, always) - radiated + relaxed
     exchanged = float(np.abs(apparent).sum())
     return EnergyBalance(

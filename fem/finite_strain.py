@@ -106,14 +106,14 @@ def finite_strain(
     ------
     ValueError
         If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock, or a
-        material has a relaxing modulus; else as `assemble`.
+        material has Prony terms or a law of its own; else as `assemble`.
     """
     n = len(mesh.points)
     solid, operators = solid_part(mesh, material), assemble(mesh, material, fixed=fixed)
     if operators.branches:
         raise ValueError(
-            "a relaxing_modulus above 0 is not implemented at large displacement; leave it out, or "
-            "use one of the linear models"
+            "Prony terms and other modulus laws are not implemented at large displacement; leave "
+            "them out, or use one of the linear models"
         )
     free = operators.free
 

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
-from fem.maxwell import MaxwellBranch, relaxing_stiffness
+from fem.maxwell import Branch, relaxing_stiffness
 from meshes.tetmesh import Floats
 
 
-def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[MaxwellBranch], s: Any) -> Any:
+def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any) -> Any:
     """Dynamic stiffness K + s C + s^2 M and that of Maxwell branches.
 
     Parameters

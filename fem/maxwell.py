@@ -4,11 +4,12 @@
 
 The internal variable d is the stretch of the spring. One branch in parallel with the equilibrium K
 is the standard linear (Zener) solid: C. Zener, Elasticity and Anelasticity of Metals (1948); Simo
-and Hughes, Computational Inelasticity (1998), chapter 10.
+and Hughes, Computational Inelasticity (1998), chapter 10. A material with a modulus law of its own
+adds a part of the stiffness that depends on frequency and has no internal variable.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,20 +33,60 @@ class MaxwellBranch:
         """
         return s * self.time / (1 + s * self.time)
 
+    def lag(self, w: Any) -> Any:
+        """Loss part of the share over w, in s, in steady motion at w in rad/s."""
+        return self.time / (1 + (w * self.time) ** 2)
 
-def relaxing_stiffness(branches: Sequence[MaxwellBranch], s: Any) -> Any:
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DispersiveBranch:
+    """Part of the stiffness whose modulus is any function of frequency: `K` (n, n) at rest, N/m,
+    and `modulus`, angular frequencies in rad/s -> complex modulus over that at rest.
+    """
+
+    K: Any
+    modulus: Callable[[Any], Any]
+
+    @property
+    def time(self) -> float:
+        """No relaxation time: refuses models that integrate internal variables.
+
+        Raises
+        ------
+        ValueError
+            Always.
+        """
+        raise ValueError(
+            "a material with a modulus law of its own has no internal variables, which motion from "
+            "rest and reduced-order models need; give it Prony terms, or use fem-harmonic or "
+            "flat-body-harmonic"
+        )
+
+    def share(self, s: Any) -> Any:
+        """Factor of K in what is added to K, at complex frequencies s in rad/s."""
+        return self.modulus(np.real_if_close(-1j * s)) - 1
+
+    def lag(self, w: Any) -> Any:
+        """Loss part of the share over w, in s, in steady motion at w in rad/s; 0 at rest."""
+        return np.imag(self.modulus(w)) / np.where(w == 0, np.inf, w)
+
+
+Branch = MaxwellBranch | DispersiveBranch
+
+
+def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:
     """Complex stiffness that branches add to K at the complex frequency s in rad/s; 0 if there are
     none.
     """
     return sum(branch.share(s) * branch.K for branch in branches)
 
 
-def branch_force(branches: Sequence[MaxwellBranch], stretch: Floats) -> Any:
+def branch_force(branches: Sequence[Branch], stretch: Floats) -> Any:
     """Forces (n,) in N of branches at internal variables (j, n) in metre; 0 without branches."""
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
 
 
-def factors(branch: MaxwellBranch) -> tuple[Floats, float]:
+def factors(branch: Branch) -> tuple[Floats, float]:
     """Low-rank factor L (n, k) of a branch, K = L L^T, as many columns as K has rank; and its time
     in s.
 
@@ -57,9 +98,8 @@ def factors(branch: MaxwellBranch) -> tuple[Floats, float]:
     return vectors[:, kept] * np.sqrt(squares[kept]), branch.time
 
 
-def on_free(branches: Sequence[MaxwellBranch], free: Any) -> tuple[MaxwellBranch, ...]:
+def on_free(branches: Sequence[Branch], free: Any) -> tuple[Branch, ...]:
     """Branches restricted to some of the degrees of freedom."""
     return tuple(
-        MaxwellBranch(K=sparse.csr_array(branch.K)[free][:, free], time=branch.time)
-        for branch in branches
+        replace(branch, K=sparse.csr_array(branch.K)[free][:, free]) for branch in branches
     )

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+from simple_model.material import Complex, Material
 
 
 @dataclass(frozen=True)
@@ -35,49 +34,37 @@ LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for 0 in a slab
 BACKWARD = 0.5  # of a layer's second resonance: where some of its modes become backward waves
 
 
-def half_space(
-    *, density: float, shear_modulus: float, poisson: float, viscosity: float = 0.0,
-    loss_factor: float = 0.0, relaxing_modulus: float = 0.0, relaxation_time: float = 0.0,
-) -> Compliance:  # fmt: skip
-    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s; poisson from 0
-    to 0.5.
+def half_space(material: Material, *, poisson: float | None = None) -> Compliance:
+    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
+
+    `poisson` stands in for the material's: here it may be 0.5, incompressible.
     """
-    law = {
-        "viscosity": viscosity, "loss_factor": loss_factor,
-        "relaxing_modulus": relaxing_modulus, "relaxation_time": relaxation_time,
-    }  # fmt: skip
+    nu = material.poisson if poisson is None else poisson
 
     def compliance(k: Complex, w: Complex) -> Complex:
-        mu = complex_modulus(w, shear_modulus, **law)
-        ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
+        mu = material.complex_modulus(w)
+        ks2, kp2 = _squared_wavenumbers(material.density, mu, nu, w)
         bp, bs = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
         still = np.abs(ks2) < 1e-9 * np.abs(k) ** 2  # the closed form cancels towards rest
         rayleigh = (2 * k**2 - ks2) ** 2 - 4 * k**2 * bp * bs
         dynamic = -bp * ks2 / (mu * np.where(still, 1.0, rayleigh))
-        return np.where(still, (1 - poisson) / (mu * k), dynamic)
+        return np.where(still, (1 - nu) / (mu * k), dynamic)
 
     return Compliance(compliance)
 
 
-def slab(
-    *, density: float, shear_modulus: float, poisson: float, depth: float,
-    viscosity: float = 0.0, loss_factor: float = 0.0, relaxing_modulus: float = 0.0,
-    relaxation_time: float = 0.0,
-) -> Compliance:  # fmt: skip
-    """Laterally infinite layer of `depth` metre bonded to a rigid base; poisson < 0.5.
+def slab(material: Material, depth: float) -> Compliance:
+    """Laterally infinite layer of `depth` metre bonded to a rigid base.
 
     Potentials phi = A e^{bp z} + B e^{-bp (z + H)} and psi likewise meet zero displacement at
     the base and unit pressure without shear at the top: four equations for each k and w, whose
     exponentials all decay, so that no thickness overflows.
     """
-    law = {
-        "viscosity": viscosity, "loss_factor": loss_factor,
-        "relaxing_modulus": relaxing_modulus, "relaxation_time": relaxation_time,
-    }  # fmt: skip
+    density, poisson = material.density, material.poisson
 
     def compliance(k: Complex, w: Complex) -> Complex:
         w = np.where(np.abs(w) < LEAST_FREQUENCY, LEAST_FREQUENCY, w)
-        mu = complex_modulus(w, shear_modulus, **law)
+        mu = material.complex_modulus(w)
         ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
         k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
         p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
@@ -100,9 +87,7 @@ def slab(
         wave's decay, as they carry energy more slowly (Tolstoy and Usdin, J Acoust Soc Am 29:37
         (1957)). Evanescent waves have theirs above 1 / depth.
         """
-        ks2, kp2 = _squared_wavenumbers(
-            density, complex_modulus(w, shear_modulus, **law), poisson, w
-        )
+        ks2, kp2 = _squared_wavenumbers(density, material.complex_modulus(w), poisson, w)
         turns = np.maximum(np.sqrt(ks2).real / 3, np.sqrt(kp2).real) * depth / (np.pi / 2)
         decay = np.abs(np.sqrt(ks2).imag)
         return float(decay[turns > BACKWARD].min(initial=1 / depth))
@@ -111,23 +96,18 @@ def slab(
 
 
 def thin_sheet(
-    *, bending_stiffness: float, mass_per_area: float, loss_factor: float = 0.0,
-    viscous_lag: float = 0.0, relaxing_share: float = 0.0, relaxation_time: float = 0.0,
-    air_density: float = AIR_DENSITY,
-) -> Compliance:  # fmt: skip
-    """Infinite thin sheet: G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2]; air_density 0 for vacuum.
-
-    D* = D (1 + i eta + i w lag + share i w tau / (1 + i w tau)).
+    material: Material, thickness: float, *, air_density: float = AIR_DENSITY
+) -> Compliance:
+    """Infinite thin sheet of `thickness` metre: G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2], m =
+    rho d, D* = mu* d^3 / 6 (1 - nu); air_density 0 for vacuum.
 
     The deflection of an infinite sheet under a static load has no bound: motion is given about a
     mean that is left out, G = 0 at w = 0.
     """
+    mass_per_area = material.density * thickness
 
     def bending(w: Complex) -> Complex:
-        return bending_stiffness * complex_modulus(
-            w, 1.0, viscosity=viscous_lag, loss_factor=loss_factor,
-            relaxing_modulus=relaxing_share, relaxation_time=relaxation_time,
-        )  # fmt: skip
+        return np.asarray(material.complex_modulus(w) * thickness**3 / (6 * (1 - material.poisson)))
 
     def compliance(k: Complex, w: Complex) -> Complex:
         inertia = (mass_per_area + 2 * air_density / k) * w**2
@@ -147,17 +127,6 @@ def thin_sheet(
         return float(k.imag[still].min(initial=inf))
 
     return Compliance(compliance, clearance)
-
-
-def complex_modulus(
-    w: Complex, modulus: float, *, viscosity: float, loss_factor: float, relaxing_modulus: float,
-    relaxation_time: float,
-) -> Complex:  # fmt: skip
-    """Complex modulus of a hysteretic Kelvin-Voigt solid with a Maxwell branch, at w in rad/s."""
-    # Frequencies are never below 0 here, so that a hysteretic loss has one sign.
-    turned = 1j * w * relaxation_time
-    relaxing = relaxing_modulus * turned / (1 + turned)
-    return np.asarray(modulus * (1 + 1j * loss_factor) + 1j * w * viscosity + relaxing)
 
 
 def _squared_wavenumbers(

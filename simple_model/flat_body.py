@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.special import jv
 
-from simple_model.compliance import Complex, Compliance
+from simple_model.compliance import Compliance
 from simple_model.focus import spot_width
 from simple_model.load_spectrum import (
     foci_harmonics,
@@ -39,6 +39,7 @@ from simple_model.load_spectrum import (
     path_samples,
     synthesise,
 )
+from simple_model.material import Complex
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.response import Effort, Response, step
 from simple_model.sampling import finer, highest, reached, shown, transform

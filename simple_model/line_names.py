@@ -2,9 +2,9 @@
 
 Every line of a load lies at |n f_d + p f_AM + q f_AM2 + r f_e + u f_s + v f_r|, whole multiples of
 the path's drawing frequency, of the three sinusoids, and of one over the periods of a signal and a
-rhythm. The drive laws are polynomials of second degree of the modulation and a factor of the level,
-so that p, q and r are at most 2, and the strength of each line follows from products of Fourier
-coefficients.
+rhythm. The strength of each line follows from products of Fourier coefficients: a drive law is a
+polynomial of the modulation, whose degree p, q and r do not exceed, or taken as one that fits it,
+and a factor of the level.
 
 Names are the sums themselves, such as "2f_AM", "f_d+f_AM-f_e", without the bars. In one with f_d
 this comes first and positive: "2f_d-f_AM" is |2 f_d - f_AM|. In others the positive terms come
@@ -20,8 +20,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from simple_model.drive import DRIVES
-from simple_model.load_spectrum import foci_harmonics, gain_orders, path_strengths
+from simple_model.load_spectrum import (
+    ALIASED,
+    foci_harmonics,
+    gain_orders,
+    harmonics_unbounded,
+    path_strengths,
+)
 from simple_model.pressure import MovingPressure
 from simple_model.tacton import Tacton, tones
 from simple_model.trajectory import Floats
@@ -37,6 +42,7 @@ PULSED = 2**14  # samples of a period of a rhythm or signal
 ROUND_OFF = 1e-10  # of the strongest harmonic of the path, its mean
 MOST_HARMONICS = 400  # of a path that are combined with the others
 MOST_PRODUCTS = 4000  # orders of the gain that are combined with the path's
+DEGREES = (4, 8, 16, 32)  # of polynomials that are fitted to a drive law that is none
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,34 +183,43 @@ def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, 
         samples = max(PULSED, 2 * len(signal.samples))
         values = signal.at((np.arange(samples) + 0.5) / samples * len(signal.samples) / signal.rate)
         if signal.role == "envelope":
-            of_signal = _fourier(level_factor(pressure, values))[None]
-        else:  # the drive laws are polynomials of second degree of it
-            orders, (low, none, high) = _at_factors(pressure, (-1.0, 0.0, 1.0))
-            coefficients = np.stack([none, (high - low) / 2, (high + low) / 2 - none])
-            of_signal = np.stack([_fourier(values**j) for j in range(3)])
+            of_signal = _fourier(_factor(pressure, values))[None]
+        else:
+            orders, coefficients = _in_powers(pressure)
+            of_signal = np.stack([_fourier(values**j) for j in range(len(coefficients))])
     if coefficients is None:
-        orders, coefficients = _at_factors(pressure, (1.0,))
+        orders, coefficients = gain_orders(_unsampled(pressure))
     if tacton.rhythm is not None and of_tacton[5]:
         level = tacton.rhythm.level((np.arange(PULSED) + 0.5) / PULSED * tacton.rhythm.period)
-        powers = _fourier(level_factor(pressure, level))
+        powers = _fourier(_factor(pressure, level))
     c = np.abs(np.einsum("jm,ju->mu", coefficients, of_signal))
     (m, u), c = _strongest(c, threshold)
     (k, v), c = _strongest(c[:, None] * np.abs(powers), threshold)
     return np.column_stack([orders[m[k]], _ranks(u[k], of_signal), _ranks(v, powers[None])]), c
 
 
-def _at_factors(pressure: MovingPressure, factors: Sequence[float]) -> tuple[Orders, NDArray]:
-    """Orders (m, 3) and coefficients (k, m) of the gain at factors (k,) of the modulation."""
-    plain = replace(pressure, tacton=replace(pressure.tacton, rhythm=None, signal=None))
-    found = [gain_orders(plain, factor) for factor in factors]
-    return found[0][0], np.stack([c for _, c in found])
+def _unsampled(pressure: MovingPressure) -> MovingPressure:
+    return replace(pressure, tacton=replace(pressure.tacton, rhythm=None, signal=None))
 
 
-def level_factor(pressure: MovingPressure, level: Floats) -> Floats:
+def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
+    """Orders (m, 3) and coefficients (k, m) of the gain with powers 0 to k - 1 of a factor of the
+    modulation: through Chebyshev's points, and checked between them.
+    """
+    law, plain = pressure.law, _unsampled(pressure)
+    for degree in DEGREES if law.degree is None else (max(1, law.degree),):
+        factors = np.cos(np.pi * np.arange(2 * degree + 1) / (2 * degree))
+        powers = np.vander(factors, degree + 1, increasing=True)
+        orders, at = gain_orders(plain, factors.tolist())
+        found = np.linalg.solve(powers[::2], at[::2])
+        if np.abs(powers @ found - at).max() <= ALIASED * np.abs(at).max():
+            return orders, found
+    raise harmonics_unbounded(law)
+
+
+def _factor(pressure: MovingPressure, level: Floats) -> Floats:
     """Factor (k,) on the pressure of a level (k,) of the amplitude."""
-    one = np.ones(1)
-    full = DRIVES[pressure.drive](1.0, one, pressure.depth_of_modulation)
-    return np.asarray(DRIVES[pressure.drive](level, one, pressure.depth_of_modulation) / full)
+    return pressure.law.level_factor(level, pressure.depth_of_modulation)
 
 
 def _fourier(values: Floats) -> NDArray[np.complex128]:

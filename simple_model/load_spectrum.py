@@ -11,6 +11,7 @@ repeated periodically, at multiples of one over its duration. From rest that is 
 that time, by causality.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import lcm
 
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from simple_model.drive import DriveLaw
 from simple_model.focus import spot_reach, spot_width
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.tacton import Tacton, modulation_at_phases, tones
@@ -27,7 +29,9 @@ Complex = NDArray[np.complex128]
 
 FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
 KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
-PHASES = 8  # of each sinusoid: the drive laws are polynomials of second degree
+PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
+MOST_PHASES = 2**20  # of all sinusoids together, for a drive law that is no polynomial
+ALIASED = 1e-4  # of the strongest: a drive law's harmonics beyond those that are sampled
 HIGHEST = 10_000.0  # Hz of the lines of pulses and recordings: the rest moves bodies by 0.1 %
 SAMPLED = 40_000.0  # Hz at which a rhythm or signal is averaged
 MOST_SAMPLED = 50_000_000  # lines of a rhythm or signal, some hundred megabytes
@@ -254,19 +258,53 @@ def _sinusoid_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floa
 
 def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:
     """Frequencies (m,) in Hz of either sign and coefficients (m,) in Pa of the gain."""
-    orders, c = gain_orders(pressure)
+    orders, (c,) = gain_orders(pressure)
     kept = np.abs(c) >= 1e-12 * np.abs(c).max()
     return orders[kept] @ np.array(tones(pressure.tacton)), c[kept]
 
 
-def gain_orders(pressure: MovingPressure, factor: float = 1.0) -> tuple[NDArray[np.int_], Complex]:
-    """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, and its coefficients (m,) in Pa, where the
-    modulation is multiplied by a factor; of either sign, all that the drive laws can make.
+def gain_orders(
+    pressure: MovingPressure, factors: Sequence[float] = (1.0,)
+) -> tuple[NDArray[np.int_], Complex]:
+    """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, of either sign, and its coefficients (k, m)
+    in Pa where the modulation is multiplied by factors (k,). All of a polynomial drive law; of
+    another the phases are doubled until harmonics in the upper half of the orders are below
+    `ALIASED`.
+
+    Raises
+    ------
+    ValueError
+        If `MOST_PHASES` are not enough for that.
     """
+    law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
+    count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)
+    while count**n_tones <= MOST_PHASES or law.degree is not None:
+        orders, c = _at_phases(pressure, factors, count)
+        beyond = (4 * np.abs(orders) >= count).any(axis=1)
+        strongest = np.abs(c).max()
+        if law.degree is not None or np.abs(c[:, beyond]).max(initial=0.0) <= ALIASED * strongest:
+            return orders, c
+        count *= 2
+    raise harmonics_unbounded(law)
+
+
+def harmonics_unbounded(law: DriveLaw) -> ValueError:
+    """Error of a drive law whose harmonics do not fall off."""
+    return ValueError(
+        f"the harmonics that drive law '{law}' makes of the modulation do not fall to {ALIASED:g} "
+        "of the strongest; make it smoother, or modulate by fewer tones"
+    )
+
+
+def _at_phases(
+    pressure: MovingPressure, factors: Sequence[float], count: int
+) -> tuple[NDArray[np.int_], Complex]:
+    """Orders (m, 3) and coefficients (k, m) from so many phases of each sinusoid."""
     tacton = pressure.tacton
-    counts = [PHASES if f else 1 for f in tones(tacton)]
+    counts = [count if f else 1 for f in tones(tacton)]
     grid = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in counts), indexing="ij")
-    driven = pressure.driven(factor * modulation_at_phases(tacton, *grid))
+    modulation = modulation_at_phases(tacton, *grid)
     of_each = np.meshgrid(*(np.fft.fftfreq(n, 1 / n) for n in counts), indexing="ij")
     orders = np.stack([np.round(each).astype(int).ravel() for each in of_each], axis=1)
-    return orders, (np.fft.fftn(driven) / driven.size).ravel()
+    driven = (pressure.driven(factor * modulation) for factor in factors)
+    return orders, np.stack([(np.fft.fftn(each) / each.size).ravel() for each in driven])

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simple_model.drive import PUBLISHED
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response
 from simple_model.sampling import fold_parts, low_passed
@@ -21,7 +22,7 @@ from simple_model.trajectory import Floats
 
 def published(pressure: MovingPressure) -> MovingPressure:
     """The same Tacton and height under the paper's load: linear drive, main lobe, no mean."""
-    return replace(pressure, drive="linear", focus="main_lobe")
+    return replace(pressure, drive=PUBLISHED, focus="main_lobe")
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.choices import choose
-from simple_model.drive import DRIVES
+from simple_model.drive import DRIVES, DriveLaw
 from simple_model.focus import FOCI, NOMINAL_HEIGHT, along_axis, moved_spot, relative_intensity
 from simple_model.tacton import Tacton, level, modulation
 from simple_model.trajectory import Floats
@@ -33,8 +33,8 @@ class MovingPressure:
     ----------
     tacton : Tacton
     focus : "gaussian", "main_lobe" or "array", the shape of the focal spot
-    drive : "linear", "pressure_squared" or "force_corrected"
-    depth_of_modulation : float, 0..1, of the last two
+    drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
+    depth_of_modulation : float, 0..1; the linear law has none
     peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a
         factor of 2, is the radiation pressure of a 160 dB focus on a wall that reflects fully.
     height : float, metre, of the focus above the array
@@ -47,14 +47,15 @@ class MovingPressure:
 
     tacton: Tacton
     focus: str = "gaussian"
-    drive: str = "pressure_squared"
+    drive: str | DriveLaw = "pressure_squared"
     depth_of_modulation: float = 1.0
     peak_pressure: float = 50.0
     height: float = NOMINAL_HEIGHT
 
     def __post_init__(self) -> None:
         choose("focus", self.focus, FOCI)
-        choose("drive", self.drive, DRIVES)
+        if not isinstance(self.drive, DriveLaw):
+            choose("drive", self.drive, DRIVES)
         if not 0 <= self.depth_of_modulation <= 1:
             raise ValueError(f"depth_of_modulation = {self.depth_of_modulation} is outside 0..1")
         if not (isfinite(self.peak_pressure) and self.peak_pressure >= 0):
@@ -62,6 +63,24 @@ class MovingPressure:
                 f"peak_pressure = {self.peak_pressure} Pa must be a finite number, 0 or above"
             )
         relative_intensity(self.height)
+        self._check_levels()
+
+    def _check_levels(self) -> None:
+        tacton = self.tacton
+        enveloped = tacton.signal is not None and tacton.signal.role == "envelope"
+        if not (tacton.trajectory.levels or tacton.rhythm or enveloped):
+            return
+        if not self.law.is_product(tacton.amplitude, self.depth_of_modulation):
+            raise ValueError(
+                f"drive law '{self.law}' is no product of a factor of the level and one of the "
+                "modulation, so that levels of a path, a rhythm and an envelope have no lines; "
+                "leave them out, or take another law"
+            )
+
+    @property
+    def law(self) -> DriveLaw:
+        """The drive law."""
+        return self.drive if isinstance(self.drive, DriveLaw) else DRIVES[self.drive]
 
     def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s.
@@ -84,10 +103,8 @@ class MovingPressure:
 
     def weight(self, phase: ArrayLike) -> Floats:
         """Factor (...) of the path's level on the pressure at fractions (...) of the period."""
-        one = np.ones(1)
-        full = DRIVES[self.drive](1.0, one, self.depth_of_modulation)
         levels = self.tacton.trajectory.level_at_phase(phase)
-        return DRIVES[self.drive](levels, one, self.depth_of_modulation) / full
+        return self.law.level_factor(levels, self.depth_of_modulation)
 
     def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level.
@@ -106,7 +123,7 @@ class MovingPressure:
     def driven(self, modulation: Floats, level: Floats | float = 1.0) -> Floats:
         """Pressure (...) in Pa at each focus where modulation and level (...) have these values."""
         amplitude = self.tacton.amplitude * level
-        driven = DRIVES[self.drive](amplitude, modulation, self.depth_of_modulation)
+        driven = self.law(amplitude, modulation, self.depth_of_modulation)
         full = self.peak_pressure * relative_intensity(self.height)
         return full / len(self.tacton.foci) * driven
 

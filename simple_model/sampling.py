@@ -6,12 +6,14 @@ focus that moves further than about s/2 in a sample makes lines above half the s
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simple_model.focus import spot_width
+from simple_model.load_spectrum import ALIASED, gain_orders
 from simple_model.pressure import MovingPressure
 from simple_model.response import step
 from simple_model.tacton import Tacton, tones
@@ -35,8 +37,19 @@ def highest(pressure: MovingPressure, passing: float) -> float:
     first, second, envelope = tones(tacton)
     weights = np.array(tacton.superposition) > 0
     tone = max(first * weights[0], second * weights[1]) + envelope
-    tone *= 2 if pressure.drive == "pressure_squared" else 1
-    return max(passing + tone, tacton.signal.rate / 2 if tacton.signal else 0.0)
+    made = passing + _highest_order(pressure) * tone
+    return max(made, tacton.signal.rate / 2 if tacton.signal else 0.0)
+
+
+@lru_cache(maxsize=32)
+def _highest_order(pressure: MovingPressure) -> int:
+    """Highest order of a sinusoid in the gain: the degree of the drive law, or as its harmonics
+    fall off.
+    """
+    if pressure.law.degree is not None:
+        return pressure.law.degree
+    orders, (c,) = gain_orders(pressure)
+    return int(np.abs(orders[np.abs(c) > ALIASED * np.abs(c).max()]).max())
 
 
 def highest_passing(pressure: MovingPressure) -> float:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.materials import PRESETS, Material
 from meshes import Palm
 from simple_model import MovingPressure, Tacton
 from simple_model.choices import choose
+from simple_model.material import PRESETS, Material
 
 KINDS = ("none", "sheet", "slab", "palm", "mesh")
 BASES = ("clamped", "absorbing", "free")

@@ -1,13 +1,14 @@
 """The keys of a scene file: each with its unit, what it may hold, and the attribute behind it."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from math import inf, isfinite, nextafter, pi
 from typing import Any
 
-from fem.materials import Material
 from simple_model import Rhythm, Signal
 from simple_model.choices import meant
+from simple_model.material import Material, PronyTerm
 from simple_model.trajectory import Points
 from skinwave.scene import Layer, Relief
 
@@ -115,29 +116,58 @@ def _inner(cls: type, keys: dict[str, Field]) -> tuple[Callable[..., Any], Calla
 def _material(key: str, value: Any) -> str | Material:
     if isinstance(value, str):
         return value
-    values = checked(f"[body.{key}]", as_table(key, value), MATERIAL)
+    table = dict(as_table(key, value))
+    one = {new: table.pop(old) for old, new in MAXWELL_BRANCH.items() if old in table}
+    values = checked(f"[body.{key}]", table, MATERIAL)
     missing = [k for k in list(MATERIAL)[:3] if MATERIAL[k].name not in values]
     if missing:
         raise ValueError(f"[body.{key}] lacks {' and '.join(missing)}; give it, or name a preset")
+    if one:
+        warnings.warn(
+            f"{' and '.join(MAXWELL_BRANCH)} of [body.{key}] are now modulus_pa and time_s of "
+            f"[[body.{key}.prony]]",
+            FutureWarning,  # which is shown to who writes scenes, not only to who writes Python
+            stacklevel=2,
+        )
+        if _number(key, one.get("modulus_pa", 0)):
+            values["prony"] = (*values.get("prony", ()), *_prony("prony", [{"time_s": 0} | one]))
     return Material(**values)
 
 
 def _write_material(material: str | Material) -> Any:
     if isinstance(material, str):
         return material
-    return {key: field.write(getattr(material, field.name)) for key, field in MATERIAL.items()}
+    if material.law is not None:
+        raise ValueError(
+            "the material has a modulus law of its own, a Python function or a table, which a "
+            "scene file cannot hold; give it Prony terms, or simulate it from Python"
+        )
+    table = {key: field.write(getattr(material, field.name)) for key, field in MATERIAL.items()}
+    return {key: value for key, value in table.items() if value != []}
+
+
+def _prony(key: str, value: Any) -> tuple[PronyTerm, ...]:
+    return tuple(PronyTerm(**values) for values in _tables(f"body.material.{key}", value, PRONY))
+
+
+def _write_prony(terms: tuple[PronyTerm, ...]) -> Any:
+    return [{key: field.write(getattr(term, field.name)) for key, field in PRONY.items()}
+            for term in terms]  # fmt: skip
+
+
+def _tables(key: str, value: Any, keys: dict[str, Field]) -> list[dict[str, Any]]:
+    """Values of each of the tables under [[key]], all of whose keys are needed."""
+    if not isinstance(value, list):
+        raise ValueError(f"{key} = {_shown(value)} must be tables, each under [[{key}]]")
+    found = [checked(f"[[{key}]]", as_table(key, table), keys) for table in value]
+    for values in found:
+        if missing := [k for k, field in keys.items() if field.name not in values]:
+            raise ValueError(f"[[{key}]] lacks {' and '.join(missing)}; give it")
+    return found
 
 
 def _layers(key: str, value: Any) -> tuple[Layer, ...]:
-    if not isinstance(value, list):
-        raise ValueError(f"{key} = {_shown(value)} must be tables, each under [[body.{key}]]")
-    found = []
-    for table in value:
-        values = checked(f"[[body.{key}]]", as_table(f"body.{key}", table), LAYER)
-        if missing := [k for k, field in LAYER.items() if field.name not in values]:
-            raise ValueError(f"[[body.{key}]] lacks {' and '.join(missing)}; give it")
-        found.append(Layer(**values))
-    return tuple(found)
+    return tuple(Layer(**values) for values in _tables(f"body.{key}", value, LAYER))
 
 
 def _write_layers(layers: tuple[Layer, ...]) -> Any:
@@ -188,8 +218,12 @@ MATERIAL = {
     "poisson": _scaled("poisson"),
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
-    "relaxing_modulus_pa": _scaled("relaxing_modulus"),
-    "relaxation_time_s": _scaled("relaxation_time"),
+    "prony": Field("prony", _prony, _write_prony),
+}
+PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
+MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
+    "relaxing_modulus_pa": "modulus_pa",
+    "relaxation_time_s": "time_s",
 }
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {

@@ -51,7 +51,8 @@ NUMBERS = {
     "focus": ("height_mm", "depth_of_modulation", "peak_pressure_pa"),
     "body": ("width_mm", "height_mm", "depth_mm"),
     "body.material": ("density_kg_m3", "shear_modulus_pa", "poisson", "viscosity_pa_s",
-                      "loss_factor", "relaxing_modulus_pa", "relaxation_time_s"),
+                      "loss_factor"),
+    "[body.material.prony]": ("modulus_pa", "time_s"),
 }  # fmt: skip
 NO_NUMBERS = (
     "'7'",

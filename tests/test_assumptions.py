@@ -9,7 +9,6 @@ import pytest
 
 import fem
 import skinwave
-from fem import Material
 from simple_model import (
     MovingPressure,
     Response,
@@ -19,6 +18,7 @@ from simple_model import (
     point_kernel,
     published,
 )
+from simple_model.material import Material, PronyTerm
 from skinwave.cli import main
 from skinwave.scene import BODIES, Body, Layer, solid_of
 from skinwave.scene_file import dumps
@@ -184,7 +184,7 @@ def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
         assert relaxing.complex_modulus(w) == pytest.approx(viscous.complex_modulus(w), rel=1e-12)
         assert relaxing.complex_modulus(3 * w).imag < 0.9 * viscous.complex_modulus(3 * w).imag
         back = as_viscous(relaxing, w)
-        assert (back.relaxing_modulus, back.viscosity) == (0, pytest.approx(viscous.viscosity))
+        assert (back.prony, back.viscosity) == ((), pytest.approx(viscous.viscosity))
         assert back.shear_modulus == pytest.approx(viscous.shear_modulus)
 
 
@@ -206,7 +206,7 @@ def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
     both = Material(
         density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=0.2,
         **({"viscosity": 5.0} if law is as_relaxing else
-           {"relaxing_modulus": 1e4, "relaxation_time": 5e-4}),
+           {"prony": (PronyTerm(modulus=1e4, time=5e-4), PronyTerm(modulus=5e3, time=2e-3))}),
     )  # fmt: skip
     w = 2 * np.pi * 140
     assert law(both, w).complex_modulus(w) == pytest.approx(both.complex_modulus(w), rel=1e-9)
@@ -228,7 +228,7 @@ def test_the_law_of_loss_is_one_rung():
     assert beside(own) == ()
     before, _ = relaxed(own, ("no propagation", "little loss"))
     after, _ = relaxed(own, ("no propagation", "little loss", "viscous loss"))
-    assert before.body.solid.relaxing_modulus == 0 < before.body.solid.viscosity
+    assert before.body.solid.fast_modulus == 0 < before.body.solid.viscosity
     assert after.body.solid == own.body.solid
 
 

@@ -19,11 +19,12 @@ from simple_model import (
 from simple_model.compliance import slab
 from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples, synthesise
+from simple_model.material import PRESETS
 from simple_model.sampling import resolving_step
 from skinwave import Body, Scene, simulate
 from skinwave.simulation import compute
 
-PALM = slab(density=1000, shear_modulus=25e3, viscosity=5.0, poisson=0.4999, depth=0.015)
+PALM = slab(PRESETS["palm"], 0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
 TIMES = np.arange(4000) / 1e4
 LATE = slice(2500, 3800)  # the transient has died out, and the end has no effect yet

@@ -8,10 +8,10 @@ from scipy.special import j0
 from simple_model import MovingPressure, Tacton, Trajectory, flat_body, point_kernel
 from simple_model.compliance import half_space, slab, thin_sheet
 from simple_model.flat_body import point_response, steady_lines
+from simple_model.material import PRESETS, Material
 
 FOREARM = {"density": 1000, "shear_modulus": 7.86e3, "viscosity": 5.03}
-PALM = {"density": 1000, "shear_modulus": 25e3, "viscosity": 5.0}
-PAPER = thin_sheet(bending_stiffness=4e9 * 1e-12 / 12 / 0.91, mass_per_area=0.08, loss_factor=0.03)
+PAPER = thin_sheet(PRESETS["paper"], 1e-4)
 WIDTH = 4.35e-3
 RADII = np.array([0, 5, 10, 15, 20, 30]) * 1e-3
 
@@ -44,7 +44,7 @@ def test_deflection_is_greatest_when_the_focus_keeps_up_with_the_surface_wave():
         0.130,
         0.120,
     ]
-    body, radius = half_space(**FOREARM, poisson=0.5), 0.1 / 2 / np.pi
+    body, radius = half_space(Material(**FOREARM, poisson=0.49), poisson=0.5), 0.1 / 2 / np.pi
     peaks = []
     for speed in speeds:
         f, a = steady_lines(body, circling(2 * radius, speed), [[radius, 0.0]])
@@ -63,16 +63,16 @@ def test_the_paper_sheet_contradicts_that_f_am_is_always_highest():
 
 def test_a_deep_slab_is_a_half_space_and_a_shallow_one_is_stiffer():
     w = 2 * np.pi * np.array([60.0, 140.0, 300.0])
-    space = point_response(half_space(**FOREARM, poisson=0.49), RADII, w, WIDTH)
-    deep = point_response(slab(**FOREARM, poisson=0.49, depth=1.0), RADII, w, WIDTH)
+    space = point_response(half_space(Material(**FOREARM, poisson=0.49)), RADII, w, WIDTH)
+    deep = point_response(slab(Material(**FOREARM, poisson=0.49), 1.0), RADII, w, WIDTH)
     np.testing.assert_allclose(deep, space, rtol=1e-3, atol=1e-5 * abs(space).max())
-    rest = static(slab(**FOREARM, poisson=0.4999, depth=0.005), RADII)
-    assert rest[0] < 0.6 * static(half_space(**FOREARM, poisson=0.4999), [0.0])[0]
+    rest = static(slab(Material(**FOREARM, poisson=0.4999), 0.005), RADII)
+    assert rest[0] < 0.6 * static(half_space(Material(**FOREARM, poisson=0.4999)), [0.0])[0]
 
 
 @pytest.mark.parametrize(
     "body",
-    [half_space(**PALM, poisson=0.4999), slab(**PALM, poisson=0.4999, depth=0.015)],
+    [half_space(PRESETS["palm"]), slab(PRESETS["palm"], 0.015)],
     ids=["half-space", "slab"],
 )
 def test_a_transient_settles_into_the_steady_state(body):
@@ -89,7 +89,7 @@ def test_a_transient_settles_into_the_steady_state(body):
 
 def test_waves_arrive_when_they_can():
     """A step load moves a point at 40 mm only after the Rayleigh wave's travel time."""
-    body = half_space(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=0.5)
+    body = half_space(Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=0.5))
     times = np.arange(600) / 2e4
     load = MovingPressure(tacton=Tacton(duration=0.03))
     x = flat_body(body, load, [[0.04, 0.0]], times).displacement[:, 0]
@@ -128,9 +128,8 @@ def test_load_lines_add_up_to_the_load():
 )
 def test_every_wave_of_a_layer_is_on_its_side_of_the_path(poisson, depth, viscosity, frequency):
     """Compared with the integral along the real axis itself."""
-    layer = slab(
-        density=1000, shear_modulus=25e3, poisson=poisson, depth=depth, viscosity=viscosity
-    )
+    solid = Material(density=1000, shear_modulus=25e3, poisson=poisson, viscosity=viscosity)
+    layer = slab(solid, depth)
     w, width, r = np.array([2 * np.pi * frequency + 0j]), 4.35e-3, 0.02
 
     def integrand(k):
@@ -143,6 +142,6 @@ def test_every_wave_of_a_layer_is_on_its_side_of_the_path(poisson, depth, viscos
 
 
 def test_a_layer_that_loses_nothing_has_no_steady_state():
-    layer = slab(density=1000, shear_modulus=25e3, poisson=0.49, depth=0.015)
+    layer = slab(Material(density=1000, shear_modulus=25e3, poisson=0.49), 0.015)
     with pytest.raises(ArithmeticError, match="add some loss"):
         point_response(layer, [0.0], [2 * np.pi * 200.0], 4.35e-3)

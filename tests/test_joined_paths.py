@@ -21,6 +21,7 @@ from simple_model import (
 from simple_model.compliance import half_space
 from simple_model.joined import parted
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
+from simple_model.material import PRESETS
 from skinwave.models.speeds import period
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps, loads
@@ -35,7 +36,7 @@ STRAIGHT = (
 )
 WITH_ROUND = (Trajectory(shape="circle", size=0.020, centre=(-0.010, 0.0)), STRAIGHT[1])
 PULSES = Rhythm(pulses=((0.010, 0.006), (0.004, 0.013)), ramp=0.001)
-SKIN = half_space(density=1000.0, shear_modulus=25e3, poisson=0.45, viscosity=5.0)
+SKIN = half_space(replace(PRESETS["palm"], poisson=0.45))
 PLACES = np.array([[0.0, 0.0], [-0.015, 0.010], [0.020, 0.001], [0.004, -0.018]])
 
 

@@ -206,7 +206,11 @@ REACH = 0.016  # m of a focus, beyond which it is below a thousandth
 @settings(max_examples=6)
 @given(numbers(0.06, 0.09), frequencies, st.sampled_from(("half-space", "slab")))
 def test_no_wave_of_an_endless_body_arrives_before_it_can(distance, am, kind):
-    body = half_space(**SLOW) if kind == "half-space" else slab(**SLOW, depth=0.02)
+    body = (
+        half_space(fem.Material(**SLOW))
+        if kind == "half-space"
+        else slab(fem.Material(**SLOW), 0.02)
+    )
     load = MovingPressure(tacton=Tacton(am_frequency=am, duration=0.05))
     times = np.arange(500) / 1e4
     x = np.abs(flat_body(body, load, [[distance, 0.0]], times).displacement[:, 0])
@@ -275,7 +279,7 @@ def turned(distance, angles):
 def test_probes_around_a_circle_see_the_same_lines(tacton, distance, angle):
     load = MovingPressure(tacton=replace(tacton, am_frequency=0.0))
     probes = turned(distance, np.array([0.0, angle]))
-    _, waves = steady_lines(half_space(**SLOW), load, probes)
+    _, waves = steady_lines(half_space(fem.Material(**SLOW)), load, probes)
     spots = path_fourier(load.spot(probes, path_samples(load)).T)  # the point kernel's
     lines = load_lines(load)
     kernel = lines.coefficients * spots[:, lines.harmonics]

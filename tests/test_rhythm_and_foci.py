@@ -20,6 +20,7 @@ from simple_model import (
 from simple_model.compliance import half_space
 from simple_model.flat_body import flat_body
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
+from simple_model.material import PRESETS
 from skinwave import Body, Scene, simulate
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
@@ -241,7 +242,7 @@ def test_lines_and_time_steps_answer_the_same_load(name):
     assert error.max() < 2e-3 if "pulses" in name else error.max() < 1e-3
 
 
-SKIN = half_space(density=1000.0, shear_modulus=25e3, poisson=0.45, viscosity=5.0)
+SKIN = half_space(replace(PRESETS["palm"], poisson=0.45))
 
 
 def waves(**tacton):

@@ -313,13 +313,7 @@ def bending_equivalent(material: Material, ratio: float) -> Material:
 
     Bending stiffness goes with E d^3, mass per area with rho d. Valid for linear bending only.
     """
-    return replace(
-        material,
-        density=material.density * ratio,
-        shear_modulus=material.shear_modulus * ratio**3,
-        viscosity=material.viscosity * ratio**3,
-        relaxing_modulus=material.relaxing_modulus * ratio**3,
-    )
+    return replace(material.scaled(modulus=ratio**3), density=material.density * ratio)
 
 
 def has_exact_waves(body: Body) -> bool:
@@ -365,18 +359,9 @@ def compliance(body: Body) -> Compliance:
     """
     solid = body.solid
     if body.kind == "sheet":
-        return thin_sheet(
-            bending_stiffness=body.bending_stiffness,
-            mass_per_area=body.mass_per_area,
-            loss_factor=solid.loss_factor,
-            viscous_lag=solid.viscosity / solid.shear_modulus,
-            relaxing_share=solid.relaxing_modulus / solid.shear_modulus,
-            relaxation_time=solid.relaxation_time,
-            air_density=AIR_DENSITY if body.air else 0.0,
-        )
+        return thin_sheet(solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0)
     if body.kind not in ("sheet", "slab") or (body.base != "clamped" and isfinite(body.depth)):
         raise ValueError(
             "flat-body is for a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
         )
-    values = vars(solid)
-    return slab(**values, depth=body.depth) if isfinite(body.depth) else half_space(**values)
+    return slab(solid, body.depth) if isfinite(body.depth) else half_space(solid)

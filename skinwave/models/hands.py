@@ -121,7 +121,7 @@ def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
     """Unrelaxed (fast) shear modulus over the mean thickness, N/m3."""
     _, normals = facet_geometry(mesh, boundary_facets(mesh.tets))
     thickness = corner_volumes(mesh.points, mesh.tets).sum() / np.maximum(normals[..., 2], 0).sum()
-    return float((body.solid.shear_modulus + body.solid.relaxing_modulus) / thickness)
+    return float((body.solid.shear_modulus + body.solid.fast_modulus) / thickness)
 
 
 def _check_regions(file: str, mesh: TetMesh) -> None:

@@ -44,7 +44,7 @@ FEWEST_MODES, MOST_MODES = 40, 160
 
 
 def sheet_only(body: Body, model: str) -> None:
-    """Refuse a body that is no sheet with clamped edges, or of a material with a Maxwell branch.
+    """Refuse a body that is no sheet with clamped edges, or of a material with Prony terms.
 
     Raises
     ------
@@ -56,10 +56,10 @@ def sheet_only(body: Body, model: str) -> None:
             f"{model} is for a sheet with clamped sides, not a {body.kind} with {body.sides} "
             "sides; give it one, or use --model fem"
         )
-    if body.solid.relaxing_modulus:
+    if body.solid.prony:
         raise ValueError(
-            f"{model} has no Maxwell branches, and this material's relaxing_modulus is "
-            f"{body.solid.relaxing_modulus:g} Pa; leave it out, or use --model fem, fem-harmonic "
+            f"{model} has no Maxwell branches, and this material's Prony terms have moduli of "
+            f"{body.solid.fast_modulus:g} Pa; leave them out, or use --model fem, fem-harmonic "
             "or fem-transient"
         )
     if body.placement.is_tilted:

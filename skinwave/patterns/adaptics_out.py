@@ -29,7 +29,9 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     tacton, notes = scene.tacton, []
     _refuse(tacton)
     if tacton.am_frequency:
-        if scene.pressure.drive != "pressure_squared" or scene.pressure.depth_of_modulation != 1:
+        M = np.linspace(-1, 1, 9)  # the sound's amplitude goes from 0 to 1 there
+        sound = scene.pressure.law(1.0, M, scene.pressure.depth_of_modulation)
+        if not np.allclose(sound, ((1 + M) / 2) ** 2):
             raise ValueError(
                 f"the engine modulates sound pressure fully, not by drive "
                 f"'{scene.pressure.drive}' with depth {scene.pressure.depth_of_modulation:g}; take "

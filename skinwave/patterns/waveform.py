@@ -93,8 +93,8 @@ def _one_role(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
 def _with_levels(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
     """Samples (t,) of levels of a recorded path and of the modulation, and notes.
 
-    They are read onto another path, so that both must be in them: as the modulation of a linear
-    drive, which is a product, or as the level that gives the same pressure without modulation.
+    They are read onto another path, so that both must be in them: as the level that gives the same
+    pressure without modulation or, where pressure has a sign, as a modulation that is a product.
     """
     tacton, pressure = scene.tacton, scene.pressure
     path = tacton.trajectory
@@ -102,11 +102,13 @@ def _with_levels(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
     notes = ["levels of the first focus"] if len(tacton.foci) > 1 else []
     notes.append("amplitude stays with the scene, but a recorded path has levels of its own: "
                  "to be read onto another path")  # fmt: skip
-    if _is_modulated(scene) and pressure.drive == "linear":
-        return levels * modulation(tacton, t), notes
     if _is_modulated(scene):
-        depth = pressure.depth_of_modulation
-        levels = levels * (1 + depth * modulation(tacton, t)) / (1 + depth)
+        law, depth, full = pressure.law, pressure.depth_of_modulation, tacton.amplitude or 1.0
+        shown = modulation(tacton, t)
+        driven = law(full * levels, shown, depth)
+        if law.is_signed and np.allclose(law(full, levels * shown, depth), driven):
+            return levels * shown, notes
+        levels = law.amplitude(driven, depth) / full
         notes.append("the modulation is in these levels, and must not be in that scene")
     return levels, [*notes, "to be read back with --role envelope"]
 

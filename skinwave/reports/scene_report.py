@@ -145,7 +145,7 @@ def _asked(album: Album) -> str:
 def _asked_rows(scene: Scene) -> list[list[str]]:
     tacton, pressure, body = scene.tacton, scene.pressure, scene.body
     depth = pressure.depth_of_modulation
-    of_depth = f", depth of modulation {depth:g}" if pressure.drive != "linear" else ""
+    of_depth = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
     return [
         ["focus", path_of(tacton)],
         ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],

@@ -7,11 +7,13 @@ nothing propagates. Each name in `ASSUMPTIONS` turns one of these off.
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from fem.materials import PRESETS, Material
-from simple_model import Trajectory
+from simple_model import MovingPressure, Trajectory
+from simple_model.drive import PUBLISHED, beyond_published
+from simple_model.material import PRESETS, Material, PronyTerm
 from skinwave.planning.estimates import response_spectrum
 from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
 
@@ -33,7 +35,7 @@ ASSUMPTIONS = {
 ELEMENTS = {"endless", "continuous path", "one material", "flat", "small deflection"}
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LOSS_LEFT = 0.1  # of the material's own: an undamped resonance is unbounded
-RELAXATION_TIME = PRESETS["palm-zener"].relaxation_time
+RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
 LEAST_LASTING = 0.5  # long-term share of a modulus, at the least, where part of it is made to relax
 LAYERS = (
     Layer(thickness=0.3e-3, material="epidermis"),
@@ -56,7 +58,7 @@ def ladder(scene: Scene) -> tuple[str, ...]:
     sheet, slab, solid = body.kind == "sheet", body.kind == "slab", body.solid
     kept = {
         "little loss": slab and solid.has_loss,
-        "viscous loss": slab and solid.relaxing_modulus > 0,
+        "viscous loss": slab and solid.fast_modulus > 0,
         "vacuum": sheet,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
@@ -110,11 +112,11 @@ def relaxed(
     update_rate, points : of the device that draws the path, as `held` takes them
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
-    own = scene.pressure.drive if scene.pressure.drive != "linear" else "pressure_squared"
+    own = beyond_published(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(
         scene.pressure,
         focus="array" if "main lobe only" in dropped else spot,
-        drive=own if "linear drive" in dropped else "linear",
+        drive=own if "linear drive" in dropped else PUBLISHED,
     )
     if "continuous path" in dropped:
         path = held(scene.tacton.trajectory, update_rate, points)
@@ -223,30 +225,23 @@ def as_one(layers: Sequence[Layer]) -> Layer:
         parts = zip(layers, solids, strict=True)
         return sum(layer.thickness * getattr(solid, name) for layer, solid in parts) / thickness
 
-    names = ("density", "shear_modulus", "viscosity", "loss_factor", "relaxing_modulus")
-    slow = sum(
-        layer.thickness * solid.relaxing_modulus * solid.relaxation_time
-        for layer, solid in zip(layers, solids, strict=True)
+    names = ("density", "shear_modulus", "viscosity", "loss_factor")
+    moduli: dict[float, float] = {}
+    for layer, solid in zip(layers, solids, strict=True):
+        for term in solid.prony:
+            time = float(f"{term.time:.9g}")  # times that differ by round-off are one
+            moduli[time] = moduli.get(time, 0.0) + layer.thickness / thickness * term.modulus
+    prony = tuple(PronyTerm(modulus=modulus, time=time) for time, modulus in moduli.items())
+    means: dict[str, Any] = {name: mean(name) for name in names}
+    return Layer(
+        thickness=thickness, material=Material(poisson=solids[0].poisson, prony=prony, **means)
     )
-    means = {name: mean(name) for name in names}
-    time = slow / thickness / means["relaxing_modulus"] if slow else 0.0
-    material = replace(solids[0], **means, relaxation_time=time)
-    return Layer(thickness=thickness, material=material)
 
 
 def with_little_loss(solid: Material, w: float) -> Material:
     """A tenth of the damping, and the same storage modulus at w in rad/s."""
-    turned = (w * solid.relaxation_time) ** 2
-    stiffer = (1 - LOSS_LEFT) * solid.relaxing_modulus * turned / (1 + turned)
-    return _of_modulus(
-        replace(
-            solid,
-            viscosity=LOSS_LEFT * solid.viscosity,
-            loss_factor=LOSS_LEFT * solid.loss_factor,
-            relaxing_modulus=LOSS_LEFT * solid.relaxing_modulus,
-        ),
-        solid.shear_modulus + stiffer,
-    )
+    stiffer = (1 - LOSS_LEFT) * float(solid.relaxing_modulus(w).real)
+    return _of_modulus(solid.scaled(loss=LOSS_LEFT), solid.shear_modulus + stiffer)
 
 
 def _of_modulus(solid: Material, shear_modulus: float) -> Material:
@@ -262,28 +257,26 @@ def as_relaxing(solid: Material, w: float) -> Material:
     the long-term modulus would otherwise fall below half of the static one.
     """
     loss = w * solid.viscosity
-    if not loss or solid.relaxing_modulus:  # nothing to fit, or fitted already
+    if not loss or solid.fast_modulus:  # nothing to fit, or fitted already
         return solid
     time = min(RELAXATION_TIME, (1 - LEAST_LASTING) * solid.shear_modulus / loss / w)
     turned = w * time
     return replace(
         _of_modulus(solid, solid.shear_modulus - loss * turned),
         viscosity=0.0,
-        relaxing_modulus=loss * (1 + turned**2) / turned,
-        relaxation_time=time,
+        prony=(PronyTerm(modulus=loss * (1 + turned**2) / turned, time=time),),
     )
 
 
 def as_viscous(solid: Material, w: float) -> Material:
-    """Kelvin-Voigt solid with the complex modulus at w in rad/s of a standard linear solid."""
-    if not w or not solid.relaxing_modulus:
+    """Kelvin-Voigt solid with the complex modulus at w in rad/s of a generalised Maxwell solid."""
+    if not w or not solid.fast_modulus:
         return solid
-    turned = 1j * w * solid.relaxation_time
-    relaxing = solid.relaxing_modulus * turned / (1 + turned)
+    relaxing = complex(solid.relaxing_modulus(w))
     return replace(
         _of_modulus(solid, solid.shear_modulus + relaxing.real),
         viscosity=solid.viscosity + relaxing.imag / w,
-        relaxing_modulus=0.0,
+        prony=(),
     )
 
 

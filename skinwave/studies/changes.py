@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.materials import Material
 from meshes import cache
 from simple_model.response import SETTLE
 from skinwave.effort import versions
@@ -148,17 +147,11 @@ def _shares(scene: Scene) -> tuple[float, float] | None:
     solid = scene.body.solid
     varied = [
         solid,
-        *(_scaled(solid, k, ("shear_modulus", "viscosity", "relaxing_modulus"))
-          for k in (1 / STIFFER, STIFFER)),
-        *(_scaled(solid, k, ("viscosity", "loss_factor", "relaxing_modulus"))
-          for k in (1 / LOSSIER, LOSSIER)),
-    ]  # fmt: skip
+        *(solid.scaled(modulus=k) for k in (1 / STIFFER, STIFFER)),
+        *(solid.scaled(loss=k) for k in (1 / LOSSIER, LOSSIER)),
+    ]
     x, y = grid(scene)
     kernel = kernel_map(scene.pressure, x, y).rms
     bodies = [replace(scene, body=replace(scene.body, material=each)) for each in varied]
     found = [share_outside(kernel, body_map(each, x, y).rms) for each in bodies]
     return min(found), max(found)
-
-
-def _scaled(solid: Material, factor: float, names: Sequence[str]) -> Material:
-    return replace(solid, **{name: factor * getattr(solid, name) for name in names})

@@ -33,11 +33,6 @@ SPOTS = {
     "main_lobe": "a focus S = sinc^2(D/D0)",
     "array": "the array's whole field",
 }
-SQUARED = (
-    "Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law, not from propagation: "
-    "pressure_squared, because a device that modulates its sound pressure pushes with the square "
-    "of it. The point kernel under the same load has them, too."
-)
 UNCERTAIN = (
     "The pressure at the focus is uncertain by a factor of 2, and all displacements with it."
 )
@@ -50,8 +45,8 @@ def modelled(runs: Iterable[Run]) -> list[str]:
         groups.setdefault((run.body, run.model), []).append(run)
     paragraphs = [_answered(group) for group in groups.values()]
     on_bodies = [run for group in groups.values() for run in group if run.response.unit == "m"]
-    if any(run.is_am and run.scene.pressure.drive == "pressure_squared" for run in on_bodies):
-        paragraphs.append(SQUARED)
+    notes = [run.scene.pressure.law.note for run in on_bodies if run.is_am]
+    paragraphs += [note for note in dict.fromkeys(notes) if note]
     return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
 
 
@@ -171,11 +166,13 @@ def _material(solid: Material) -> str:
     )
     if solid.loss_factor:
         text += f", loss factor {solid.loss_factor:g}"
-    if solid.relaxing_modulus:
+    for term in solid.prony:
         text += (
-            f", a Maxwell branch of {solid.relaxing_modulus / 1e3:.4g} kPa with relaxation time "
-            f"{1e3 * solid.relaxation_time:g} ms"
+            f", a Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
+            f"{1e3 * term.time:g} ms"
         )
+    if solid.law is not None:
+        text += ", and a complex modulus of its own"
     return text
 
 

@@ -15,7 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from simple_model import Response, lines, resolved_lines
+from simple_model import MovingPressure, Response, lines, resolved_lines
+from simple_model.drive import beyond_published
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
 from skinwave.models.bodies import default_size
@@ -205,7 +206,7 @@ def followed_lines(scene: Scene, response: Response) -> dict[str, float]:
     """Names and frequencies in Hz of the lines that are followed, as far as a response resolves
     them: those of a drive that is not linear, which has all that a linear one has.
     """
-    drive = scene.pressure.drive if scene.pressure.drive != "linear" else "pressure_squared"
+    drive = beyond_published(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(scene.pressure, drive=drive)
     return resolved_lines(pressure, response, candidates=JUDGED, highest=HIGHEST)[0]
 

@@ -11,7 +11,7 @@ from fem.added_mass import near_field
 from simple_model.compliance import AIR_DENSITY, thin_sheet
 from simple_model.flat_body import point_response
 from skinwave.verify.case import Case, Plot, described, misfit, order, relative
-from skinwave.verify.exact import PAPER
+from skinwave.verify.exact import PAPER, THICKNESS
 from skinwave.verify.references import Complex, Floats
 from skinwave.verify.statics import WIDTH
 
@@ -117,7 +117,10 @@ def focus_on_a_sheet_in_air() -> Case:
 
 
 def _endless(radii: Floats, hz: Floats, density: float) -> Complex:
-    sheet = thin_sheet(**PAPER, viscous_lag=LAG, air_density=density)
+    paper = replace(fem.PRESETS["paper"], loss_factor=0.0)
+    sheet = thin_sheet(
+        replace(paper, viscosity=LAG * paper.shear_modulus), THICKNESS, air_density=density
+    )
     return point_response(sheet, radii, 2 * np.pi * hz, WIDTH)
 
 

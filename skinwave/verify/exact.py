@@ -1,6 +1,7 @@
 """Wavenumber integrals against closed forms, and finite elements against wavenumber integrals."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +22,8 @@ from skinwave.verify.waves import FOREARM
 Kernel = Callable[[Floats], Complex]
 RADII = np.array([0, 5, 10, 15, 20, 30]) * 1e-3
 FREQUENCIES = np.array([20.0, 80.0, 140.0, 191.0, 210.0])  # Hz
+SKIN = fem.Material(**FOREARM, poisson=0.49)
+THICKNESS = 1e-4  # m, of paper
 PAPER = {"bending_stiffness": 4e9 * 1e-12 / 12 / 0.91, "mass_per_area": 0.08}
 CIRCLES = ((0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # diameter in m and speed in m/s
 HANKEL = "Hankel's integral on the real axis: Sneddon, Fourier Transforms (1951)"
@@ -30,15 +33,14 @@ def exact_half_space() -> Case:
     """A half-space under a focus at rest and in vibration."""
     poissons = (0.0, 0.3, 0.49, 0.5)
     rest = [
-        abs(point_response(half_space(**FOREARM, poisson=nu), RADII, [0.0], WIDTH)[0])
-        for nu in poissons
+        abs(point_response(half_space(SKIN, poisson=nu), RADII, [0.0], WIDTH)[0]) for nu in poissons
     ]
     closed = [
         references.gaussian_at_rest(RADII, width=WIDTH, shear_modulus=7.86e3, poisson=nu)
         for nu in poissons
     ]
     w = 2 * np.pi * FREQUENCIES
-    found = point_response(half_space(**FOREARM, poisson=0.5), RADII, w, WIDTH)
+    found = point_response(half_space(SKIN, poisson=0.5), RADII, w, WIDTH)
     exact = np.array([_half_space(hz, RADII) for hz in FREQUENCIES])
     return Case(
         title="Wavenumber integral (flat-body): a focus on a half-space",
@@ -56,7 +58,7 @@ def exact_half_space() -> Case:
 def exact_sheet() -> Case:
     """A focus on an infinite paper sheet, with the added mass of air."""
     w = 2 * np.pi * FREQUENCIES[1:]
-    found = point_response(thin_sheet(**PAPER, loss_factor=0.03), RADII, w, WIDTH)
+    found = point_response(thin_sheet(fem.PRESETS["paper"], THICKNESS), RADII, w, WIDTH)
     exact = np.array(
         [references.gaussian_response(_paper(hz), RADII, width=WIDTH) for hz in FREQUENCIES[1:]]
     )
@@ -75,20 +77,21 @@ def exact_slab() -> Case:
     """A bonded layer: at rest, very deep, and at its thickness resonance."""
     checks = []
     for poisson, depth in ((0.3, 0.005), (0.45, 0.015), (0.4999, 0.015)):
-        body = slab(density=1000, shear_modulus=25e3, poisson=poisson, depth=depth)
+        body = slab(fem.Material(density=1000, shear_modulus=25e3, poisson=poisson), depth)
         found = 1e6 * point_response(body, RADII, [0.0], WIDTH)[0].real
         layer = {"width": WIDTH, "shear_modulus": 25e3, "poisson": poisson, "depth": depth}
         exact = 1e6 * references.gaussian_on_bonded_layer(RADII, **layer)
         name = f"at rest, depth {1e3 * depth:g} mm, nu = {poisson:g}, relative L2"
         checks.append(misfit(name, found, exact, 1e-3, "um"))
     w = 2 * np.pi * FREQUENCIES
-    deep = point_response(slab(**FOREARM, poisson=0.5 - 1e-9, depth=1.0), RADII, w, WIDTH)
+    deep = point_response(slab(replace(SKIN, poisson=0.5 - 1e-9), 1.0), RADII, w, WIDTH)
     space = np.array([_half_space(hz, RADII) for hz in FREQUENCIES])
     checks.append(
         misfit("1 m deep, 20 to 210 Hz, relative L2", 1e6 * deep, 1e6 * space, 1e-3, "um")
     )
     hz = np.linspace(60, 120, 6001)
-    column = slab(density=1000, shear_modulus=25e3, poisson=0.0, depth=0.02, loss_factor=0.01)
+    solid = fem.Material(density=1000, shear_modulus=25e3, poisson=0.0, loss_factor=0.01)
+    column = slab(solid, 0.02)
     g = np.abs(
         column(np.array([1e-3 + 0j]), np.asarray(2 * np.pi * hz[:, None], np.complex128))[:, 0]
     )
@@ -107,8 +110,8 @@ def exact_circles() -> Case:
     """Harmonics of a circling focus, on the path and in its centre."""
     checks = []
     for name, body, kernel in (
-        ("half-space", half_space(**FOREARM, poisson=0.5), _space),
-        ("paper", thin_sheet(**PAPER, loss_factor=0.03), _paper),
+        ("half-space", half_space(SKIN, poisson=0.5), _space),
+        ("paper", thin_sheet(fem.PRESETS["paper"], THICKNESS), _paper),
     ):
         for size, speed in CIRCLES:
             load = circling(size, speed)
@@ -135,12 +138,11 @@ def exact_circles() -> Case:
     )
 
 
-def circling_on_skin(law: Mapping[str, float] = FOREARM, name: str = "skin") -> Case:
+def circling_on_skin(solid: fem.Material = SKIN, name: str = "skin") -> Case:
     """AM and circling focus on a bonded layer, of forearm unless another law is given."""
     depth = 0.010
     across = meshes.graded_axis(0.07, 0.0025, meshes.Grading(radius=0.02, growth=1.3))
     mesh = meshes.extrude(across, across, np.linspace(-depth, 0, 5))
-    solid = fem.Material(**law, poisson=0.49)
     load = circling(0.02, 12.0, am=140.0)
     return _beside_exact_waves(
         f"Circling focus on {name}: finite elements against the wavenumber integral",
@@ -148,7 +150,7 @@ def circling_on_skin(law: Mapping[str, float] = FOREARM, name: str = "skin") -> 
         "4; verified by the cases on flat-body",
         "sides fixed at 70 mm, where the response is below a hundredth of that at the focus",
         mesh, solid, {"right": "xyz", "back": "xyz", "bottom": "xyz"},
-        slab(**law, poisson=0.49, depth=depth), load, 0.02,
+        slab(solid, depth), load, 0.02,
     )  # fmt: skip
 
 
@@ -170,7 +172,7 @@ def circling_on_paper() -> Case:
         "flat-body",
         "free edges at 250 mm; loss factor 0.7 at 190 Hz, so that they reflect nothing",
         mesh, solid, {},
-        thin_sheet(**PAPER, viscous_lag=lag, air_density=0.0), circling(0.02, 12.0), 0.02,
+        thin_sheet(solid, thickness, air_density=0.0), circling(0.02, 12.0), 0.02,
     )  # fmt: skip
 
 

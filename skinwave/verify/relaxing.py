@@ -16,9 +16,10 @@ from skinwave.verify.statics import WIDTH, column, layered_column_mesh
 from skinwave.verify.stepping import oscillator
 
 ZENER = "standard linear solid: Zener, Elasticity and Anelasticity of Metals (1948)"
-SKIN = {
-    "density": 1000.0, "shear_modulus": 7.86e3, "relaxing_modulus": 10e3, "relaxation_time": 1e-3,
-}  # fmt: skip
+SKIN = fem.Material(
+    density=1000.0, shear_modulus=7.86e3, poisson=0.49,
+    prony=(fem.PronyTerm(modulus=10e3, time=1e-3),),
+)  # fmt: skip
 MODULUS, TIME = 0.8, 0.7  # of the oscillator's Maxwell branch: stiffness and relaxation time
 
 
@@ -30,8 +31,8 @@ def column_that_relaxes() -> Case:
     checks = []
     for time in (1e-7, 1e-4, 0.5e-3, 3e-3, 1e3):
         solid = fem.Material(
-            density=1000.0, shear_modulus=mu, poisson=0.0, relaxing_modulus=relaxing,
-            relaxation_time=time,
+            density=1000.0, shear_modulus=mu, poisson=0.0,
+            prony=(fem.PronyTerm(modulus=relaxing, time=time),),
         )  # fmt: skip
         ops, force, read = column(mesh, {0: solid})
         found = fem.harmonic(ops, force, hz) @ read
@@ -72,9 +73,9 @@ def half_space_that_relaxes() -> Case:
     """Wavenumber integral of a half-space under a vibrating focus."""
     hz = np.array([20.0, 80.0, 140.0, 210.0])
     w = 2 * np.pi * hz
-    found = point_response(half_space(**SKIN, poisson=0.5), RADII, w, WIDTH)
-    turned = 1j * w * SKIN["relaxation_time"]
-    moduli = SKIN["shear_modulus"] + SKIN["relaxing_modulus"] * turned / (1 + turned)
+    found = point_response(half_space(SKIN, poisson=0.5), RADII, w, WIDTH)
+    turned = 1j * w * 1e-3
+    moduli = 7.86e3 + 10e3 * turned / (1 + turned)
     exact = [
         references.gaussian_response(
             partial(references.half_space_kernel, w=a, density=1000, mu=mu, poisson=0.5),

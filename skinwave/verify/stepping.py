@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -15,7 +16,7 @@ from skinwave.verify.references import Floats
 from skinwave.verify.statics import column, layered_column_mesh
 
 CHUNG = "Chung and Hulbert, J Appl Mech 60:371 (1993)"
-SKIN = {"density": 1000.0, "shear_modulus": 25e3, "poisson": 0.4999}
+SKIN: dict[str, Any] = {"density": 1000.0, "shear_modulus": 25e3, "poisson": 0.4999}
 
 
 def oscillator(damping: float = 0.0) -> fem.Operators:

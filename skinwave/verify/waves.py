@@ -1,6 +1,7 @@
 """Waves: half-space, surface, plate; and the absorbing (viscous) boundary."""
 
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from skinwave.verify.case import Case, Check, Plot, below, described, largest, m
 from skinwave.verify.references import Floats
 from skinwave.verify.statics import QUARTER, RADII, WIDTH, focus_force, on_axis, quarter_space
 
-FOREARM = {"density": 1000.0, "shear_modulus": 7.86e3, "viscosity": 5.03}
+FOREARM: dict[str, Any] = {"density": 1000.0, "shear_modulus": 7.86e3, "viscosity": 5.03}
 ACHENBACH = "Achenbach, Wave Propagation in Elastic Solids (1973)"
 LYSMER = "Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969)"
 

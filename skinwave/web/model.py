@@ -21,10 +21,8 @@ from simple_model import (
     sensation_level,
     spectrum,
 )
-from simple_model.drive import DRIVES
 from simple_model.focus import lobe_width
 from simple_model.joined import parted
-from simple_model.line_names import level_factor
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.tacton import CARRIER, level, tones
 from skinwave.run import JUDGED, is_skin
@@ -175,7 +173,7 @@ def mean_level(pressure: MovingPressure) -> float:
     if rhythm is None:
         return 1.0
     level = rhythm.level((np.arange(LEVELS) + 0.5) / LEVELS * rhythm.period)
-    return float(level_factor(pressure, level).mean())
+    return float(pressure.law.level_factor(level, pressure.depth_of_modulation).mean())
 
 
 def at_any_speed(path: Trajectory) -> Trajectory:
@@ -256,13 +254,13 @@ def commanded_curve(pressure: MovingPressure, start: float, end: float) -> Comma
 def sound_amplitude(pressure: MovingPressure, t: Floats) -> Floats:
     """Amplitude (...) of the sound at a focus at times (...) in s, as a share of full drive.
 
-    Its square is what pushes, so that it is the root of what the drive law makes; but for the
-    linear law, by which, as published, the skin feels the signal itself, with its sign.
+    Its square is what pushes, so that it is the root of what the drive law makes; but for a
+    law with a sign, by which, as published, the skin feels the signal itself, with its sign.
     """
     tacton = pressure.tacton
     shown, envelope = modulation(tacton, t), tacton.amplitude * level(tacton, t)
-    driven = DRIVES[pressure.drive](envelope, shown, pressure.depth_of_modulation)
-    return np.asarray(driven if pressure.drive == "linear" else np.sqrt(driven))
+    driven = pressure.law(envelope, shown, pressure.depth_of_modulation)
+    return driven if pressure.law.is_signed else np.sqrt(driven)
 
 
 def thinned(x: Floats, y: Floats, most: int = MOST_SHOWN) -> tuple[Floats, Floats]:

@@ -6,6 +6,7 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 from trame_client.widgets.core import HtmlElement
 
+from simple_model.drive import DRIVES
 from skinwave.web import drawings
 from skinwave.web.controls import CHOICES, NUMBERS
 from skinwave.web.fields import choice, heading, number
@@ -14,11 +15,6 @@ from skinwave.web.session import Session
 from skinwave.web.space import in_space
 from skinwave.web.timeline import rhythm
 
-DRIVES = {
-    "linear": "linear: the signal itself, as published",
-    "pressure_squared": "pressure squared: usual AM",
-    "force_corrected": "force corrected: square root first",
-}
 PROFILES = {
     "gaussian": "Gaussian, of the half width and force of the array's",
     "main_lobe": "main lobe (sinc²), as published",
@@ -69,7 +65,9 @@ def control_panel(session: Session) -> None:
         in_space(session)
         heading("On the skin")
         number(session, "height")
-        choice("drive", "Drive law", [{"title": DRIVES[d], "value": d} for d in CHOICES["drive"]])
+        choice("drive", "Drive law",
+               [{"title": f"{name.replace('_', ' ')}: {law.words}", "value": name}
+                for name, law in DRIVES.items()])  # fmt: skip
         choice("profile", "Focus profile",
                [{"title": PROFILES[p], "value": p} for p in CHOICES["profile"]])  # fmt: skip
         v3.VCheckbox(v_model=("published", False), density="compact", hide_details=True,

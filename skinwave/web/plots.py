@@ -77,7 +77,7 @@ def commanded_plot(pressure: MovingPressure, start: float, end: float) -> Plot:
         shown = "largest and least amplitude; zoom in to see it"
         least = numbers(100 * found.least)
         data.append(curve | {"name": "least", "y": least, "mirrored": True, "role": "published"})
-    law = pressure.drive.replace("_", " ")
+    law = pressure.law.name.replace("_", " ")
     return {
         "title": f"Commanded signal, {law}, {shown}", "data": data,
         "x": {"said": "time, ms", "range": [1e3 * max(0.0, start),

@@ -95,8 +95,9 @@ def values_of(scene: Scene) -> Values:
         "a superposition that is none of the five": ratio is None,
         f"a peak_pressure_pa of {pressure.peak_pressure:g}": pressure.peak_pressure
         != MovingPressure.peak_pressure,
-        f"a depth_of_modulation of {pressure.depth_of_modulation:g}": pressure.drive != "linear"
+        f"a depth_of_modulation of {pressure.depth_of_modulation:g}": pressure.law.uses_depth
         and pressure.depth_of_modulation != MovingPressure.depth_of_modulation,
+        f"drive law '{pressure.law}'": pressure.drive not in CHOICES["drive"],
         f"profile = {pressure.focus} of the focus": pressure.focus not in CHOICES["profile"],
     }  # fmt: skip
     if said := [what for what, holds in beyond.items() if holds]:
