@@ -13,9 +13,9 @@ import meshes
 import skinwave
 from fem import linear_solver
 from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.bodies.build import build as build_body
+from skinwave.bodies.build import operators
 from skinwave.fields import field
-from skinwave.models.bodies import build as build_body
-from skinwave.models.bodies import operators
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.simulation import compute

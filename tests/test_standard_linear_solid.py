@@ -13,7 +13,7 @@ from meshes import cache
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import complex_modulus, half_space, slab, thin_sheet
 from skinwave import scene_file
-from skinwave.models.bodies import compliance
+from skinwave.bodies.analytic import compliance
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.simulation import compute

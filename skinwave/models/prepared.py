@@ -12,9 +12,12 @@ from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_reach, spot_width
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
 from simple_model.sampling import shown
+from skinwave.bodies.build import Build
+from skinwave.bodies.sheet import air
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
-from skinwave.models.bodies import Build, air, default_size, surface_load, surface_motion
 from skinwave.models.full import assembled, energy_balance, meshed
+from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import SAMPLE_RATE, Body, Scene
 
 BAND = 1000.0  # Hz up to which the reduced model must meet its tolerance

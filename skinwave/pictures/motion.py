@@ -13,9 +13,11 @@ from meshes import TetMesh, cache, part
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import path_samples
+from skinwave.bodies.sheet import air
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, silent, versions
-from skinwave.models.bodies import air, default_size, surface_load
 from skinwave.models.full import assembled, energy_balance, meshed
+from skinwave.models.loads import surface_load
 from skinwave.models.prepared import BAND, reduced_lines, sample_times
 from skinwave.scene import Scene
 from skinwave.simulation import check_knobs

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model import Response
-from skinwave.models.bodies import check_mesh, default_size
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
@@ -67,7 +67,7 @@ def told(
     body, size = scene.body, h or default_size(scene.body)
     other, coarse = compared or coarser_body(scene, h, tolerance, solver)
     if coarse.effort.dofs == response.effort.dofs:  # one mesh: all there is, or the file's own
-        error = np.nan if body.kind == "mesh" else 1.0
+        error = np.nan if body.file else 1.0
     else:
         found = quantity_of_interest(coarse, scene, answer(coarse, scene))
         error = richardson_error(found, fine, coarser_by(body, other, size))

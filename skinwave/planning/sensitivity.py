@@ -11,7 +11,7 @@ import numpy as np
 
 import fem
 from meshes.tetmesh import Floats
-from skinwave.models.bodies import coarsest_size, default_size
+from skinwave.bodies.sizes import coarsest_size, default_size
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene

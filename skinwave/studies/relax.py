@@ -16,9 +16,9 @@ from itertools import pairwise
 import numpy as np
 
 from simple_model import Response, lines, resolved_lines
+from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, apart, peak_memory
-from skinwave.models.bodies import default_size
 from skinwave.planning.assessment import sentences
 from skinwave.run import JUDGED
 from skinwave.scene import Scene
@@ -169,7 +169,7 @@ def _answered(
 
 
 def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, int]:
-    if scene.body.kind != "palm":  # a palm is meshed once per machine
+    if not scene.body.of_kind.mesh_is_cached:
         os.environ["SKINWAVE_CACHE"] = ""
     started = time.perf_counter()
     response = compute(scene, model, h=h)
