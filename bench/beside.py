@@ -23,7 +23,7 @@ from bench import codes
 from bench.child import march
 from bench.codes import CODES
 from bench.problem import Problem
-from skinwave.models.bodies import build
+from skinwave.bodies.build import build
 from skinwave.models.prepared import answer, prepare, sample_times
 from skinwave.scene import PROBES, Body, Scene
 from skinwave.studies import paper15

@@ -9,8 +9,8 @@ import numpy as np
 
 import fem
 from simple_model import point_kernel
+from skinwave.bodies.build import build
 from skinwave.effort import Clock, peak_memory, silent
-from skinwave.models.bodies import build
 from skinwave.models.full import TRANSIENT_RATE, assembled, meshed
 from skinwave.models.prepared import answer, prepare
 from skinwave.scene import PROBES, Body

@@ -16,7 +16,7 @@ import numpy as np
 from fem import Material
 from fem.materials import from_young
 from simple_model import MovingPressure, Response, Tacton, Trajectory
-from skinwave.models.bodies import default_size
+from skinwave.bodies.sizes import default_size
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import plan
 from skinwave.scene import Body, Scene
@@ -103,7 +103,7 @@ def judge(seed: int) -> tuple[bool, bool, bool]:
     wrong = error(planned, reference)
     good = []
     candidates = [("point-kernel", {}), *(("fem", {"h": h * rung}) for rung in RUNGS)]
-    if body.kind == "slab":
+    if body.of_kind.is_layer:
         candidates[1:1] = [("flat-body-harmonic", {}), ("flat-body", {})]
     for other, knobs in candidates:
         found, cost = timed(asked, other, **knobs)

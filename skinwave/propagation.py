@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import sensation_level
 from skinwave.comparison import heard_phasors, phase_delays
 from skinwave.pictures.views import path_points
-from skinwave.run import Run, is_skin
+from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.surface import SurfaceMap
 
@@ -111,7 +111,7 @@ def propagation(
             "share": share_outside(kernel_surface.rms, surface.rms),
             "spread": reach_of(surface.rms >= _level(surface.rms, NEAR), away),
             "kernel_spread": reach_of(kernel_surface.rms >= _level(kernel_surface.rms, NEAR), away),
-            "felt": _felt(surface, away) if is_skin(run.scene.body) else (),
+            "felt": _felt(surface, away) if run.scene.body.is_skin else (),
         }
     )
 

@@ -6,18 +6,13 @@ from functools import cached_property
 from meshes.tetmesh import Floats
 from simple_model import LineTable, Response, Unnamed, line_table
 from simple_model.line_names import SAME, line_frequency
-from skinwave.scene import Body, Scene
+from skinwave.scene import Scene
 
 # Lines that claims are about, of one focus, whether or not the load has them.
 JUDGED = (
     "f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM", "f_d", "2f_d", "3f_d",
     "f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM",
 )  # fmt: skip
-
-
-def is_skin(body: Body) -> bool:
-    """Whether a body is skin: a sheet is paper."""
-    return body.kind not in ("none", "sheet")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +81,7 @@ class Run:
     @property
     def is_skin(self) -> bool:
         """Whether it is skin that moves, of which alone thresholds of detection are known."""
-        return self.response.unit == "m" and is_skin(self.scene.body)
+        return self.response.unit == "m" and self.scene.body.is_skin
 
     @property
     def is_am(self) -> bool:

@@ -10,10 +10,9 @@ import tomli_w
 
 from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.choices import choose
 from simple_model.trajectory import BY_POINTS
-from skinwave.scene import BODIES, KINDS, Body, Placement, Scene
-from skinwave.scene_keys import ONLY_OF, PATH, SECTIONS, as_table, as_text, checked
+from skinwave.scene import KINDS, Body, Placement, Scene, kind_of
+from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
@@ -107,11 +106,11 @@ def dumps(scene: Scene) -> str:
             source = next(s for s in sources[section] if hasattr(s, field.name))
             if section != "tacton" or key not in unused(tacton):
                 table[section][key] = field.write(getattr(source, field.name))
-    if body.kind == "none":
+    if not body.of_kind.discretise:
         table["body"] = {"kind": "none"}
         del table["placement"]
-    for key in {key for key, kind in ONLY_OF.items() if kind != body.kind} & set(table["body"]):
-        del table["body"][key]
+    for key in _keys_of_kinds() - set(body.of_kind.keys):
+        table["body"].pop(key, None)
     return tomli_w.dumps(table)
 
 
@@ -124,16 +123,18 @@ def unused(tacton: Tacton) -> set[str]:
 
 
 def _body(values: dict[str, Any]) -> Body:
-    presets = {"none": "none", "sheet": "paper-sheet", "slab": "skin-slab", "palm": "palm"}
-    kind = values.get("kind", "slab")
-    choose("body kind", kind, KINDS)
-    for key in ONLY_OF.keys() & values.keys():
-        if ONLY_OF[key] != kind:
-            raise ValueError(f'[body] {key} is for kind = "{ONLY_OF[key]}", not "{kind}"')
+    kind = kind_of(values.get("kind", Body.kind))
+    for key in (_keys_of_kinds() - set(kind.keys)) & values.keys():
+        takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
+        raise ValueError(f'[body] {key} is for kind = {takers}, not "{kind.name}"')
     shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
-    if kind == "mesh":
-        return Body(**shape, placement=Placement(**placement))
-    return replace(BODIES[presets[kind]], **shape, placement=Placement(**placement))
+    missing = next(iter(kind.presets.values()), {})
+    return Body(**{**missing, **shape}, placement=Placement(**placement))
+
+
+def _keys_of_kinds() -> set[str]:
+    """Keys that only some kinds of body take."""
+    return {key for kind in KINDS.values() for key in kind.keys}
 
 
 def _split(values: dict[str, Any], names: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:

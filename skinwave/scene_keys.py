@@ -301,9 +301,6 @@ SECTIONS = {
 }
 
 
-ONLY_OF = {"relief": "palm", "file": "mesh", "unit": "mesh", "up": "mesh", "air": "sheet"}
-
-
 def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
     """Values by attribute name, each read by its field; an error names keys for a wrong one."""
     values = {}

@@ -8,8 +8,9 @@ import numpy as np
 import fem
 from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.choices import choose
+from skinwave.bodies.analytic import exact_waves
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
-from skinwave.models.bodies import EXACT, exact_waves
+from skinwave.models.flat_body import EXACT
 from skinwave.models.full import Map, harmonic_answer, transient_answer
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer

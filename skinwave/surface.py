@@ -15,8 +15,9 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
 from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
+from skinwave.bodies.analytic import exact_waves, has_exact_waves
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
-from skinwave.models.bodies import default_size, exact_waves, has_exact_waves
 from skinwave.pictures.motion import Waves, line_amplitudes, waves
 from skinwave.scene import Scene
 
@@ -59,7 +60,7 @@ class SurfaceMap:
 
 def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats, Floats]:
     """Coordinates (nx,) and (ny,) in metre of a map about the origin, within the scene's body."""
-    flat = scene.body.kind not in ("none", "mesh")
+    flat = scene.body.of_kind.is_bounded
     sides = (scene.body.width, scene.body.height) if flat else (np.inf, np.inf)
     counts = [int(min(reach, side / 2) / step * (1 + 1e-9)) for side in sides]
     x, y = (np.asarray(step * np.arange(-n, n + 1), np.float64) for n in counts)
@@ -96,7 +97,7 @@ def body_map(
         If there is no body, or none that can be meshed.
     """
     if not has_wavenumber_integral(scene):
-        size = max(h or 0.0, COARSER[scene.body.kind == "sheet"] * default_size(scene.body))
+        size = max(h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
         moved = waves(scene, REDUCED, progress, h=size, solver=solver)
         return replace(element_map(moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
     compliance = exact_waves(scene.body, "flat-body-harmonic")

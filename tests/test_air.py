@@ -14,9 +14,10 @@ from fem.materials import rayleigh_damping
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import thin_sheet
 from simple_model.flat_body import point_response
-from skinwave.models.bodies import air, build, operators, surface_load
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
+from skinwave.models.loads import surface_load
 from skinwave.models.prepared import answer, prepare, typical_spots
-from skinwave.models.speeds import air_mass, bending_wavenumber
 from skinwave.models.stretching import membrane, reduced_answer
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Placement, Scene

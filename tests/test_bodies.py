@@ -17,8 +17,10 @@ from meshes.shapes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory, lines
 from simple_model.focus import along_axis, array_field, spot_width
 from skinwave import compare
+from skinwave.bodies.absorbing_layer import has_layer
+from skinwave.bodies.build import build, operators
 from skinwave.cli import main
-from skinwave.models.bodies import build, has_layer, operators, surface_load
+from skinwave.models.loads import surface_load
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Layer, Placement, Relief
 from skinwave.scene_file import dumps, loads

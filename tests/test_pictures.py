@@ -23,9 +23,9 @@ from fem import PRESETS
 from simple_model import MovingPressure, Tacton, Trajectory, published
 from simple_model.flat_body import steady_lines
 from skinwave import exports
+from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
 from skinwave.models import speeds
-from skinwave.models.bodies import compliance
 from skinwave.pictures import films, maps, motion, render, views
 from skinwave.pictures.figures import tacton_figure
 from skinwave.pictures.levels import levels_figure

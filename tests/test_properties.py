@@ -381,8 +381,8 @@ def test_a_scene_comes_back_from_its_file(scene, tacton):
 @given(scenes())
 def test_what_is_planned_runs(scene):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skinwave.models.bodies.SHEET_CELLS", 16)
-        patch.setattr("skinwave.models.bodies.SLAB_CELL", 6e-3)
+        patch.setattr("skinwave.bodies.sheet.SHEET_CELLS", 16)
+        patch.setattr("skinwave.bodies.slab.SLAB_CELL", 6e-3)
         try:
             required = plan(scene, 0.3)
         except ValueError:

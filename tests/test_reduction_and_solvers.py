@@ -15,9 +15,9 @@ import skinwave
 from fem import linear_solver, products
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load_spectrum import reduced_lines
+from skinwave.bodies.build import build as build_body
+from skinwave.bodies.build import operators
 from skinwave.fields import field
-from skinwave.models.bodies import build as build_body
-from skinwave.models.bodies import operators
 from skinwave.models.full import energy_balance
 from skinwave.models.prepared import prepare
 from skinwave.simulation import compute

@@ -20,15 +20,16 @@ ROOMS = {
 
 # Rooms within skinwave, and what each may import beside the modules in none of them.
 INNER = {
-    "models": set(),
-    "planning": {"models"},
+    "bodies": set(),
+    "models": {"bodies"},
+    "planning": {"bodies", "models"},
     "patterns": set(),
-    "pictures": {"models", "planning"},
-    "verify": {"models", "planning", "pictures"},
-    "studies": {"models", "planning", "pictures"},
-    "reports": {"models", "planning", "pictures", "studies", "verify"},
-    "sweeps": {"models", "planning", "pictures"},
-    "web": {"models", "planning", "pictures", "reports", "studies"},
+    "pictures": {"bodies", "models", "planning"},
+    "verify": {"bodies", "models", "planning", "pictures"},
+    "studies": {"bodies", "models", "planning", "pictures"},
+    "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
+    "sweeps": {"bodies", "models", "planning", "pictures"},
+    "web": {"bodies", "models", "planning", "pictures", "reports", "studies"},
 }
 
 # Rooms within meshes, likewise.

@@ -15,7 +15,7 @@ from simple_model.compliance import half_space, slab, thin_sheet
 from simple_model.load_spectrum import reduced_lines
 from simple_model.material import PronyTerm
 from skinwave import scene_file
-from skinwave.models.bodies import compliance
+from skinwave.bodies.analytic import compliance
 from skinwave.models.prepared import prepare
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.simulation import compute

@@ -11,15 +11,11 @@ from fem import PRESETS
 from meshes import cache
 from simple_model import Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
+from skinwave.bodies.analytic import has_exact_waves
+from skinwave.bodies.build import build
+from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.slab import cell_layers
 from skinwave.comparison import compare
-from skinwave.models.bodies import (
-    build,
-    cell_layers,
-    check_mesh,
-    coarsest_size,
-    default_size,
-    has_exact_waves,
-)
 from skinwave.models.full import harmonic_answer
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import (

@@ -26,9 +26,9 @@ from simple_model import (
 )
 from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import lobe_width, spot_width
+from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
 from skinwave.models import speeds
-from skinwave.models.bodies import compliance
 from skinwave.planning.plan import plan
 from skinwave.propagation import share_outside
 from skinwave.scene import BODIES, Body

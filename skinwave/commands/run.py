@@ -35,13 +35,12 @@ def run(options: argparse.Namespace) -> int:
     from skinwave import record
     from skinwave.outputs import output_folder
     from skinwave.run import Run
-    from skinwave.scene import BODIES
+    from skinwave.scene import body_name
     from skinwave.scene_file import read
     from skinwave.simulation import follow
     from skinwave.studies.study_page import write_single
 
     scene = read(options.scene)
-    known = (label for label, body in BODIES.items() if body == scene.body)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(
         out, overwrite=options.overwrite, inputs=[options.scene, scene.body.file]
@@ -53,9 +52,7 @@ def run(options: argparse.Namespace) -> int:
                 h=metre(options.h), dt=options.dt, solver=options.solver, mapped=mapped,
             )  # fmt: skip
         warn(w for w in response.effort.warnings if w not in required.warnings)
-        run = Run(
-            tacton=scene.name, body=next(known, scene.body.kind), scene=scene, response=response
-        )
+        run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
         write_single(folder, run)
         record.write(folder, record.of_command(options), scene=scene, response=response)
     summary = {

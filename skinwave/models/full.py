@@ -23,16 +23,11 @@ from simple_model.load_spectrum import (
     synthesise,
 )
 from simple_model.sampling import resolving_step, shown
+from skinwave.bodies.build import Build, operators
+from skinwave.bodies.build import build as build_body
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import (
-    Build,
-    default_size,
-    operators,
-    surface_load,
-    surface_motion,
-    vacuum_only,
-)
-from skinwave.models.bodies import build as build_body
+from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import Body, Scene
 
 Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
@@ -79,6 +74,21 @@ def energy_balance(
         )
     radiated = spent.radiated / spent.lost if spent.lost > 0 else 0.0
     return imbalance, radiated
+
+
+def vacuum_only(body: Body, model: str) -> None:
+    """Refuse a body with air, whose added-mass operator is dense.
+
+    Raises
+    ------
+    ValueError
+        If it has air.
+    """
+    if body.air:
+        raise ValueError(
+            f"{model} solves sparse equations, and the added mass of air is a dense operator; "
+            "leave air out, or use --model fem, fem-nonlinear or flat-body"
+        )
 
 
 def transient_answer(

@@ -11,9 +11,11 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.focus import spot_width
 from simple_model.sampling import shown
+from skinwave.bodies.build import Build
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
-from skinwave.models.bodies import Build, default_size, surface_load, surface_motion
 from skinwave.models.full import assembled, meshed
+from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.reduction import (
     BAND,
     ReducedBody,

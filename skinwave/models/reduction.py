@@ -20,8 +20,9 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure
 from simple_model.load_spectrum import reduced_lines
+from skinwave.bodies.build import Build
+from skinwave.bodies.sheet import air
 from skinwave.effort import Progress, silent
-from skinwave.models.bodies import Build, air
 from skinwave.models.full import energy_balance
 from skinwave.scene import Body
 

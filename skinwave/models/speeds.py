@@ -5,61 +5,25 @@ from math import asin, ceil, pi
 
 import numpy as np
 
-from fem.materials import Material
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
-from simple_model.compliance import AIR_DENSITY
 from simple_model.tacton import pattern_period, repeated
 from skinwave.scene import Body
 
 FEWEST, MOST = 40, 256  # frames of an animation
 EACH = 8  # frames to a period of the fastest line that counts
-AIR_TURNS = 30  # each leaves a quarter of the error, or less
 SAME = 1e-6  # of a tone: further from a multiple of the common frequency it is none
 
 
 def surface_speed(body: Body, frequency: float) -> float:
     """Phase speed in m/s of the surface wave of an infinite body at a frequency in Hz.
 
-    A slab's is that of the Rayleigh wave of its material, as if it were deep: in a layer that is
-    thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s sqrt(mu*/rho)) and
-    mu* = `Material.complex_modulus`. A sheet's is that of bending, with its air.
-
     Raises
     ------
     ValueError
         If there is no body.
     """
-    if body.kind == "none":
-        raise ValueError("body kind 'none' carries no wave; choose a sheet or a slab")
-    solid, w = body.solid, 2 * pi * frequency
-    if body.kind == "sheet":
-        return w / bending_wavenumber(body, frequency)
-    return _viscous(solid, w) * solid.rayleigh_speed / solid.shear_speed
-
-
-def bending_wavenumber(body: Body, frequency: float) -> float:
-    """Bending wavenumber k of an infinite sheet, rad/m, at a frequency in Hz:
-    D k^4 = (m + 2 rho / k) w^2.
-    """
-    w = 2 * pi * frequency
-    k = (body.mass_per_area * w**2 / body.bending_stiffness) ** 0.25
-    for _ in range(AIR_TURNS if body.air and w else 0):
-        k = ((body.mass_per_area + 2 * AIR_DENSITY / k) * w**2 / body.bending_stiffness) ** 0.25
-    return float(k)
-
-
-def air_mass(body: Body, frequency: float) -> float:
-    """Added mass 2 rho / k, kg/m2, of the air on both sides of a sheet at a frequency in Hz.
-
-    Junger and Feit, Sound, Structures, and Their Interaction (1986), section 5.11.
-    """
-    return 2 * AIR_DENSITY / bending_wavenumber(body, frequency)
-
-
-def _viscous(solid: Material, w: float) -> float:
-    """Phase speed of shear waves with loss, m/s."""
-    return float(1 / np.real(1 / np.sqrt(solid.complex_modulus(w) / solid.density)))
+    return body.of_kind.wave_speed(body, frequency)
 
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:

@@ -8,7 +8,7 @@ mass and membrane stiffness are all those of the true sheet, and no element is f
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import islice
 from math import pi
 
@@ -28,10 +28,11 @@ from simple_model.load_spectrum import (
     reduced_lines,
 )
 from simple_model.sampling import resolving_step
+from skinwave.bodies.build import Build, build
+from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.bodies import Build, air, build, surface_load, vacuum_only
-from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
-from skinwave.models.speeds import bending_wavenumber
+from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count, vacuum_only
+from skinwave.models.loads import surface_load
 from skinwave.scene import Body, Scene
 
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
@@ -51,7 +52,7 @@ def sheet_only(body: Body, model: str) -> None:
     ValueError
         If it is one of these.
     """
-    if body.kind != "sheet" or body.sides != "clamped":
+    if not body.of_kind.is_plate or body.sides != "clamped":
         raise ValueError(
             f"{model} is for a sheet with clamped sides, not a {body.kind} with {body.sides} "
             "sides; give it one, or use --model fem"
@@ -82,7 +83,7 @@ def expected_error(body: Body, h: float) -> float:
 def meshed_sheet(body: Body, h: float) -> Build:
     """Mesh of the equivalent sheet in cells of h in metre, with a thickness to match."""
     thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
-    return build(body, h, thickness=thickness)
+    return build(body, h, discretise=partial(discretise, thickness=thickness))
 
 
 def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membrane:

@@ -10,9 +10,10 @@ from meshes import TetMesh, part
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import path_samples
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
-from skinwave.models.bodies import default_size, surface_load
 from skinwave.models.full import assembled, meshed
+from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times, spent
 from skinwave.models.reduction import (
     ReducedResponse,

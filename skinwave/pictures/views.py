@@ -22,7 +22,6 @@ from skinwave.fitting import effort_of, fitting
 from skinwave.models.reduction import oscillating
 from skinwave.models.speeds import repeated, shown_part, strongest_tone, surface_speed
 from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
-from skinwave.run import is_skin
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
 
@@ -135,7 +134,7 @@ def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | N
     read = fem.probe_operator(mesh, mesh.points[surface])
     frequencies, amplitudes = line_amplitudes(moved, read)
     levels = np.full(len(surface), -np.inf)
-    if is_skin(scene.body):
+    if scene.body.is_skin:
         levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
     tone = strongest_tone(frequencies, amplitudes)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model import Response
-from skinwave.models.bodies import check_mesh, default_size
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import compared_with, convergence, quantity_of_interest

@@ -11,7 +11,7 @@ from simple_model.flat_body import flat_body, point_response, steady_lines, stea
 from simple_model.focus import spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
-from skinwave.models.bodies import compliance, is_plain_layer
+from skinwave.bodies.analytic import compliance, is_plain_layer
 from skinwave.scene import Body, Scene
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
@@ -33,7 +33,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         lines = load_lines(scene.pressure, tolerance / 100)
         f, a = merge_lines(lines.frequencies, lines.strengths[:, None].astype(complex))
     elif not body.solid.has_loss or (
-        body.kind != "sheet" and (body.kind != "slab" or body.base != "clamped")
+        not body.of_kind.is_plate and not (body.of_kind.compliance and body.base == "clamped")
     ):
         f, a = _lines_of_load(scene, tolerance)
     else:

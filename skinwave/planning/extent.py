@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simple_model.focus import spot_width
-from skinwave.models.speeds import air_mass
+from skinwave.bodies.sheet import air_mass
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
 
@@ -23,7 +23,7 @@ class Row:
 
 def symmetry(scene: Scene) -> str:
     """Symmetry axes: across their middle planes the load is its own mirror image at all times."""
-    if scene.body.kind not in ("sheet", "slab") or scene.body.placement != FLAT:
+    if not scene.body.of_kind.is_symmetric or scene.body.placement != FLAT:
         return ""
     path = scene.tacton.trajectory
     path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
@@ -36,7 +36,7 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[R
     Only absorbing sides are moved inwards: reflections from others belong to the response.
     """
     body = scene.body
-    plain = body.kind == "slab" and body.base == "clamped" and body.is_plain
+    plain = body.of_kind.is_layer and body.base == "clamped" and body.is_plain
     if not plain or body.sides != "absorbing":
         return body, []
     half = np.array([body.width, body.height]) / 2
@@ -65,7 +65,7 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
     stretching; with air, its added mass.
     """
     body = scene.body
-    if body.kind != "sheet":
+    if not body.of_kind.is_plate:
         return []
     middle = max(highest / 2, LOWEST)
     air = air_mass(body, middle) / body.mass_per_area

@@ -5,9 +5,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.sampling import resolving_step
+from skinwave.bodies.analytic import exact_waves
+from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
-from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
-from skinwave.models.full import TRANSIENT_RATE, step_count
+from skinwave.models.flat_body import EXACT
+from skinwave.models.full import TRANSIENT_RATE, step_count, vacuum_only
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
@@ -83,7 +85,7 @@ def plan(
         vacuum_only(scene.body, model)
     if dt is not None:
         step_count(float(sample_times(scene)[-1]), dt)
-    if scene.body.kind == "none":
+    if not scene.body.of_kind.discretise:
         if model not in (None, *KERNELS):
             raise ValueError(f"a scene without a body has no {model} response; use --model auto")
         kernel = model or "point-kernel"
@@ -261,15 +263,15 @@ def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
         return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus}'"
-    if body.kind in ("palm", "mesh"):
-        return "a body that is not flat"
+    if not body.of_kind.compliance:
+        return f"a body of kind '{body.kind}' has no wavenumber integral"
     if len(body.strata) > 1:
         return f"{len(body.strata)} layers; the wavenumber integral is for one material"
     if body.placement != FLAT:
         return "the body is tilted or moved; the wavenumber integral is for one across the beam"
-    if body.kind == "sheet" and body.sides == "absorbing":
+    if body.of_kind.is_plate and body.sides == "absorbing":
         return "absorbing sides of a sheet reflect in part; the wavenumber integral has no sides"
-    if body.kind == "sheet":
+    if body.of_kind.is_plate:
         return f"the {body.sides} sides of this sheet reflect; the wavenumber integral has no sides"
     if not has_wavenumber_solution(scene):
         return f"its base is {body.base}; the wavenumber integral is for a clamped one or none"

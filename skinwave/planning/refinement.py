@@ -16,16 +16,11 @@ from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats
 from simple_model import Response
+from skinwave.bodies.build import COMPARED
+from skinwave.bodies.hands import FINE_PALM
+from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.slab import cell_layers
 from skinwave.effort import Progress
-from skinwave.models import hands
-from skinwave.models.bodies import (
-    COMPARED,
-    FINE_PALM,
-    cell_layers,
-    check_mesh,
-    coarsest_size,
-    default_size,
-)
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.models.reduction import oscillating, read_at, respond
 from skinwave.scene import Body, Scene
@@ -149,7 +144,7 @@ def refined(
 def ladder(body: Body) -> Floats:
     """Sequence of element sizes (k,) in metre that a body may be meshed with, descending."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
-    if body.kind in hands.KINDS:  # whose coarser meshes cut the rim off, and layers
+    if not body.of_kind.conforming:  # whose coarser meshes cut the rim off, and layers
         coarsest = min(FIRST_HAND * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
@@ -180,7 +175,7 @@ def compared_with(body: Body, h: float) -> float:
 
 def _has_cell_layers(body: Body) -> bool:
     """Whether the size alone sets the number of cells through the depth, not the body's layers."""
-    return body.kind == "slab" and len(body.strata) == 1
+    return body.of_kind.is_layer and len(body.strata) == 1
 
 
 def _layered(body: Body, layers: int, near: float) -> float:
@@ -229,5 +224,5 @@ def enough(body: Body, h: float, error: float, tolerance: float) -> float:
     """Element size in metre that meets a tolerance, by the error with h; a slab's cells are at most
     as high as its depth.
     """
-    size = min(h, body.depth if body.kind == "slab" else h)
+    size = min(h, body.depth if body.of_kind.is_layer else h)
     return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

@@ -36,7 +36,11 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     unconstrained sheet is no deflection.
     """
     body, u = scene.body, response.displacement
-    if body.kind != "sheet" or response.unit != "m" or response.model.startswith("fem-nonlinear"):
+    if (
+        not body.of_kind.is_plate
+        or response.unit != "m"
+        or response.model.startswith("fem-nonlinear")
+    ):
         return ()
     bent = u if body.is_held else u - u.mean(axis=1, keepdims=True)
     clamped = body.sides == "clamped"
@@ -64,7 +68,7 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
     """Warning of rigid-body drift under a load with non-zero mean."""
     if scene.body.is_held or not mean_gain(scene):
         return ()
-    half_space = ", or take depth_mm = inf" if scene.body.kind == "slab" else ""
+    half_space = ", or take depth_mm = inf" if scene.body.of_kind.is_layer else ""
     return (
         "this body is unconstrained and drifts under a pressure with non-zero mean: only motion "
         f"about the mean counts; clamp its base or its sides{half_space}",

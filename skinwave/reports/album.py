@@ -28,7 +28,7 @@ from skinwave.pictures.motion import Waves, waves
 from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Scene, with_body
+from skinwave.scene import BODIES, Scene, body_name, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
 from skinwave.studies import paper15
@@ -68,7 +68,7 @@ def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
         If a body beside it is unknown, or the path or probes do not fit on it.
     """
     bodies: dict[str, Scene] = {}
-    if scene.body.kind != "none":
+    if scene.body.of_kind.discretise:
         bodies[body_name(scene.body)] = scene
     for name in beside:
         choose("body", name, [n for n in BODIES if n != "none"])
@@ -78,11 +78,6 @@ def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
     if not bodies:
         bodies = {n: on for n in paper15.MEASURED_ON if (on := _fitting(scene, n))}
     return paper15.beside_kernels(scene) | bodies
-
-
-def body_name(body: Body) -> str:
-    """The name of a preset body, or else the kind of a body."""
-    return next((name for name, known in BODIES.items() if known == body), body.kind)
 
 
 def _fitting(scene: Scene, name: str) -> Scene | None:
@@ -146,7 +141,7 @@ def answers(
     moved = {
         body: _moved(its, body, progress, h, solver)
         for body, its in shown.items()
-        if its.body.kind != "none"
+        if its.body.of_kind.discretise
     }
     tones = max(repeated(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
@@ -180,7 +175,7 @@ def _plan(
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     trust: dict[str, Any] = {"command": command, "model": required.model}
     drawn = [run for run in runs if run.scene == scene]
-    if drawn and scene.body.kind != "none":
+    if drawn and scene.body.of_kind.discretise:
         trust["misfit"] = _misfit(_planned_answer(scene, required, solver), drawn[0].response)
     trust["cases"] = _verified(progress)
     (folder / "trust.json").write_text(json.dumps(trust, indent=1), encoding="utf-8")

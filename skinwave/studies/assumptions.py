@@ -53,9 +53,9 @@ def ladder(scene: Scene) -> tuple[str, ...]:
         If the scene has no body.
     """
     body, path = scene.body, scene.tacton.trajectory
-    if body.kind == "none":
+    if not body.of_kind.discretise:
         raise ValueError("a scene without a body keeps every assumption; give it one")
-    sheet, slab, solid = body.kind == "sheet", body.kind == "slab", body.solid
+    sheet, slab, solid = body.of_kind.is_plate, body.of_kind.is_layer, body.solid
     kept = {
         "little loss": slab and solid.has_loss,
         "viscous loss": slab and solid.fast_modulus > 0,
@@ -79,7 +79,7 @@ def beside(scene: Scene) -> tuple[str, ...]:
     where the scene does not have it, it is tried on the wavenumber integral only.
     """
     names = ladder(scene)
-    if "viscous loss" in names or scene.body.kind != "slab" or not scene.body.solid.viscosity:
+    if "viscous loss" in names or not scene.body.of_kind.is_layer or not scene.body.solid.viscosity:
         return ()
     return (*names[: names.index("little loss") + 1], "viscous loss")
 
@@ -92,7 +92,7 @@ def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
     if name == "sinc^2 profile":
         return "main lobe only" not in names
     body, endless = scene.body, replace(scene.body, sides="absorbing")
-    flat = body.kind == "slab" and "flat" not in names
+    flat = body.of_kind.is_layer and "flat" not in names
     return name != "endless" or (flat and endless != body and endless.is_held)
 
 
@@ -128,7 +128,7 @@ def relaxed(
     # Wavenumber integrals are those of a Gaussian in a homogeneous, flat and infinite body.
     elements = pressure.focus != "gaussian" or not ELEMENTS.isdisjoint(dropped)
     model = "fem" if elements else "flat-body"
-    if elements and body.kind == "slab" and "endless" not in dropped:
+    if elements and body.of_kind.is_layer and "endless" not in dropped:
         body = replace(body, sides="absorbing")
     if "small deflection" in dropped:
         model = "fem-nonlinear"
@@ -195,7 +195,7 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
         solid = law(solid, 2 * np.pi * line)
         return solid if "little loss" in dropped else with_little_loss(solid, 2 * np.pi * line)
 
-    if body.kind == "slab":
+    if body.of_kind.is_layer:
         solid = made(solid)
     changes: dict[str, object] = {
         "material": solid if solid != body.solid else body.material,
@@ -207,7 +207,7 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
             for layer in body.layers or LAYERS
         )
         changes["layers"] = (as_one(layers),) if "flat" in dropped else layers
-    elif body.kind == "slab":
+    elif body.of_kind.is_layer:
         changes["layers"] = ()
     if "flat" in dropped:
         rim = min(Relief().edge_radius, 0.45 * body.depth)

@@ -40,7 +40,7 @@ class Shown:
     @property
     def body(self) -> Run:
         """The body that the sentences describe: skin, if there is any."""
-        skin = [run for run in self.bodies if run.scene.body.kind != "sheet"]
+        skin = [run for run in self.bodies if run.scene.body.is_skin]
         return (skin or list(self.bodies))[-1]
 
 

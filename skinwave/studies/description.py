@@ -1,7 +1,6 @@
 """Description of the models and of what they leave out, in sentences true of the runs at hand."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -120,15 +119,8 @@ def levels_of(tacton: Tacton) -> list[str]:
 
 def extent(body: Body) -> str:
     """Kind, size and boundary conditions of a body."""
-    if body.kind == "none":
-        return "none"
-    if body.kind == "mesh":
-        size = f"body from {Path(body.file).name}, {body.up} towards the device"
-    else:
-        across = f"{1e3 * body.width:g} x {1e3 * body.height:g}"
-        deep = f" x {1e3 * body.depth:g}" if np.isfinite(body.depth) else ""
-        size = f"{body.kind} of {across}{deep} mm"
-    return f"{size}, base {body.base}, sides {body.sides}"
+    size = body.of_kind.words(body)
+    return f"{size}, base {body.base}, sides {body.sides}" if body.of_kind.discretise else size
 
 
 def _body(runs: list[Run]) -> str:
@@ -137,9 +129,9 @@ def _body(runs: list[Run]) -> str:
     depth_only = " of which the wavenumber integral takes only the depth," * is_layer
     text = f"{extent(body)},{depth_only} of {_material(body.solid)}"
     text += above(body)
-    if body.kind == "sheet":
+    if body.of_kind.is_plate:
         return f"{text}. {_sheet(runs)}"
-    left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * (body.kind == "slab")
+    left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * body.of_kind.is_layer
     return f"{text}. Left out: {' and '.join(left_out)}." if left_out else f"{text}."
 
 

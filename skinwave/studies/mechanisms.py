@@ -125,7 +125,7 @@ def _mechanisms(
         "linear load": ("linear", lambda scene: answer(prepared, scene)),
         "squared load": ("pressure_squared", lambda scene: answer(prepared, scene)),
     }
-    if body.kind == "sheet":
+    if body.of_kind.is_plate:
         found["squared load, stretching"] = (
             "pressure_squared", lambda scene: compute(scene, "fem-nonlinear", h=h)
         )  # fmt: skip

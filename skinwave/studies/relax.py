@@ -17,9 +17,9 @@ import numpy as np
 
 from simple_model import MovingPressure, Response, lines, resolved_lines
 from simple_model.drive import beyond_published
+from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
-from skinwave.models.bodies import default_size
 from skinwave.planning.assessment import sentences
 from skinwave.processes import apart
 from skinwave.run import JUDGED
@@ -171,7 +171,7 @@ def _answered(
 
 
 def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, int]:
-    if scene.body.kind != "palm":  # a palm is meshed once per machine
+    if not scene.body.of_kind.mesh_is_cached:
         os.environ["SKINWAVE_CACHE"] = ""
     started = time.perf_counter()
     response = compute(scene, model, h=h)

@@ -9,14 +9,14 @@ from functools import lru_cache
 from pathlib import Path
 
 from skinwave import document
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress, one_thread, peak_memory
 from skinwave.files import write_lines, write_responses, write_run
-from skinwave.models.bodies import check_mesh, default_size
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.processes import helper
 from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Scene, with_body
+from skinwave.scene import BODIES, Body, Scene, body_name, with_body
 from skinwave.simulation import check_knobs, compute
 from skinwave.studies import paper15
 from skinwave.studies.changes import (
@@ -49,9 +49,8 @@ def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str
 
 def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
     """The same for one scene: on its own body or, if it has none, on paper and skin."""
-    if scene.body.kind != "none":
-        known = (label for label, body in BODIES.items() if body == scene.body)
-        bodies = {next(known, scene.body.kind): scene}
+    if scene.body.of_kind.discretise:
+        bodies = {body_name(scene.body): scene}
     else:
         bodies = {key: with_body(scene, BODIES[key]) for key in paper15.MEASURED_ON}
     return {name: paper15.beside_kernels(scene) | bodies}
@@ -73,7 +72,7 @@ def run_study(
     """
     check_knobs(solver, h=h)
     for solid in {s.body for group in scenes.values() for s in group.values()}:
-        if solid.kind != "none":
+        if solid.of_kind.discretise:
             check_mesh(solid, h or default_size(solid))  # before any run
     started = time.perf_counter()
     with helper() as aside, one_thread():
@@ -123,7 +122,7 @@ def _begun_bodies(
     the coarser ones that responses are assessed by, are reduced in other processes.
     """
     every = [each for group in scenes.values() for each in group.items()]
-    solids = {s.body: (column, s) for column, s in every if s.body.kind != "none"}
+    solids = {s.body: (column, s) for column, s in every if s.body.of_kind.discretise}
     *others, last = solids
     begun = {body: aside.submit(_prepared, solids[body][1], h, solver) for body in others}
     coarse = {
@@ -165,7 +164,7 @@ def _begun_maps(
     begun = {
         scene.body: aside.submit(element_maps, scene, h, solver)
         for scene in scenes[first_of(scenes)].values()
-        if scene.body.kind != "none" and not has_wavenumber_integral(scene)
+        if scene.body.of_kind.discretise and not has_wavenumber_integral(scene)
     }
 
     def maps(run: Run) -> Drawn:
@@ -195,9 +194,9 @@ def _answered(
     every = [(name, column, scene) for name, g in scenes.items() for column, scene in g.items()]
     with suppress(KeyboardInterrupt):
         for k, (name, column, scene) in enumerate(
-            sorted(every, key=lambda each: each[2].body.kind != "none")
+            sorted(every, key=lambda each: bool(each[2].body.of_kind.discretise))
         ):
-            if scene.body.kind == "none":
+            if not scene.body.of_kind.discretise:
                 response = compute(scene, column)
             else:
                 prepared[column], coarser = bodies(scene)
@@ -205,7 +204,7 @@ def _answered(
                 response = assessed(
                     scene, found, prepared[column], h, solver=solver, compared=coarser
                 )
-            body = "none" if scene.body.kind == "none" else column
+            body = column if scene.body.of_kind.discretise else "none"
             run = Run(tacton=name, body=body, scene=scene, response=response)
             write_run(folder / name / column, run)
             groups.setdefault(name, []).append(run)

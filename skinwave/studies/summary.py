@@ -175,7 +175,7 @@ def _sure(shown: Shown) -> str:
 
 
 def _material(body: Body, shares: tuple[float, float] | None) -> str:
-    if body.kind == "sheet":
+    if body.of_kind.is_plate:
         return "grammage, stiffness and support of the sheet that was measured are not published"
     text = "skin's stiffness is known to a factor of 2, its loss to one of 5"
     if shares is None:

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 
 from simple_model import Response, lines, resolved_lines
 from skinwave import document
+from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
-from skinwave.models.bodies import default_size
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
@@ -132,7 +132,7 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
     ValueError
         If the scene has no body.
     """
-    if scene.body.kind == "none":
+    if not scene.body.of_kind.discretise:
         raise ValueError("a scene without a body has one model only; give it a sheet or a slab")
     todo = list(chosen or candidates(scene))
     fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]

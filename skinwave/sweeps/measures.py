@@ -9,7 +9,7 @@ import numpy as np
 from simple_model import Response, named_lines, point_kernel, sensation_level
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import JUDGED, Run, is_skin
+from skinwave.run import JUDGED, Run
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import Case
 
@@ -68,7 +68,7 @@ def commanded(case: Case) -> dict[str, Any]:
             "probe_x_mm": [1e3 * x for x, _ in case.scene.probes],
             "probe_y_mm": [1e3 * y for _, y in case.scene.probes],
         }
-        if body.kind not in ("none", "sheet"):
+        if body.is_skin:
             row["rayleigh_speed_m_per_s"] = body.solid.rayleigh_speed
     return row
 
@@ -92,7 +92,7 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     row |= _kernel(kernel, agreement) | _effort(response)
     if response.unit == "m":
         row |= _motion(response, agreement) | {f"{n}_um": 1e6 * a for n, a in found.items()}
-        row |= _felt(run) if is_skin(scene.body) else {}
+        row |= _felt(run) if scene.body.is_skin else {}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 

@@ -146,7 +146,7 @@ def model_of(scene: Scene, asked: str) -> str:
     """
     if asked != "auto":
         return asked
-    if scene.body.kind == "none":
+    if not scene.body.of_kind.discretise:
         return "point-kernel"
     is_exact = has_wavenumber_solution(scene) and is_laterally_infinite(scene.body)
     return "flat-body" if is_exact else "fem"
@@ -167,7 +167,7 @@ Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
 def _solid(case: Case, knobs: Knobs) -> Solid | None:
     """Body and probes by which a run shares a reduced body with others, if it does."""
     scene = case.scene
-    if scene is None or model_of(scene, knobs.model) != "fem" or scene.body.kind == "none":
+    if scene is None or model_of(scene, knobs.model) != "fem" or not scene.body.of_kind.discretise:
         return None
     return scene.body, scene.probes
 

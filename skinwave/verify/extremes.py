@@ -9,7 +9,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.focus import spot_width
-from skinwave.models.bodies import build, operators
+from skinwave.bodies.build import build, operators
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.scene import Body, Scene
 from skinwave.verify.case import Case, below, relative

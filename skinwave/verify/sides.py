@@ -7,7 +7,8 @@ import numpy as np
 import fem
 import meshes
 from meshes.tetmesh import Floats
-from skinwave.models.bodies import layer_drag, slab_lines
+from skinwave.bodies.absorbing_layer import layer_drag
+from skinwave.bodies.slab import slab_lines
 from skinwave.scene import Body
 from skinwave.verify.case import Case, Plot, below
 

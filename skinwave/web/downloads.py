@@ -12,7 +12,7 @@ from simple_model.choices import choose
 from simple_model.response import step
 from skinwave.exports import sampled, waveform_table
 from skinwave.processes import apart
-from skinwave.scene import BODIES, Scene, with_body
+from skinwave.scene import BODIES, Scene, body_name, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
 
@@ -113,7 +113,7 @@ def _body_of(scene: Scene, answer: Answer) -> str:
     """The name of the body whose response this is."""
     if answer.response.unit == "Pa":
         return "none"
-    return next((n for n, body in BODIES.items() if body == scene.body), scene.body.kind)
+    return body_name(scene.body)
 
 
 def _column(scene: Scene, answer: Answer) -> str:

@@ -25,7 +25,7 @@ from simple_model.focus import lobe_width
 from simple_model.joined import parted
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.tacton import CARRIER, level, tones
-from skinwave.run import JUDGED, is_skin
+from skinwave.run import JUDGED
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.web.moving import Moving
@@ -122,7 +122,7 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
     """
     table = line_table(scene.pressure, response, candidates=JUDGED, most=MOST_LINES,
                        highest=HIGHEST, settle=UNTRUSTED)  # fmt: skip
-    felt = response.unit == "m" and is_skin(scene.body)
+    felt = response.unit == "m" and scene.body.is_skin
     peaks = table.unnamed[:MOST_PEAKS]
     amplitudes = [(n, f, float(table.amplitudes[n][0])) for n, f in table.frequencies.items()]
     amplitudes += [(f"{x.kind}, {x.frequency:.0f} Hz", x.frequency, float(x.amplitudes[0]))

@@ -67,7 +67,7 @@ def skin_of(made: Any, body: Body) -> tuple[Shape, Ints]:
     upper side of a sheet, the whole surface of others, without the absorbing layer.
     """
     mesh = made.mesh
-    if body.kind == "sheet":
+    if body.of_kind.is_plate:
         facets = mesh.facets["top"]
     else:
         own = slice(None) if made.drag is None else made.drag == 0

@@ -53,7 +53,7 @@ class Session:
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """From now on tell a page, served by this loop, what the other process tells."""
         self._loop = loop
-        if self.scene and self.scene.body.kind != "none":
+        if self.scene and self.scene.body.of_kind.discretise:
             self.ask()
 
     def ask(self) -> None:
@@ -98,7 +98,7 @@ def refresh(session: Session) -> None:
         state.update({"problem": str(error), "stale": True})
         return
     session.number += 1
-    waiting = session.scene.body.kind != "none"
+    waiting = session.scene.body.of_kind.discretise
     if not waiting:
         session.worker.cancel()
         session.waves = None

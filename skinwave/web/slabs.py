@@ -18,8 +18,8 @@ from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
 from simple_model.flat_body import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from simple_model.focus import spot_width
+from skinwave.bodies.analytic import compliance
 from skinwave.effort import Progress
-from skinwave.models.bodies import compliance
 from skinwave.scene import Body
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above

@@ -30,14 +30,11 @@ from simple_model.load_spectrum import (
     path_samples,
 )
 from simple_model.response import step
+from skinwave.bodies.analytic import has_exact_waves
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
-from skinwave.models.bodies import (
-    build,
-    default_size,
-    has_exact_waves,
-    operators,
-    surface_load,
-)
+from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times
 from skinwave.models.reduction import (
     BAND,
@@ -49,7 +46,6 @@ from skinwave.models.reduction import (
     select_lines,
 )
 from skinwave.planning.assessment import sentences
-from skinwave.run import is_skin
 from skinwave.scene import Body, Scene
 from skinwave.web.model import (
     FAINTEST_LEVEL,
@@ -72,8 +68,6 @@ MAPPED = 60  # lines that a map is made of, the strongest
 TOLERANCE = 0.02  # of a reduction
 MANY = 264  # knots, of which every second spans the same pressures
 NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
-# Metre. Coarser than in `compare`: an error of some per cent, for a response within seconds.
-SIZES = {"sheet": 2.5e-3, "palm": 5e-3, "slab": 4.5e-3, "mesh": 4.5e-3}
 # As in `skinwave.steps`; a body that is cached begins with the third.
 STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.15, "reduce": 0.7, "read the surface": 0.05}
 KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
@@ -229,7 +223,7 @@ def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> Map:
     """
     amplitudes = np.abs(motion)
     felt = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
-    shown = felt if is_skin(scene.body) else felt[:0]
+    shown = felt if scene.body.is_skin else felt[:0]
     level = shown.max(axis=0, initial=FAINTEST_LEVEL)
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = np.where(np.isnan(rms), np.nan, level.reshape(SIDE, SIDE))
@@ -243,8 +237,8 @@ def _steady(pressure: MovingPressure) -> MovingPressure:
 
 def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     progress("mesh", 0.0)
-    made = build(body, min(SIZES[body.kind], body.depth) if body.kind != "sheet"
-                 else SIZES["sheet"])  # fmt: skip
+    size = body.of_kind.interactive_size
+    made = build(body, size if body.of_kind.is_plate else min(size, body.depth))
     progress("assemble", 0.0)
     return made, operators(made)
 

@@ -1,0 +1,14 @@
+"""Bodies: one file a kind, each a `BodyKind` that it registers; and what all kinds share.
+
+Importing this room registers the built-in kinds, in this order.
+"""
+
+from skinwave.bodies import none, sheet, slab, palm, mesh  # noqa: F401, I001
+from skinwave.bodies.body import BODIES, KINDS, Body, BodyKind, body_name, kind_of, register
+from skinwave.bodies.parts import FLAT, Layer, Placement, Relief, solid_of
+
+__all__ = [
+    "BODIES", "FLAT", "KINDS",
+    "Body", "BodyKind", "Layer", "Placement", "Relief",
+    "body_name", "kind_of", "register", "solid_of",
+]  # fmt: skip

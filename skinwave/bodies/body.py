@@ -1,0 +1,261 @@
+"""A body and its kind, and the registry of kinds."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from fem.materials import Material
+from meshes import Palm
+from simple_model.choices import choose
+from simple_model.compliance import Compliance
+from skinwave import extensions
+from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.parts import FLAT, PLAIN, Layer, Placement, Relief, check_material, solid_of
+
+BASES = ("clamped", "absorbing", "free")
+LARGEST = 2.0  # m: a body of more was meant in mm
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A body below the plane that the focus moves in, the middle of its surface at the origin.
+
+    Parameters
+    ----------
+    kind : the name of a registered `BodyKind`: "none" (the point kernel needs no body), "sheet"
+        (thin, bends), "slab" (thick), "palm" (soft tissue on bone, `depth` below the middle of the
+        palm) or "mesh" (from a file)
+    material : the name of a preset, or a Material
+    width, height, depth : float, metre, along x, y and downwards, at most 2; a slab's depth may
+        be inf, a half-space, which only flat-body can compute
+    base, sides : "clamped", "absorbing" or "free"; of a hand the part that looks downwards, and
+        the ends at the wrist and the fingers or the cuts of a file
+    layers : from the surface downwards; what is below them is of `material`
+    relief : of a palm
+    file, unit, up : of a mesh, as `meshes.body_from_file` takes them
+    placement : how the body lies under the device
+    air : bool, whether air moves along on both sides of a sheet, as if in a baffle; or vacuum
+
+    Raises
+    ------
+    ValueError
+        If a value is unknown, not finite or out of range.
+    """
+
+    kind: str = "slab"
+    material: str | Material = "palm"
+    width: float = 0.100
+    height: float = 0.100
+    depth: float = 0.015
+    base: str = "clamped"
+    sides: str = "absorbing"
+    layers: tuple[Layer, ...] = ()
+    relief: Relief = PLAIN
+    file: str = ""
+    unit: str = "m"
+    up: str = "+z"
+    placement: Placement = FLAT
+    air: bool = False
+
+    def __post_init__(self) -> None:
+        kind = self.of_kind
+        check_material(self.material)
+        for name in ("base", "sides"):
+            choose(name, getattr(self, name), BASES)
+        for name in ("width", "height", "depth"):
+            length, may_be_infinite = getattr(self, name), name == "depth" and kind.is_layer
+            if not (length > 0 and (isfinite(length) or (may_be_infinite and length == inf))):
+                raise ValueError(f"body {name} = {1e3 * length} mm must be finite and above 0")
+            if isfinite(length) and length > LARGEST:
+                raise ValueError(
+                    f"body {name} = {length:g} m is more than {LARGEST:g} m, the limit of a body; "
+                    f"lengths are in metre here and in mm in a scene file, so that "
+                    f"{length:g} mm are {name} = {length / 1e3:g}, or {name}_mm = {length:g}"
+                )
+        if kind.discretise and self.base == self.sides == "free":
+            raise ValueError(
+                "a body with free base and free sides is unconstrained and drifts under the mean "
+                "load; clamp one of them"
+            )
+
+        self._check_layers()
+
+        if ("file" in kind.keys) != bool(self.file):
+            raise ValueError(
+                "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
+            )
+        if self.air and "air" not in kind.keys:
+            raise ValueError(
+                f"air = true is for a sheet, which weighs little more than the air that it moves, "
+                f"not a {self.kind}; leave it out"
+            )
+        kind.check(self)
+
+    def _check_layers(self) -> None:
+        if not self.layers:
+            return
+        if not self.of_kind.may_be_layered:
+            raise ValueError(f"a body of kind '{self.kind}' has no layers; leave them out")
+        if (below := sum(layer.thickness for layer in self.layers)) >= self.depth:
+            raise ValueError(
+                f"the layers are {1e3 * below:g} mm thick in all, but the body is "
+                f"{1e3 * self.depth:g} mm deep; leave some of it for what is below them"
+            )
+
+    @property
+    def of_kind(self) -> "BodyKind":
+        """The registered record of its kind."""
+        return kind_of(self.kind)
+
+    @property
+    def solid(self) -> Material:
+        """The material itself, below all layers."""
+        return solid_of(self.material)
+
+    @property
+    def palm(self) -> Palm:
+        """The palm that outline and relief describe."""
+        return Palm(
+            breadth=self.width, length=self.height, thickness=self.depth, **vars(self.relief)
+        )
+
+    @property
+    def bending_stiffness(self) -> float:
+        """Bending stiffness E d^3 / 12 (1 - nu^2) of a sheet, N m."""
+        return self.solid.young * self.depth**3 / 12 / (1 - self.solid.poisson**2)
+
+    @property
+    def mass_per_area(self) -> float:
+        """Mass per area of a sheet, kg/m2."""
+        return self.solid.density * self.depth
+
+    @property
+    def strata(self) -> tuple[tuple[float, Material], ...]:
+        """Depth in metre where each material begins; neighbours of one material are one."""
+        found: list[tuple[float, Material]] = []
+        top = 0.0
+        for thickness, material in [
+            *((layer.thickness, solid_of(layer.material)) for layer in self.layers),
+            (inf, self.solid),
+        ]:
+            if not found or found[-1][1] != material:
+                found.append((top, material))
+            top += thickness
+        return tuple(found)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it is constrained: clamped at its base or its sides."""
+        return "clamped" in (self.base, self.sides)
+
+    @property
+    def is_skin(self) -> bool:
+        """Whether it is skin: a plate is paper."""
+        return self.of_kind.discretise is not None and not self.of_kind.is_plate
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is of one material and lies flat under the device."""
+        return len(self.strata) == 1 and self.placement == FLAT
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyKind:
+    """Kind of body: the keys that it takes, how it is meshed, and what is known of its waves.
+
+    Parameters
+    ----------
+    name : str, `kind` in a scene
+    keys : attributes of `Body` that only kinds take which list them
+    presets : name of a preset body -> attributes that differ from those of `Body()`; missing keys
+        of a scene are those of the first
+    check : raises a ValueError for a body that cannot be
+    words : kind and size of a body in a few words
+    discretise : mesh of a body, with elements of a size in metre; None without anything to mesh
+    check_size : raises a ValueError for an element size in metre that has too many elements
+    default_size : default element size of a body, metre
+    interactive_size : element size in metre for a response within seconds, with some per cent error
+    compliance : wavenumber integral of a laterally infinite body; None without any
+    wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
+    is_plate : bool, whether it is thin, so that it bends, in-plane tension stiffens it, and air
+        adds mass
+    is_layer : bool, whether it is a layer of uniform depth, which may be inf
+    is_symmetric : bool, whether its mesh may be halved at x = 0 and y = 0
+    is_bounded : bool, whether width and height are those of its surface
+    may_be_layered : bool
+    conforming : bool, whether elements follow its layers
+    mesh_is_cached : bool, whether its mesh is one per machine, which no run has to wait for
+    normal_patch : float, metre, standard deviation of the area about a probe whose mean normal is
+        the direction of its motion; 0 for the normal at the probe
+    """
+
+    name: str
+    keys: tuple[str, ...] = ()
+    presets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    check: Callable[[Body], object] = lambda body: None
+    words: Callable[[Body], str] = lambda body: _size(body)
+    discretise: Callable[[Body, float], Discretised] | None = None
+    check_size: Callable[[Body, float], None] = lambda body, h: None
+    default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
+    interactive_size: float = 4.5e-3
+    compliance: Callable[[Body], Compliance] | None = None
+    wave_speed: Callable[[Body, float], float] = lambda body, frequency: _rayleigh(body, frequency)
+    is_plate: bool = False
+    is_layer: bool = False
+    is_symmetric: bool = False
+    is_bounded: bool = True
+    may_be_layered: bool = True
+    conforming: bool = False
+    mesh_is_cached: bool = False
+    normal_patch: float = 0.0
+
+
+def _size(body: Body) -> str:
+    across = f"{1e3 * body.width:g} x {1e3 * body.height:g}"
+    deep = f" x {1e3 * body.depth:g}" if isfinite(body.depth) else ""
+    return f"{body.kind} of {across}{deep} mm"
+
+
+def _rayleigh(body: Body, frequency: float) -> float:
+    """Phase speed in m/s of the Rayleigh wave of a body's material, as if it were deep: in a layer
+    that is thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s
+    sqrt(mu*/rho)) and mu* = `Material.complex_modulus`.
+    """
+    solid = body.solid
+    slowness = 1 / np.sqrt(solid.complex_modulus(2 * np.pi * frequency) / solid.density)
+    return float(1 / np.real(slowness)) * solid.rayleigh_speed / solid.shear_speed
+
+
+KINDS: dict[str, BodyKind] = {}
+BODIES: dict[str, Body] = {}  # presets by name
+
+
+def register(kind: BodyKind) -> BodyKind:
+    """Add a kind of body and its presets to those that scenes may have.
+
+    Presets of a known kind need no kind of their own: `BODIES[name] = Body(...)`.
+
+    Raises
+    ------
+    ValueError
+        If there is one of that name.
+    """
+    extensions.add(KINDS, kind.name, kind, kind.discretise)
+    for name, own in kind.presets.items():
+        BODIES[name] = Body(kind=kind.name, **own)
+    return kind
+
+
+def kind_of(name: str) -> BodyKind:
+    """The kind of a name; raises a ValueError if there is none."""
+    if name not in KINDS:
+        extensions.load()
+    return KINDS[choose("body kind", name, KINDS)]
+
+
+def body_name(body: Body) -> str:
+    """The name of a preset body, or else the kind of a body."""
+    return next((name for name, known in BODIES.items() if known == body), body.kind)

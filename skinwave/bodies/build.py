@@ -1,0 +1,95 @@
+"""A body that is meshed, with its materials and boundary conditions, under the device."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem.assembly import Operators, assemble
+from fem.boundary import Support
+from fem.materials import Material
+from meshes import TetMesh, half
+from meshes.tetmesh import Floats, Ints
+from skinwave.bodies.body import Body
+from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.sizes import checked, default_size
+
+# Of a size that is asked for: a mesh that it is compared with may be so much coarser.
+COMPARED = 4 / 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Build:
+    """Meshed body: arguments of `fem.assemble`; `drag` (m,) in 1/s of the absorbing layer, or None;
+    `support` of a hand, or None.
+    """
+
+    mesh: TetMesh
+    material: dict[int, Material]
+    fixed: dict[str, str]
+    absorbing: Ints | None
+    drag: Floats | None = None
+    support: Support | None = None
+    symmetry: str = ""
+
+
+def build(
+    body: Body,
+    h: float | None = None,
+    symmetry: str = "",
+    discretise: Callable[[Body, float], Discretised] | None = None,
+) -> Build:
+    """Mesh a body with elements of h in metre, or as fine as the scene set needs.
+
+    Parameters
+    ----------
+    symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
+        part with positive coordinates is meshed, with symmetry conditions on these planes
+    discretise : instead of that of its kind
+
+    Raises
+    ------
+    ValueError
+        If the body is "none", or would have too many degrees of freedom.
+    """
+    size = checked(body, h or default_size(body), COMPARED)
+    discretise = discretise or body.of_kind.discretise
+    assert discretise  # else refused
+    made = discretise(body, size)
+    mesh = made.mesh
+    ends = {"bottom": body.base, "sides": body.sides}
+    ends = {name: end for name, end in ends.items() if len(mesh.facets.get(name, ()))}
+    fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
+    for axis in symmetry:
+        mesh = half(mesh, axis)
+        fixed[f"mirror_{axis}"] = axis
+    drag = made.drag(mesh) if made.drag else None
+    support = made.support(mesh) if made.support else None
+    if body.is_held and "xyz" not in fixed.values() and not (support and support.stiffness.any()):
+        raise ValueError(
+            f"the sides are clamped, but {body.file} has no facets 'sides' or 'cut' to fix; clamp "
+            "its base, or name them in the file"
+        )
+    mesh = replace(mesh, points=body.placement(mesh.points))
+    leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
+    return Build(
+        mesh=mesh,
+        material=dict(enumerate(made.materials)),
+        fixed=fixed,
+        absorbing=np.vstack(leaky) if leaky else None,
+        drag=drag,
+        support=support,
+        symmetry=symmetry,
+    )
+
+
+def operators(build: Build) -> Operators:
+    """Stiffness, damping and mass of a meshed body."""
+    return assemble(
+        build.mesh,
+        build.material,
+        fixed=build.fixed,
+        absorbing=build.absorbing,
+        drag=build.drag,
+        support=build.support,
+    )

@@ -1,0 +1,45 @@
+"""Mesh of a body before its boundary conditions, and the region of each element by its depth."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem.boundary import Support
+from fem.materials import Material
+from meshes import TetMesh
+from meshes.tetmesh import Floats
+
+THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it resolves
+Strata = Sequence[tuple[float, Material]]  # depth in metre where each begins, and its material
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Discretised:
+    """Mesh of a body in its own frame, of 10-node tetrahedra, with facets `top`, and `bottom` and
+    `sides` where conditions of these names hold.
+
+    `materials` by region; `drag`: mass-proportional damping (m,) in 1/s of the elements of a mesh;
+    `support`: elastic and absorbing support of a mesh. Both are called with the part of the mesh
+    that symmetry leaves.
+    """
+
+    mesh: TetMesh
+    materials: Sequence[Material]
+    drag: Callable[[TetMesh], Floats] | None = None
+    support: Callable[[TetMesh], Support] | None = None
+
+
+def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:
+    """Mesh whose regions are the strata by the depth (m,) in metre of each element, and their
+    materials.
+    """
+    starts, materials = zip(*strata, strict=True)
+    region = np.searchsorted(starts[1:], depths, side="right")
+    return replace(mesh, region=region), list(materials)
+
+
+def resolving_size(strata: Strata) -> float:
+    """Coarsest size in metre of elements that resolve layers which they do not follow."""
+    starts = [start for start, _ in strata]
+    return float(np.diff(starts).min(initial=np.inf)) / THINNEST

@@ -1,0 +1,76 @@
+"""Body in a file: a surface that is filled with elements, or a volume mesh."""
+
+from pathlib import Path
+
+import numpy as np
+
+import fem
+from fem.load_and_probe import facet_normals
+from meshes import MeshError, TetMesh, body_from_file, boundary_facets, quadratic
+from meshes.facets import seen_from_above
+from meshes.tetmesh import Ints
+from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.hands import depths, hand_size, support
+
+NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
+
+
+def discretise(body: Body, h: float) -> Discretised:
+    """Ten-node tetrahedra of h in metre about the middle, growing away from it.
+
+    The facet sets are `top`, seen from above, the file's own `bottom`, and `sides` where it was cut
+    or has a set of that name. All else that it rests on is its support.
+
+    Raises
+    ------
+    MeshError
+        If the body cannot be meshed, or its file has several regions.
+    """
+    mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
+    _check_regions(body.file, mesh)
+    cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
+    facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
+    if not _is_rest(mesh):
+        facets["bottom"] = mesh.facets["bottom"]
+    mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets=facets)
+    mesh, materials = in_layers(mesh, body.strata, depths(mesh))
+    return Discretised(mesh=mesh, materials=materials, support=lambda mesh: _support(body, mesh))
+
+
+def _support(body: Body, mesh: TetMesh) -> fem.Support:
+    """Support below, by the normals of the facets."""
+    return support(body, mesh, facet_normals(mesh, boundary_facets(mesh.tets)), [])
+
+
+def _check_regions(file: str, mesh: TetMesh) -> None:
+    if (count := len(np.unique(mesh.region))) > 1:
+        raise MeshError(
+            f"{file} has {count} regions, but a body from a file is of one material or of layers "
+            "below its top; save it as one region and describe its layers in the scene"
+        )
+
+
+def _is_rest(mesh: TetMesh) -> bool:
+    """Whether `bottom` is all of the boundary that is not seen from above, but for the cut."""
+    unseen = boundary_facets(mesh.tets)[~seen_from_above(mesh)]
+    cut = _corners(mesh.facets["cut"]) if "cut" in mesh.facets else set()
+    return _corners(mesh.facets["bottom"]) | cut == _corners(unseen) | cut
+
+
+def _corners(facets: Ints) -> set[tuple[int, ...]]:
+    """The corners of each facet, in rising order."""
+    return set(map(tuple, np.sort(facets[:, :3], axis=1).tolist()))
+
+
+MESH = register(
+    BodyKind(
+        name="mesh",
+        keys=("file", "unit", "up"),
+        words=lambda body: f"body from {Path(body.file).name}, {body.up} towards the device",
+        discretise=discretise,
+        default_size=hand_size,
+        is_bounded=False,
+        normal_patch=NORMAL_PATCH,
+    )
+)

@@ -1,0 +1,74 @@
+"""Parametric palm: soft tissue on bone, meshed finely under the focus."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+import fem
+from fem.load_and_probe import facet_points
+from meshes import TetMesh, boundary_facets, palm_mesh
+from meshes.files.import_body import GROWTH
+from meshes.shapes.palm import gradient
+from meshes.tetmesh import Floats
+from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.hands import depths, hand_size, support
+
+COARSEST = 2.0  # elements far from the middle, over those of h
+RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
+# Elements at the surface, over those of h, because the motion there has the scale of the focal
+# spot; up to which radius they have that size; and how much slower than sideways they grow
+# downwards.
+SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
+
+
+def discretise(body: Body, h: float) -> Discretised:
+    """Ten-node tetrahedra of h in metre about the middle of the palm, growing away from it; all
+    that it rests on is its support, bone below, and at its ends the tissue that it is cut from.
+
+    Raises
+    ------
+    MeshError
+        If it cannot be meshed.
+    """
+    # Larger elements do not follow the rim, where waves reflect and the base's support ends.
+    coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
+    mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
+    mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
+    mesh, materials = in_layers(mesh, body.strata, depths(mesh))
+    return Discretised(mesh=mesh, materials=materials, support=lambda mesh: _support(body, mesh))
+
+
+def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
+    """Edge lengths (n,) in metre aimed at in points (n, 3): 0.8 h where the focus travels, h some
+    5 mm below it, growing further down and out.
+    """
+    slope = float(np.log(GROWTH))
+
+    def sizes(points: Floats) -> Floats:
+        beside = np.maximum(np.linalg.norm(points[:, :2], axis=1) - FINE_RADIUS, 0.0)
+        below = DOWNWARDS * np.minimum(points[:, 2], 0.0)
+        return np.minimum(SURFACE * h + slope * np.hypot(beside, below), coarsest)
+
+    return sizes
+
+
+def _support(body: Body, mesh: TetMesh) -> fem.Support:
+    """Support below and at both ends, by the normals of the palm's level set."""
+    slope = gradient(body.palm, facet_points(mesh, boundary_facets(mesh.tets)))
+    outward = np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
+    return support(body, mesh, outward, [(body.sides, np.abs(outward[:, 1]))])
+
+
+PALM = register(
+    BodyKind(
+        name="palm",
+        keys=("relief",),
+        presets={"palm": {"width": 0.085}},
+        check=lambda body: body.palm,
+        discretise=discretise,
+        default_size=lambda body: min(body.depth / 2, hand_size(body)),
+        interactive_size=5e-3,
+        mesh_is_cached=True,
+    )
+)

@@ -1,0 +1,124 @@
+"""Parts of a body: its layers, the relief of a palm, and its placement under the device."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.materials import PRESETS, Material
+from meshes import Palm
+from simple_model.choices import choose
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer:
+    """A layer below the surface, or below the layer above it.
+
+    Parameters
+    ----------
+    thickness : float, metre
+    material : the name of a preset, or a Material
+
+    Raises
+    ------
+    ValueError
+        If the material is unknown, or the thickness not finite and above 0.
+    """
+
+    thickness: float
+    material: str | Material
+
+    def __post_init__(self) -> None:
+        check_material(self.material)
+        if not (isfinite(self.thickness) and self.thickness > 0):
+            raise ValueError(
+                f"layer thickness = {1e3 * self.thickness} mm must be finite and above 0"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relief:
+    """Relief of a palm, in metre, as in `meshes.Palm`; with all heights 0 a slab with rounded
+    edges.
+    """
+
+    cup_depth: float = Palm.cup_depth
+    thenar_height: float = Palm.thenar_height
+    hypothenar_height: float = Palm.hypothenar_height
+    pad_height: float = Palm.pad_height
+    corner_radius: float = Palm.corner_radius
+    edge_radius: float = 0.007  # soft tissue on bone is thinner than a whole hand
+
+
+PLAIN = Relief()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """Where a body lies under the device: turned about the x axis, then about the y axis of the
+    plane that the focus moves in, then moved.
+
+    Parameters
+    ----------
+    tilt_x, tilt_y : float, rad, at most 60 degrees
+    offset : (x, y) in metre
+    lift : float, metre, upwards, towards the device
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or out of range.
+    """
+
+    tilt_x: float = 0.0
+    tilt_y: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+    lift: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("tilt_x", "tilt_y"):
+            if not abs(getattr(self, name)) <= STEEPEST:
+                raise ValueError(
+                    f"{name} = {np.degrees(getattr(self, name)):g} degrees is beyond "
+                    f"{np.degrees(STEEPEST):.0f}, where next to no pressure is left; turn it less"
+                )
+        if not (np.isfinite(self.offset).all() and abs(self.lift) <= FURTHEST_LIFT):
+            raise ValueError(
+                f"offset {self.offset} m and lift {self.lift} m: the body must lie within "
+                f"{1e3 * FURTHEST_LIFT:g} mm of the focus; move the height of the focus with it"
+            )
+
+    @property
+    def is_tilted(self) -> bool:
+        """Whether it is turned, and not only moved."""
+        return bool(self.tilt_x or self.tilt_y)
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """The matrix (3, 3) that turns the body."""
+        (cx, cy), (sx, sy) = np.cos([self.tilt_x, self.tilt_y]), np.sin([self.tilt_x, self.tilt_y])
+        about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+        about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        return about_y @ about_x
+
+    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) of the body where they lie under the device."""
+        if self == FLAT:
+            return points
+        return points @ self.rotation.T + [*self.offset, self.lift]
+
+
+STEEPEST, FURTHEST_LIFT = np.pi / 3, 0.05
+FLAT = Placement()
+
+
+def solid_of(material: str | Material) -> Material:
+    """The material that a name stands for."""
+    return PRESETS[material] if isinstance(material, str) else material
+
+
+def check_material(material: str | Material) -> None:
+    """Refuse the name of a material that is no preset."""
+    if isinstance(material, str):
+        choose("material", material, PRESETS)

@@ -1,0 +1,70 @@
+"""Element sizes of a body: its default, the coarsest that resolves it, and what is refused."""
+
+from math import isfinite
+
+import numpy as np
+
+from skinwave.bodies.analytic import has_exact_waves
+from skinwave.bodies.body import Body
+from skinwave.bodies.discretised import THINNEST, resolving_size
+
+FINEST_HAND = 1e-3  # m: finer elements of a hand exceed the limits of its mesher
+
+
+def check_mesh(body: Body, h: float) -> None:
+    """Refuse, before anything is computed, what cannot be meshed with elements of h in metre.
+
+    Raises
+    ------
+    ValueError
+        If elements are larger than the body, or more than can be solved for.
+    """
+    h = checked(body, h)
+    body.of_kind.check_size(body, h)
+
+
+def checked(body: Body, h: float, slack: float = 1.0) -> float:
+    """The size h in metre if a body can be meshed with it, layers `slack` times as coarsely as is
+    allowed. Raises what `check_mesh` does.
+    """
+    if body.of_kind.discretise is None:
+        raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")
+    _check_layers(body, h, slack)
+    if not body.of_kind.is_bounded:
+        return h
+    if not isfinite(body.depth):
+        exact = "use --model flat-body or " if has_exact_waves(body) else ""
+        raise ValueError(f"depth_mm = inf has no mesh; {exact}give a finite depth")
+    longest = max(body.width, body.height, body.depth)
+    if h > longest:
+        raise ValueError(
+            f"elements of {1e3 * h:g} mm are larger than the body, whose longest side is "
+            f"{1e3 * longest:g} mm; take smaller ones"
+        )
+    return h
+
+
+def _check_layers(body: Body, h: float, slack: float) -> None:
+    """Refuse layers that elements which do not follow them cannot resolve."""
+    coarsest = coarsest_size(body)
+    thin, slab = 1e3 * THINNEST * coarsest, "or a slab, whose elements follow its layers"
+    if coarsest < FINEST_HAND * (1 - 1e-9):
+        raise ValueError(
+            f"a layer of {thin:g} mm of a {body.kind} is thinner than half of its finest elements, "
+            f"{1e3 * THINNEST * FINEST_HAND:g} mm; take thicker layers, {slab}"
+        )
+    if h > slack * coarsest * (1 + 1e-9):
+        raise ValueError(
+            f"a layer of {thin:g} mm is thinner than half an element of {1e3 * h:g} mm; take "
+            f"elements of {1e3 * coarsest:g} mm, thicker layers, {slab}"
+        )
+
+
+def default_size(body: Body) -> float:
+    """Default element size of a body, metre."""
+    return body.of_kind.default_size(body)
+
+
+def coarsest_size(body: Body) -> float:
+    """Coarsest element size in metre that resolves a body's layers; those of a slab follow them."""
+    return np.inf if body.of_kind.conforming else resolving_size(body.strata)

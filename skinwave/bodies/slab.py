@@ -1,0 +1,79 @@
+"""Thick slab: a layer of uniform depth, or a half-space. Its mesh and its wavenumber integral."""
+
+from functools import partial
+from math import isfinite
+
+import numpy as np
+
+from meshes import Grading, extrude, graded_axis
+from meshes.files.import_body import FINE_RADIUS
+from meshes.shapes.structured import check_size, with_planes
+from meshes.tetmesh import Floats
+from simple_model.compliance import Compliance, half_space, slab
+from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
+from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.discretised import Discretised, in_layers
+
+SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
+# From cell to cell along the surface and downwards, and the coarsest cell over the finest.
+GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
+
+
+def discretise(body: Body, h: float) -> Discretised:
+    """Structured mesh whose elements follow the layers, with any absorbing layer around it."""
+    mesh = extrude(*slab_lines(body, h))
+    depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+    mesh, materials = in_layers(mesh, body.strata, depths)
+    drag = partial(layer_drag, body) if has_layer(body) else None
+    return Discretised(mesh=mesh, materials=materials, drag=drag)
+
+
+def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
+    """Grid lines along x, y and z: fine where the focus travels, with any absorbing layer."""
+    along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
+    halves = [graded_axis(side / 2, h, along) for side in (body.width, body.height)]
+    if has_layer(body):
+        halves = [np.concatenate([half, half[-1] + layer_line(body, half)]) for half in halves]
+    x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
+    return x, y, -_depth_line(body, h)[::-1]
+
+
+def _depth_line(body: Body, h: float) -> Floats:
+    """Grid lines of a slab from its top downwards."""
+    down = Grading(radius=0.0, growth=GROWTH[1], coarsest=COARSEST[1] * h)
+    return with_planes(graded_axis(body.depth, h, down), [start for start, _ in body.strata[1:]])
+
+
+def cell_layers(body: Body, h: float) -> int:
+    """Number of cells of h in metre through the depth of a slab."""
+    return len(_depth_line(body, h)) - 1
+
+
+def compliance(body: Body) -> Compliance:
+    """Compliance of a slab on a rigid base, or of a half-space.
+
+    Raises
+    ------
+    ValueError
+        If its base is another.
+    """
+    if body.base != "clamped" and isfinite(body.depth):
+        raise ValueError(
+            "flat-body is for a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
+        )
+    return slab(body.solid, body.depth) if isfinite(body.depth) else half_space(body.solid)
+
+
+SLAB = register(
+    BodyKind(
+        name="slab",
+        presets={"skin-slab": {}},  # effective soft tissue of the palm on bone
+        discretise=discretise,
+        check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
+        default_size=lambda body: min(SLAB_CELL, body.depth / 2),
+        compliance=compliance,
+        is_layer=True,
+        is_symmetric=True,
+        conforming=True,
+    )
+)
