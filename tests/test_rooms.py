@@ -41,7 +41,10 @@ MESHES = {
 }
 COMMANDS = {"commands": set(INNER)}
 WITHIN = {"meshes": MESHES, "skinwave": INNER | COMMANDS}
-GROUND = {"meshes": set(), "skinwave": {"models", "planning", "pictures"}}  # of modules in no room
+GROUND = {
+    "meshes": set(),
+    "skinwave": {"bodies", "models", "planning", "pictures"},
+}  # of modules in no room
 DOORS = {"skinwave.cli"}  # which imports the commands
 
 
