@@ -5,8 +5,20 @@
 (`maxwell` has what Prony terms and other modulus laws add to K.)
 
 Operators are built once, factorised once, and then only solved with. Index letters of every
-einsum in this package: e element, q quadrature point, a b element nodes, i j components,
-n node, p probe, t time, f frequency, l derivative along an element edge.
+einsum in this package:
+
+    e    element or facet
+    q    quadrature point
+    a b  nodes of an element
+    d    derivative along an element edge, from corner 0 to another corner
+    i j  components of displacement
+    k l  directions at rest, of which a membrane has two
+    v w  linear pressure functions of a macroelement
+    n    node, or degree of freedom
+    p    probe, or point
+    m    mode, or vector of a basis
+    t    time
+    f    frequency
 """
 
 import warnings

@@ -68,7 +68,13 @@ def added_mass(
     axes : (2, 3) unit vectors along the sides of the rectangle
     mirrored : those of "xy" in whose positive half the mesh lies, the motion being the same in the
         other half; M is then of the part that is meshed
+    facets : a facet set's name or nodes (e, a), of the sheet
     rate : float, 1/s, of the sheet's own Rayleigh damping by mass
+
+    Returns
+    -------
+    AddedMass
+        Of the free degrees of freedom, kg.
 
     Raises
     ------
@@ -107,10 +113,18 @@ def near_field(
     spacing: tuple[float, float],
     mirrored: Sequence[bool] = (False, False),
 ) -> Callable[[Floats], Floats]:
-    """int w(y) / |x - y| dA (k, ny, nx) in metre of fields w (k, ny, nx) at nodes of a grid.
+    """Near-field integral int w(y) / |x - y| dA of fields at the nodes of a grid.
 
-    `spacing` in metre along y and x, as is `mirrored`, which adds the images of a field in the
-    first line of nodes; what lies on that line counts with its image.
+    Parameters
+    ----------
+    shape : numbers (ny, nx) of nodes
+    spacing : metre, along y and x
+    mirrored : whether the images in the first line of nodes along y and along x count as well; what
+        lies on that line counts with its image
+
+    Returns
+    -------
+    function of fields (k, ny, nx), to (k, ny, nx) in metre times their unit
     """
     whole = [2 * n - 1 if image else n for n, image in zip(shape, mirrored, strict=True)]
     padded = [fft.next_fast_len(2 * n - 1, real=True) for n in whole]
@@ -131,10 +145,17 @@ def near_field(
 
 
 def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
-    """int 1/r dA in metre over rectangles of a size in metre, their middles at x and y.
+    """Integral of 1/r over rectangles, x asinh(y/x) + y asinh(x/y) between their corners: the
+    potential of a charged plate (Durand, Electrostatique, vol. 1 (1964)).
 
-    x asinh(y/x) + y asinh(x/y) between the corners, the potential of a charged plate: Durand,
-    Electrostatique, vol. 1 (1964).
+    Parameters
+    ----------
+    x, y : (...) float, metre, middles of the rectangles
+    size : metre, along x and y
+
+    Returns
+    -------
+    (...) float, metre
     """
 
     def corner(x: Floats, y: Floats) -> Floats:

@@ -11,8 +11,9 @@
     K_j     = (mu_j/mu) K of the elements with a Prony term of one relaxation time: the stiffness
               of a generalised Maxwell branch, see `maxwell`
 
-Where nu > 0.45 most of lam acts on a projection of the dilatation, see `dilatation`; without that
-volumetric locking makes displacements some wavelengths away several per cent too small.
+Where nu > 0.45 most of lam acts on a projection of the dilatation, see `pressure_projection`;
+without that volumetric locking makes displacements some wavelengths away several per cent too
+small.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -85,6 +86,11 @@ def assemble(
     absorbing : absorbing facets (dashpots), by the name of their set or as nodes, or None.
     drag : (m,) float, 1/s, mass-proportional damping of each element in an absorbing layer
     support : springs and dashpots of a surface as functions of position, or None
+
+    Returns
+    -------
+    Operators
+        K in N/m, C in N s/m and M in kg of the free degrees of freedom.
 
     Raises
     ------
@@ -194,8 +200,18 @@ def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
 
 
 def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Element stiffness blocks (k, e, a, b) in N/m for the components (i, j) = UPPER[k], each with
-    the slice of its elements. The blocks below the diagonal are these, transposed.
+    """Element stiffness blocks, some elements at a time.
+
+    Parameters
+    ----------
+    mesh : TetMesh, of e elements
+    mu, lam : (e,) float, Pa, Lame's parameters
+
+    Yields
+    ------
+    slice of the elements
+    blocks : (6, e, a, b) float, N/m, for the components (i, j) in UPPER; those below the diagonal
+        are these, transposed
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     for slab in slabs(len(mesh.tets)):

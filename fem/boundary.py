@@ -65,7 +65,20 @@ def dashpots(
     region: Ints,
     share: Floats | None = None,
 ) -> sparse.csr_array:
-    """Lysmer-Kuhlemeyer damping (3 n, 3 n) of facets (k, a), or of a share (k q,) of them."""
+    """Lysmer-Kuhlemeyer damping matrix of absorbing facets.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    nodes : (e, a) int, of the facets
+    materials : list of Material
+    region : (elements,) int, index of each element's material
+    share : (e q,) float, fraction of the damping at each quadrature point; 1 if not given
+
+    Returns
+    -------
+    (3 n, 3 n) sparse, N s/m
+    """
     if share is not None:
         nodes, share = _where(nodes, share)
     m = [materials[r] for r in region[_owners(mesh, nodes)]]

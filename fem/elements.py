@@ -1,9 +1,7 @@
 """Lagrange shape functions and quadrature on triangles and tetrahedra.
 
 Both are written in barycentric coordinates, so that one formula serves both shapes: the
-quadratic functions are l_a (2 l_a - 1) at the corners and 4 l_a l_b at the mid-sides.
-Index letters of every einsum in `fem`: e element, q quadrature point, a b element nodes,
-i j components, n node, p probe, t time, f frequency, m mode, l barycentric coordinate.
+quadratic functions are L_a (2 L_a - 1) at the corners and 4 L_a L_b at the mid-sides.
 """
 
 from itertools import permutations
@@ -26,7 +24,7 @@ def shape_functions(barycentric: Floats, n_nodes: int) -> Floats:
 
 
 def shape_derivatives(barycentric: Floats, n_nodes: int) -> Floats:
-    """Derivatives (q, n_nodes, l - 1) along the edges from corner 0 to each other corner."""
+    """Derivatives (q, n_nodes, d) along the edges from corner 0 to each other corner."""
     points, corners = barycentric.shape
     by_coordinate = np.zeros((points, n_nodes, corners))
     if n_nodes == corners:

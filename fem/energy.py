@@ -57,7 +57,14 @@ def with_energy_balance(
 
     Parameters
     ----------
+    operators : Operators, that the states were stepped with
+    states : of `transient`
     force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
+
+    Yields
+    ------
+    state : State
+    balance : EnergyBalance, J
     """
     C, R, free = operators.C, operators.R, operators.free
 
@@ -82,8 +89,19 @@ def with_losses(
     free: Ints,
     lost: Callable[[State, State], EnergyBalance],
 ) -> Iterator[tuple[State, EnergyBalance]]:
-    """States of any body, each with the energy balance since the first: `lost` gives the losses
-    between two states.
+    """States of any body, each with the energy balance since the first.
+
+    Parameters
+    ----------
+    states : of any time integration
+    force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
+    free : (n_free,) int, free degrees of freedom
+    lost : two successive states -> the losses between them, J
+
+    Yields
+    ------
+    state : State
+    balance : EnergyBalance, J
     """
     before, spent = next(states), EnergyBalance()
     f = force(before.time)[free]
@@ -121,7 +139,7 @@ def mean_power(
     frequencies: Floats,
     branches: Sequence[Branch] = (),
 ) -> EnergyBalance:
-    """Mean power balance of a load's spectral lines, in W.
+    """Mean power balance of a load's spectral lines.
 
     Parameters
     ----------
@@ -129,6 +147,11 @@ def mean_power(
     forces, motion : (f, n) complex amplitudes of the load in N and of the displacement in metre
     frequencies : (f,) float, Hz
     branches : generalised Maxwell branches, of (n, n) each
+
+    Returns
+    -------
+    EnergyBalance
+        Of all lines together, W.
     """
     w = 2 * np.pi * frequencies
     apparent = w * (forces * motion.conj()).sum(axis=1) / 2

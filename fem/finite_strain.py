@@ -101,6 +101,12 @@ def finite_strain(
     Parameters
     ----------
     mesh, material, fixed : as for `assemble`
+    membrane : Membrane among the nodes of the mesh, or None
+
+    Returns
+    -------
+    Elastic
+        Forces in N and their tangent in N/m on the 3 n degrees of freedom.
 
     Raises
     ------
@@ -173,7 +179,7 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
     """
     nodes, m = membrane.triangles, membrane.material
     corners = mesh.points[nodes[:, :3]]
-    edges = corners[:, 1:, :2] - corners[:, :1, :2]  # (e, l, k)
+    edges = corners[:, 1:, :2] - corners[:, :1, :2]  # (e, d, k)
     area = np.linalg.det(edges) / 2
     if np.ptp(corners[..., 2]) > 1e-9 * np.abs(edges).max() or (area <= 0).any():
         raise MeshError(
@@ -182,7 +188,7 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
         )
     barycentric, weights = triangle_rule(2)
     derivatives = shape_derivatives(barycentric, nodes.shape[1])
-    G = np.einsum("ekl,qal->eqka", np.linalg.inv(edges), derivatives)
+    G = np.einsum("ekd,qad->eqka", np.linalg.inv(edges), derivatives)
     volume = membrane.thickness * area[:, None] * weights
     lam = 2 * m.first_lame * m.shear_modulus / (m.first_lame + 2 * m.shear_modulus)
     alike = np.ones(len(nodes))
@@ -196,7 +202,17 @@ def internal_force(part: Part, u: Floats) -> Floats:
 
 
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
-    """Rate (n, 3) in N/s of nodal forces: those of the stress of the rate of E at v (n, 3)."""
+    """Rate of nodal forces: those of the stress of the rate of E.
+
+    Parameters
+    ----------
+    part : Part, elements of one kind
+    u, v : (n, 3) float, metre and m/s, displacement and velocity
+
+    Returns
+    -------
+    (n, 3) float, N/s
+    """
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
     return spread_stress(part, stress(part, (rate + rate.swapaxes(2, 3)) / 2) @ F)

@@ -23,7 +23,25 @@ def shape_nodes(mesh: TetMesh) -> Floats:
 
 
 def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
-    """Shape gradients (e, q, i, a) and quadrature volumes (e, q); `nodes` (e, a, i) give shape."""
+    """Shape gradients and quadrature volumes of tetrahedra.
+
+    Parameters
+    ----------
+    nodes : (e, a, i) float, metre, that give the elements their shape
+    n_nodes : number of shape functions, 4 or 10
+    degree : of the quadrature
+    first : number of the first element, for messages
+
+    Returns
+    -------
+    gradients : (e, q, i, a) float, 1/m
+    volumes : (e, q) float, m3
+
+    Raises
+    ------
+    MeshError
+        If an element is inverted.
+    """
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
     cofactors, determinants, volumes = jacobians(nodes, degree, first)
     inverse = cofactors / determinants[..., None, None]
@@ -31,21 +49,39 @@ def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Flo
 
 
 def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
-    """Cofactors (e, q, l, i) and determinants (e, q) of the map from the reference element, and
-    quadrature volumes (e, q). Four nodes span a straight element, where q is 1 for the first two.
+    """Cofactors and determinants of the map from the reference element.
+
+    Parameters
+    ----------
+    nodes : (e, a, i) float, metre; four nodes span a straight element
+    degree : of the quadrature
+    first : number of the first element, for messages
+
+    Returns
+    -------
+    cofactors : (e, q, d, i) float, m2
+    determinants : (e, q) float, m3
+    volumes : (e, q) float, m3, of the quadrature points
+
+    q is 1 for the first two if elements are straight.
+
+    Raises
+    ------
+    MeshError
+        If an element is inverted.
     """
     barycentric, weights = tetrahedron_rule(degree)
     at = barycentric[:1] if nodes.shape[1] == 4 else barycentric
     jacobian = np.einsum(
-        "qal,eai->eqli", shape_derivatives(at, nodes.shape[1]), nodes, optimize=True
+        "qad,eai->eqdi", shape_derivatives(at, nodes.shape[1]), nodes, optimize=True
     )
     x, y, z = (jacobian[..., i] for i in range(3))
     cofactors = np.empty_like(jacobian)
-    for l in range(3):  # noqa: E741 - the letter of the derivatives
-        m, n = (l + 1) % 3, (l + 2) % 3
-        cofactors[..., l, 0] = y[..., m] * z[..., n] - z[..., m] * y[..., n]
-        cofactors[..., l, 1] = z[..., m] * x[..., n] - x[..., m] * z[..., n]
-        cofactors[..., l, 2] = x[..., m] * y[..., n] - y[..., m] * x[..., n]
+    for d in range(3):
+        m, n = (d + 1) % 3, (d + 2) % 3
+        cofactors[..., d, 0] = y[..., m] * z[..., n] - z[..., m] * y[..., n]
+        cofactors[..., d, 1] = z[..., m] * x[..., n] - x[..., m] * z[..., n]
+        cofactors[..., d, 2] = x[..., m] * y[..., n] - y[..., m] * x[..., n]
     determinants = (jacobian[..., 0, :] * cofactors[..., 0, :]).sum(axis=-1)
     inverted = np.flatnonzero((determinants <= 0).any(axis=1))
     if len(inverted):

@@ -34,12 +34,21 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
 def pressure_force(
     mesh: TetMesh, facets: str | Ints = "top", *, kind: str = "dead"
 ) -> Callable[[Floats, Floats], Floats]:
-    """Dead or follower load: a function that gives nodal forces (3 n,) in N of pressures (k q,) in
-    Pa at a displacement (3 n,) in metre.
+    """Dead or follower load of a pressure.
 
     A "dead" pressure has the direction and the area of the body at rest, as `load_operator`; a
     "follower" acts on the displaced surface: f_ai = -int N_a q (x_,1 x x_,2)_i (Belytschko, Liu and
     Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6).
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    facets : a facet set's name or nodes (e, a)
+    kind : "dead" or "follower"
+
+    Returns
+    -------
+    function of pressures (e q,) in Pa and a displacement (3 n,) in metre, to forces (3 n,) in N
 
     Raises
     ------
@@ -78,12 +87,23 @@ def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
 def probe_operator(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> sparse.csr_array:
-    """Probe operator S (p, 3 n): displacement into the body, metre, at surface points (p, 2 or 3).
+    """Probe operator S: displacement into the body at surface points.
 
     A point is projected along z onto the facets; positive is the direction of a pressure, against
-    the normal of the facet; or, with a `patch` in metre, against the mean normal of the surface,
-    weighted by a Gaussian of that standard deviation about the point. Next to a crease the facet
-    itself depends on the mesh.
+    the normal of the facet; or, with a patch, against the mean normal of the surface. Next to a
+    crease the facet itself depends on the mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    points : (p, 2 or 3) float, metre
+    facets : a facet set's name or nodes (e, a)
+    patch : metre, standard deviation of the Gaussian that weights the normals about a point; 0: the
+        facet's own normal
+
+    Returns
+    -------
+    (p, 3 n) sparse, without unit
 
     Raises
     ------
@@ -131,7 +151,7 @@ def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> F
 def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
     """The two edge tangents at one barycentric point (p, 3) per facet (p, a)."""
     derivatives = shape_derivatives(barycentric, nodes.shape[1])
-    tangents = np.einsum("pal,pai->pli", derivatives, mesh.points[nodes])
+    tangents = np.einsum("pad,pai->pdi", derivatives, mesh.points[nodes])
     return tangents[:, 0], tangents[:, 1]
 
 
@@ -144,7 +164,7 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
     """`facet_geometry` of facets whose nodes are at places (e, a, i)."""
     barycentric, weights = triangle_rule()
     derivatives = shape_derivatives(barycentric, places.shape[1])
-    tangents = np.einsum("qal,eai->eqli", derivatives, places, optimize=True)
+    tangents = np.einsum("qad,eai->eqdi", derivatives, places, optimize=True)
     normals = np.cross(tangents[:, :, 0], tangents[:, :, 1]) / 2
     return shape_functions(barycentric, places.shape[1]), normals * weights[:, None]
 
@@ -159,7 +179,7 @@ def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:
         N = shape_functions(barycentric, facets.shape[1])
         miss = points - np.einsum("pa,pai->pi", N, facets)
         tangents = np.einsum(
-            "pal,pai->pil", shape_derivatives(barycentric, facets.shape[1]), facets
+            "pad,pai->pid", shape_derivatives(barycentric, facets.shape[1]), facets
         )
         step = np.linalg.solve(tangents, miss[:, :, None])[:, :, 0]
         barycentric = barycentric + np.column_stack([-step.sum(axis=1), step])
@@ -167,7 +187,18 @@ def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:
 
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> NDArray[np.bool_]:
-    """Whether `probe_operator` can read at points (p, 2) in metre."""
+    """Points at which `probe_operator` can read.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    points : (p, 2) float, metre
+    facets : a facet set's name or nodes (e, a)
+
+    Returns
+    -------
+    (p,) bool
+    """
     _, barycentric = _nearest(mesh.points[facet_set(mesh, facets)[:, :3], :2], points)
     return np.all(barycentric >= -BESIDE, axis=1)
 

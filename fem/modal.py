@@ -67,6 +67,7 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
 
     Parameters
     ----------
+    poles : Poles, of p outputs
     forces : (f, r) reduced forces of the lines, N kg^-1/2
     frequencies : (f,) float, Hz
 
@@ -83,10 +84,19 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
 
 
 def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
-    """Exponential sum (t, p): Re sum_j amplitudes (j, p) exp(rates (j,) t) at equally spaced times
-    (t,) from 0.
+    """Exponential sum Re sum_j amplitudes exp(rates t).
 
     Exponentials are computed within one chunk of times and at the start of each, and multiplied.
+
+    Parameters
+    ----------
+    rates : (j,) complex, 1/s
+    amplitudes : (j, p) complex
+    times : (t,) float, s, equally spaced from 0
+
+    Returns
+    -------
+    (t, p) float, in the unit of the amplitudes
     """
     j, p = amplitudes.shape
     if j > MOST_RATES:
@@ -106,14 +116,19 @@ def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Float
 
 
 def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt: float) -> Floats:
-    """Probe displacement (t, p) in metre from rest, exact for a load linear within each step.
+    """Probe displacement from rest, exact for a load linear within each step.
 
     Parameters
     ----------
+    poles : Poles, of p outputs
     footprints : (k, r) reduced forces at k positions of the focus, N kg^-1/2 per Pa
     position : (t,) float, position of the focus, in 0..k-1; between two positions linear
     gain : (t,) float, Pa, pressure at the focus
     dt : float, s
+
+    Returns
+    -------
+    (t, p) float, metre
     """
     from scipy.signal import lfilter  # brings scipy.stats, half a second that few models need
 

@@ -44,14 +44,20 @@ def static(
     tolerance: float = 1e-8,
     solver: str = "auto",
 ) -> Floats:
-    """Static displacement (3 n,) in metre under a force applied in as few load steps as converge.
+    """Static displacement under a force applied in as few load steps as converge.
 
     Parameters
     ----------
+    body : Elastic
     force : (3 n,) in N; or displacement (3 n,) -> such forces, for those that follow the body
     start : (3 n,) in metre, initial guess; undeformed if not given
     tolerance : residual relative to the force; or, of a residual below `ROUND_OFF`, the
         correction that it calls for, relative to the displacement
+    solver : of `linear_solver.factorise`
+
+    Returns
+    -------
+    (3 n,) float, metre
 
     Raises
     ------
@@ -148,17 +154,24 @@ def dynamic(
     tolerance: float = 1e-3,
     solver: str = "auto",
 ) -> Iterator[State]:
-    """States at 0, dt, 2 dt, ... by generalized-alpha and Newton's method, without end.
+    """Time integration by generalized-alpha and Newton's method, without end.
 
     A step for which Newton's method does not converge is made of two halves, and so on.
 
     Parameters
     ----------
+    body : Elastic
     force : time in s and displacement (3 n,) in metre -> nodal forces (3 n,) in N
     dt : float, s
     spectral_radius : 0 to 1, factor per step on the amplitude of motion far above 1/dt
     initial : displacement and velocity to start from; at rest at time 0 if not given
     tolerance : the last correction of a step's displacement, relative to that displacement
+    solver : of `linear_solver.factorise`
+
+    Yields
+    ------
+    State
+        At 0, dt, 2 dt, ...
 
     Raises
     ------
@@ -279,7 +292,14 @@ def with_energy_balance(
 
     Parameters
     ----------
+    body : Elastic
+    states : of `dynamic`
     force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
+
+    Yields
+    ------
+    state : State
+    balance : EnergyBalance, J
     """
     free = body.operators.free
 

@@ -39,9 +39,17 @@ def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:
 
 
 def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -> Floats:
-    """Orthonormal linear pressure functions over each of the `macroelements`, in m^-3/2, at the
-    points of each element for degree 2 (e, q, 4); the constant alone, and else 0, where not
-    `sloping`.
+    """Orthonormal linear pressure functions over each macroelement.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    cluster : (e,) int, macroelement of each element
+    sloping : (c,) bool, where functions may slope: elsewhere the constant alone, and else 0
+
+    Returns
+    -------
+    (e, q, 4) float, m^-3/2, at the quadrature points for degree 2
     """
     nodes = shape_nodes(mesh)
     volumes = jacobians(nodes, 2, 0)[2]

@@ -177,6 +177,7 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 
     Parameters
     ----------
+    model : ReducedModel
     forces : (r, k) float, N kg^-1/2, reduced forces
     frequencies : (f,) float, Hz
 
@@ -323,11 +324,11 @@ def _moments(
 
 
 def _norms(block: Floats, product: Floats) -> Floats:
-    """Mass norms (k,) of columns with their product with M.
+    """Mass norms (m,) of columns with their product with M.
 
     At rest every second moment of a body without loss is 0, which is no direction.
     """
-    return np.maximum(np.sqrt(np.einsum("nk,nk->k", block, product)), SMALLEST)
+    return np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), SMALLEST)
 
 
 def _padded(coordinates: Floats, size: int) -> Floats:

@@ -73,10 +73,24 @@ def stretching_modes(
 
     Parameters
     ----------
+    mesh : TetMesh, of the sheet
     operators : the sheet's linear operators, from `assemble`
     membrane : the whole membrane stiffness, among the nodes of the mesh
+    n : number of modes
     added : added mass of a fluid, as `added_mass` gives it; the modes with it are combinations of
         the n lowest without
+    solver : of `linear_solver.factorise`
+    progress : called with the fraction done
+
+    Returns
+    -------
+    StretchingModes
+        In coordinates (n,) in kg^1/2 m.
+
+    Raises
+    ------
+    Diverged
+        If the modes do not converge.
     """
     hz, shapes = modes(operators, n, solver=solver)
     damping: Any = 0.0
@@ -120,7 +134,19 @@ def _projected(A: Any, shapes: Floats) -> Floats:
 
 
 def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
-    """The sheet's energy and its derivatives with respect to z; `lag` in s as in `stress_lag`."""
+    """Strain energy of a sheet in its modal coordinates z, and its derivatives.
+
+    Parameters
+    ----------
+    modal : Operators, diagonal K in 1/s2, of r modes
+    H : (k, r, r) float, geometric stiffness of each state of stress
+    lag : s, viscosity over modulus, as of `stress_lag`
+
+    Returns
+    -------
+    Elastic
+        In coordinates (r,).
+    """
     squares, n = modal.K.diagonal(), len(modal.free)
     stacked = H.reshape(-1, n)
 

@@ -16,10 +16,20 @@ MOST_RESTARTS = 40  # of Lanczos' method
 
 
 def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floats:
-    """Static displacement (3 n,) or (3 n, k) in metre under nodal forces (3 n,) or (3 n, k) in N.
+    """Static displacement under nodal forces.
 
     One step of iterative refinement: thin sheets are so ill-conditioned that a direct solution
     alone leaves residuals near 1e-5.
+
+    Parameters
+    ----------
+    operators : Operators
+    force : (3 n,) or (3 n, k) float, N
+    solver : of `linear_solver.factorise`
+
+    Returns
+    -------
+    (3 n,) or (3 n, k) float, metre
 
     Raises
     ------
@@ -33,9 +43,20 @@ def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floa
 
 
 def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats, Floats]:
-    """Natural modes: the n lowest frequencies (n,) in Hz and mass-normalised shapes (3 n, n).
+    """Natural modes of lowest frequency, without damping.
 
-    Rigid-body modes of a free body are found near 0 Hz. Damping is left out.
+    Rigid-body modes of a free body are found near 0 Hz.
+
+    Parameters
+    ----------
+    operators : Operators
+    n : number of modes
+    solver : of `linear_solver.factorise`
+
+    Returns
+    -------
+    frequencies : (n,) float, Hz
+    shapes : (3 n_nodes, n) float, kg^-1/2, mass-normalised
 
     Raises
     ------

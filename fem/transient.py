@@ -46,14 +46,21 @@ def transient(
     initial: State | None = None,
     solver: str = "auto",
 ) -> Iterator[State]:
-    """States at 0, dt, 2 dt, ... by the generalized-alpha method, without end.
+    """Time integration by the generalized-alpha method, without end.
 
     Parameters
     ----------
+    operators : Operators
     force : time in s -> nodal forces (3 n,) in N
     dt : float, s
     spectral_radius : 0 to 1, factor per step on the amplitude of motion far above 1/dt
     initial : state to start from; at rest at time 0 if not given
+    solver : of `linear_solver.factorise`
+
+    Yields
+    ------
+    State
+        At 0, dt, 2 dt, ...
 
     Raises
     ------

@@ -95,6 +95,7 @@ def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tup
 
     Parameters
     ----------
+    pressure : MovingPressure
     points : (k, 2 or 3) float, metre, of the surface
     load : (k, r) float, reduced forces of unit pressure at each point
 
@@ -162,8 +163,17 @@ def path_fourier(values: Floats | Complex) -> Complex:
 
 
 def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
-    """Fourier synthesis (t, p): Re sum a exp(2 pi i f t) of lines (f,) in Hz with amplitudes
-    (f, p), at times in s.
+    """Fourier synthesis Re sum a exp(2 pi i f t).
+
+    Parameters
+    ----------
+    frequencies : (f,) float, Hz
+    amplitudes : (f, p) complex
+    times : (t,) float, s
+
+    Returns
+    -------
+    (t, p) float, in the unit of the amplitudes
     """
     turn = np.exp(2j * np.pi * np.outer(times, frequencies))
     return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
