@@ -25,12 +25,11 @@ from fem.load_and_probe import (
     facet_points,
     load_operator,
     on_surface,
-    pressure_force,
     probe_operator,
 )
 from fem.materials import PRESETS, Material, from_young
 from fem.maxwell import MaxwellBranch
-from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
+from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
@@ -73,10 +72,8 @@ __all__ = [
     "nonlinear",
     "on_surface",
     "poles",
-    "pressure_force",
     "probe_operator",
     "reduce",
-    "respond",
     "static",
     "stored",
     "stretching_modes",
