@@ -41,7 +41,7 @@ from fem.load_and_probe import (
     probe_operator,
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
-from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
+from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
@@ -90,7 +90,6 @@ __all__ = [
     "pressure_force",
     "probe_operator",
     "reduce",
-    "respond",
     "static",
     "stored",
     "stretching_modes",

@@ -1,8 +1,11 @@
 """Pages show what a user or a file has written, and run none of it."""
 
+import ast
 import json
 import re
 from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +13,13 @@ import pytest
 import tomli_w
 from in_browser import needs_browser
 
+import skinwave
 from simple_model import Effort, Response
 from skinwave import document
 from skinwave.cli import main
-from skinwave.document import Html, joined, markup
+from skinwave.document import Markup
 from skinwave.scene_file import loads
-from skinwave.studies import relax_page, tradeoff
+from skinwave.studies import mechanisms, relax_page, tradeoff
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Ladder, Rung
 from skinwave.studies.tradeoff import Candidate, Measured, Study
@@ -84,6 +88,14 @@ def verified(folder):
     (folder / "index.html").write_text(shown, encoding="utf-8")
 
 
+def mechanised(folder):
+    line = mechanisms.Line(
+        tacton=HOSTILE, body=HOSTILE, mechanism=HOSTILE, line=HOSTILE, frequency=1.0, amplitude=1e-6
+    )
+    found = mechanisms.Findings(lines=(line,), ratios=(), failed=(HOSTILE,))
+    mechanisms.write(folder, found)
+
+
 def ran(folder):
     (folder / "scene.toml").write_text(table(body={"kind": "none"}), encoding="utf-8")
     out = ["--out", str(folder / "out"), "--quiet"]
@@ -114,7 +126,7 @@ def compared(folder):
     assert main(["compare", str(folder / "scene.toml"), "--h", "6", *out]) == 0
 
 
-WRITERS = (relaxed, traded, verified, ran, reported, compared)
+WRITERS = (relaxed, traded, verified, mechanised, ran, reported, compared)
 
 
 def opened(browser, path, obeyed=False):
@@ -126,6 +138,30 @@ def opened(browser, path, obeyed=False):
     tab.goto(f"file://{path}")
     tab.wait_for_timeout(300)
     return tab, said
+
+
+class Tags(HTMLParser):
+    """What elements a page has, and its text."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.found, self.text = set(), ""
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.found |= {tag, *(name for name, _ in attrs if name.startswith("on"))}
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.mark.parametrize("write", WRITERS[:5], ids=lambda write: write.__name__)
+def test_a_text_that_looks_like_markup_is_text(tmp_path, write):
+    write(tmp_path)
+    for path in tmp_path.rglob("index.html"):
+        page = Tags(path.read_text(encoding="utf-8"))
+        assert not page.found & {"b", "script", "svg", "onerror", "onload"}
+        assert HOSTILE in page.text
 
 
 @pytest.mark.slow
@@ -149,7 +185,7 @@ def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
 @needs_browser
 def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
     """The second line of defence, by itself."""
-    page = document.page("t", Html(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
+    page = document.page("t", Markup(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
     tab, said = opened(browser, tmp_path / "index.html")
     assert not tab.evaluate("window.ran")
@@ -179,15 +215,16 @@ def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
 
 
 def test_only_html_made_here_is_taken_as_it_is():
-    assert markup("<p>{}</p>", "<b>") == "<p>&lt;b&gt;</p>"
-    assert markup("<p>{}</p>", Html("<b>")) == "<p><b></p>"
-    assert joined(["<b>", Html("<i>")], "") == "&lt;b&gt;<i>"
-    forgotten = Html("<b>") + "<i>"
-    assert not isinstance(forgotten, Html)
+    cells = ["<b>1</b>", Markup("<b>2</b>"), Markup("<i>{}</i>").format("<b>"), "-1e+3"]
+    made = document.table([], [cells])
+    assert "<td>&lt;b&gt;1&lt;/b&gt;</td><td><b>2</b></td><td><i>&lt;b&gt;</i></td>" in made
+    assert '<td class="number">-1e+3</td>' in made
+    assert "&lt;p&gt;<b>" in document.page("", "<p>" + Markup("<b>"))
     for made in (
         document.page("<t>", "<p>"), document.section("<t>", "<p>"), document.paragraph("<p><t>"),
         document.table(["<t>"], [["<p>", "< -120"]]),
         document.picture(b"", "<p>\"'", '<t>"'), document.inner_page("<p>", "<t>"),
+        document.preformatted("<p><t>"),
         document.warnings_banner([("<t>", Effort(warnings=("<p>",)))]),
     ):  # fmt: skip
         assert not re.search(r"<[pt]>[^<]*(?!</p>)<[pt]>|<t>|<p>\"", made)
@@ -199,9 +236,17 @@ def test_every_page_has_its_policy(tmp_path):
     verified(tmp_path)
     page = (tmp_path / "index.html").read_text()
     assert page.index("Content-Security-Policy") < page.index("<title>")
-    assert "default-src 'none'" in page
+    assert "default-src 'none'" in unescape(page)
     assert "script-src" not in page
-    sources = [*Path("skinwave").rglob("*.py")] if Path("skinwave").is_dir() else []
-    for path in sources:  # pages come from `document.page` alone
-        if path.name not in ("document.py", "front.py"):
-            assert "<!doctype" not in path.read_text(encoding="utf-8").lower(), path
+    for path in Path(skinwave.__file__).parent.rglob("*.py"):  # pages come from a template alone
+        assert "<!doctype" not in path.read_text(encoding="utf-8").lower(), path
+
+
+def test_markup_is_made_of_literals_alone():
+    made = 0
+    for path in Path(skinwave.__file__).parent.rglob("*.py"):
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(call, ast.Call) and ast.unparse(call.func).endswith("Markup"):
+                made += 1
+                assert all(isinstance(each, ast.Constant) for each in call.args), path
+    assert made > 5

@@ -152,6 +152,7 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
         "dask",
         "pyarrow",
         "platformdirs",
+        "jinja2",
     }
     assert not loaded & heavy
     assert {"numpy"} <= loaded
@@ -159,7 +160,8 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
 
 def test_help_loads_nothing_heavy():
     code = "import sys, skinwave.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
-    code += "assert not {'numpy', 'scipy', 'matplotlib', 'rich', 'dask'} & set(sys.modules)"
+    code += "assert not {'numpy', 'scipy', 'matplotlib', 'rich', 'dask'} & set(sys.modules)\n"
+    code += "assert not {'jinja2', 'markupsafe', 'platformdirs'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 

@@ -1,7 +1,7 @@
 """Phase speed of surface waves, the Mach angle of a faster focus, and the period of a pattern."""
 
 from dataclasses import replace
-from math import asin, ceil, pi
+from math import asin, ceil
 
 import numpy as np
 
@@ -33,18 +33,6 @@ def mach_angle(wave_speed: float, speed: float) -> float | None:
     For a straight path: on a circle smaller than a wavelength no clean cone forms.
     """
     return asin(wave_speed / speed) if speed > wave_speed else None
-
-
-def apparent_speed(distances: Floats, times: Floats, motion: Floats, frequency: float) -> float:
-    """Apparent phase speed in m/s of a line of motion (t, p) along distances (p,) in metre.
-
-    The phase of its part at `frequency` Hz is fitted by a straight line, weighted by amplitude;
-    the times (t,) in s should span whole periods. Negative where waves come in.
-    """
-    wave = motion.T @ np.exp(-2j * pi * frequency * times)
-    phase = np.unwrap(np.angle(wave))
-    slope = np.polyfit(distances, phase, 1, w=np.abs(wave))[0]
-    return float(-2 * pi * frequency / slope)
 
 
 def seam(tacton: Tacton, span: float) -> float:

@@ -11,8 +11,6 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from skinwave.scene import Scene
 
-NOT_A_NUMBER = "must be a finite number"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Pattern:

@@ -23,7 +23,6 @@ from skinwave.pictures.views import View
 from skinwave.reports.album import Album
 from skinwave.run import Run
 
-FORMATS = ("png", "svg", "pdf")
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
 QUALITY, FILM_QUALITY = 88, 60  # of pictures inside a page
 

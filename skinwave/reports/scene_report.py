@@ -135,10 +135,9 @@ def _write_data(folder: Path, album: Album) -> None:
 
 def _asked(album: Album) -> str:
     rows = _asked_rows(album.scene)
-    scene = document.markup(
-        '<details class="screen"><summary>The scene in full</summary><pre>{}</pre></details>',
-        dumps(album.scene),
-    )
+    scene = document.Markup(
+        '<details class="screen"><summary>The scene in full</summary>{}</details>'
+    ).format(document.preformatted(dumps(album.scene)))
     return document.section("What was asked", document.table(["", ""], rows), scene)
 
 
@@ -178,7 +177,7 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    said = document.joined(map(document.paragraph, untold(runs)), "")
+    said = document.Markup().join(map(document.paragraph, untold(runs)))
     known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
     if not known and not any(run.unnamed for run in runs):
         return said or document.paragraph("A constant pressure on a focus at rest has no line.")
@@ -197,8 +196,8 @@ def _lines(runs: Sequence[Run]) -> str:
         header += [f"{answered(run)}, {'Pa' if run.response.unit == 'Pa' else 'µm'} peak"]
         header += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
-    heading = document.markup("<h3>{}</h3>", f"Lines at ({x:g}, {y:g}) mm")
-    return document.joined([heading, document.table(header, rows), said], "")
+    heading = document.Markup("<h3>Lines at ({:g}, {:g}) mm</h3>").format(x, y)
+    return heading + document.table(header, rows) + said
 
 
 def _share(run: Run, name: str, probe: int) -> float:
@@ -301,7 +300,7 @@ def _again(album: Album) -> list[str]:
     command = (album.trust or {}).get("command") or "skinwave report scene.toml"
     said = renderer().said if renderer().found else "none"
     return [
-        document.markup("<p><code>{}</code></p>", command),
+        document.Markup("<p><code>{}</code></p>").format(command),
         document.paragraph(f"Computed with {named}; drawn with {said}. The scene:"),
-        document.markup("<pre>{}</pre>", dumps(album.scene)),
+        document.preformatted(dumps(album.scene)),
     ]

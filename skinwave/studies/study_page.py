@@ -49,7 +49,7 @@ def write_single(folder: Path, run: Run) -> None:
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *map(document.paragraph, untold([run])),
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
-        document.section("The scene", document.markup("<pre>{}</pre>", dumps(run.scene))),
+        document.section("The scene", document.preformatted(dumps(run.scene))),
     ]
     title = f"{run.tacton} on {run.body}: {run.model}"
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from skinwave.document import Html, joined, markup, paragraph, table
+from skinwave.document import Markup, paragraph, table
 from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import label
 from skinwave.pictures.surfaces import SURFACES, surfaces_figure
@@ -74,7 +74,7 @@ def small_table(columns: Sequence[Propagation], name: str) -> str:
     return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
 
 
-def beside_published(kernel: Run, published: Run) -> Html:
+def beside_published(kernel: Run, published: Run) -> Markup:
     """Effect of drive law and focus: the kernel as published beside the same load."""
     names = [n for n in kernel.frequencies if n in published.frequencies]
     levels = [
@@ -93,12 +93,10 @@ def beside_published(kernel: Run, published: Run) -> Html:
     drives = " against ".join(
         f"{r.scene.pressure.drive}, {r.scene.pressure.focus}" for r in (kernel, published)
     )
-    return markup(
+    return Markup(
         "<details><summary>Kernel as published beside the same load: what the drive law and the "
-        "focus change</summary>{}{}</details>",
-        paragraph(drives + "; largest at any probe."),
-        folded,
-    )
+        "focus change</summary>{}{}</details>"
+    ).format(paragraph(drives + "; largest at any probe."), folded)
 
 
 def _propagated(found: Propagation) -> str:
@@ -208,7 +206,7 @@ def _reach(found: Reach | None) -> str:
     return f"{'> ' * found.beyond}{1e3 * found.metre:.0f}"
 
 
-def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Html:
+def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Markup:
     """Tacton -> body -> what propagation changes, a row each."""
     rows = [
         [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
@@ -220,4 +218,4 @@ def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Html:
     header = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
     header += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
     header += ["highest sensation level"]
-    return joined([paragraph(ABOUT_MAPS), table(header, rows)], "")
+    return paragraph(ABOUT_MAPS) + table(header, rows)

@@ -7,7 +7,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import Effort
 from skinwave.comparison import compare, moving_rms
-from skinwave.document import Html, joined, markup, paragraph, table
+from skinwave.document import Markup, paragraph, table
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label
 from skinwave.propagation import strongest_component
@@ -18,7 +18,7 @@ SILENT = 0.01  # of the strongest probe: where the reference moves less, no misf
 ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
 
 
-def claims_table(verdicts: list[Verdict]) -> Html:
+def claims_table(verdicts: list[Verdict]) -> Markup:
     """Claims down, kernels and bodies across: holds or fails, and the number that decides."""
     columns = list(dict.fromkeys(v.column for v in verdicts))
     found = {(v.claim, v.column): v for v in verdicts}
@@ -30,7 +30,7 @@ def claims_table(verdicts: list[Verdict]) -> Html:
     return table(["claim", *map(label, columns)], rows)
 
 
-def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Html:
+def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Markup:
     """Each Tacton's responses, in pairs between which one thing changes: drive law and focus
     from the published kernel to that under the same load, propagation from this to a body.
     """
@@ -80,7 +80,7 @@ def _between(values: Floats) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None = None) -> Html:
+def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None = None) -> Markup:
     """Seconds by phase, size and memory of each reduced body, and of the whole."""
     rows = []
     for name, effort in efforts.items():
@@ -99,7 +99,7 @@ def effort_table(efforts: dict[str, Effort], tactons: int, total: float | None =
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
     counted = f"{tactons} Tacton{'s' * (tactons != 1)}"
     summary = f"{counted} took {spent:.0f} s in all, at most {peak:.2f} GiB in a process. {named}"
-    return joined([table(header, rows), paragraph(summary)], "")
+    return table(header, rows) + paragraph(summary)
 
 
 def _spread(spread: dict[int, float]) -> str:
@@ -110,4 +110,5 @@ def _verdict(verdict: Verdict | None) -> str:
     if verdict is None:
         return "not assessed"
     kind, word = ("yes", "holds") if verdict.holds else ("no", "fails")
-    return markup('<span class="{}">{}</span><br><small>{}</small>', kind, word, verdict.sentence)
+    template = Markup('<span class="{}">{}</span><br><small>{}</small>')
+    return template.format(kind, word, verdict.sentence)

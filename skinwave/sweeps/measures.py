@@ -29,7 +29,6 @@ AT_PROBES = (
     "probe_x_mm", "probe_y_mm", "peak_um", "rms_um", "level_db", "kernel_peak_pa", "kernel_rms_pa",
     "kernel_misfit", "kernel_shape_misfit", "kernel_delay_ms",
 )  # fmt: skip
-COSTS = ("seconds", "peak_memory_gib")  # which differ from run to run
 
 
 def columns(cases: Iterable[Case]) -> dict[str, str]:

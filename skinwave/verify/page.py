@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from skinwave import document
+from skinwave.document import Markup
 from skinwave.effort import versions
 from skinwave.pictures.figures import SPARE, png
 from skinwave.verify.case import Check, Entry, Plot, Result
@@ -67,11 +68,8 @@ def summary_table(results: list[Result]) -> str:
 def _summary(results: list[Result]) -> str:
     rows = [
         [
-            document.markup(
-                '<a href="#{}">{}</a><br><small>{}</small>',
-                r.entry.name,
-                r.case.title,
-                _quantity(r.case.worst),
+            Markup('<a href="#{}">{}</a><br><small>{}</small>').format(
+                r.entry.name, r.case.title, _quantity(r.case.worst)
             ),
             *_numbers(r.case.worst),
             _verdict(r.case.passed),
@@ -87,19 +85,19 @@ def _shown(result: Result) -> str:
     case = result.case
     rows = [[_quantity(c), *_numbers(c), _verdict(c.passed)] for c in case.checks]
     parts = [
-        document.markup(
-            '<h3 id="{}">{} {}</h3>', result.entry.name, case.title, _verdict(case.passed)
+        Markup('<h3 id="{}">{} {}</h3>').format(
+            result.entry.name, case.title, _verdict(case.passed)
         ),
-        document.markup("<p><small>Source: {}.<br>Mesh: {}.</small></p>", case.source, case.mesh),
+        Markup("<p><small>Source: {}.<br>Mesh: {}.</small></p>").format(case.source, case.mesh),
         document.table(["quantity", *HEADER, ""], rows),
     ]
     if case.said:
-        parts.append(document.markup("<p>It says: <code>{}</code></p>", case.said))
+        parts.append(Markup("<p>It says: <code>{}</code></p>").format(case.said))
     if case.note:
         parts.append(document.paragraph(case.note))
     if case.plot:
         parts.append(document.picture(png(_figure(case.plot), 90), case.title))
-    return document.joined(parts)
+    return Markup("\n").join(parts)
 
 
 def _figure(plot: Plot) -> Figure:
@@ -152,4 +150,4 @@ def _word(passed: bool) -> str:
 
 
 def _verdict(passed: bool) -> str:
-    return document.markup('<span class="{}">{}</span>', "yes" if passed else "no", _word(passed))
+    return Markup('<span class="{}">{}</span>').format("yes" if passed else "no", _word(passed))
