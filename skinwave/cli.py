@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 import skinwave
+from skinwave import extensions
 from skinwave.commands import COMMANDS
 from skinwave.plain_text import printable, say
 from skinwave.processes import SAFE_PATH, ended_by_signals, environment
@@ -40,6 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if typed[:1] == ["--version"]:  # looked up here, because help need not wait for it
         print(f"skinwave {skinwave.__version__}")
         return 0
+    try:
+        extensions.load()
+    except ValueError as error:
+        say(f"skinwave: {error}", sys.stderr)
+        return 2
     options = parser().parse_args(_joined(typed))
     options.typed = typed
     leave_out_working_settings()

@@ -6,23 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 import fem
-from simple_model import Response, point_kernel, point_kernel_published
+from simple_model import Response
 from simple_model.choices import choose
-from skinwave.bodies.analytic import exact_waves
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
-from skinwave.models.flat_body import EXACT
-from skinwave.models.full import Map, harmonic_answer, transient_answer
-from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
-from skinwave.models.stretching import full_answer, reduced_answer
+from skinwave.models import Map, Request, named
+from skinwave.models.prepared import answer, sample_times
 from skinwave.planning.plan import Plan, plan
 from skinwave.planning.warnings import beyond_linear
 from skinwave.scene import Scene
-
-MODELS = (
-    "auto", "point-kernel", "point-kernel-published", "flat-body", "flat-body-harmonic",
-    "fem", "fem-harmonic", "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
-)  # fmt: skip
-KERNELS = {"point-kernel": point_kernel, "point-kernel-published": point_kernel_published}
 
 
 def simulate(
@@ -107,9 +98,8 @@ def required_plan(
     solver: str = "auto",
 ) -> Plan:
     """Plan of a request; raises what `simulate` does before any work."""
-    choose("model", model, MODELS)
+    asked = None if model == "auto" else named(model).name
     check_knobs(solver, h=h, dt=dt)
-    asked = None if model == "auto" else model
     return plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
 
 
@@ -127,7 +117,7 @@ def follow(
     """Response of a plan, with its expected error and all warnings; arguments are those of the
     plan.
     """
-    if required.model == "fem" and required.prepared:
+    if required.prepared and named(required.model).is_reduced:
         found = answer(required.prepared, scene, progress)
     else:
         found = compute(
@@ -152,47 +142,19 @@ def compute(
     """Response of one model, not planned: its expected error is unknown, and it gives no warnings.
     Arguments and exceptions are those of `simulate`.
     """
-    choose("model", model, MODELS[1:])
+    known = named(model)
     check_knobs(solver, h=h, dt=dt)
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    found = _computed(scene, model, tolerance, progress or silent, h, dt, solver, mapped)
+    known.refuse(scene.body)
+    request = Request(
+        times=sample_times(scene), tolerance=tolerance, report=progress or silent,
+        h=h, dt=dt, solver=solver, mapped=mapped,
+    )  # fmt: skip
+    found = known.solve(scene, request)
     if found.effort.versions:
         return found
     return replace(found, effort=replace(found.effort, versions=versions()))
-
-
-def _computed(
-    scene: Scene,
-    model: str,
-    tolerance: float,
-    report: Progress,
-    h: float | None,
-    dt: float | None,
-    solver: str,
-    mapped: Map,
-) -> Response:
-    times = sample_times(scene)
-    if model in KERNELS:
-        return KERNELS[model](scene.pressure, scene.probe_points, times)
-    if model in EXACT:
-        waves, body = EXACT[model], exact_waves(scene.body, model)
-        return waves(body, scene.pressure, scene.probe_points, times)
-    if model == "fem-transient":
-        return transient_answer(scene, times, report, h=h, dt=dt, solver=solver)
-    if model == "fem-harmonic":
-        return harmonic_answer(
-            scene, times, report, h=h, solver=solver, threshold=tolerance / 50, mapped=mapped
-        )
-    if model == "fem-nonlinear":
-        return reduced_answer(scene, times, report, h=h, dt=dt, solver=solver)
-    if model == "fem-nonlinear-transient":
-        return full_answer(scene, times, report, h=h, dt=dt, solver=solver)
-    prepared = prepare(
-        scene.body, scene.probe_points, report, h=h, solver=solver,
-        tolerance=reduction_tolerance(tolerance),
-    )  # fmt: skip
-    return answer(prepared, scene, report)
 
 
 def warned(response: Response, sentences: tuple[str, ...]) -> Response:

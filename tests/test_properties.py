@@ -21,10 +21,11 @@ from simple_model.rhythm import ROLES
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import Body, Scene, SkinwaveWarning, dumps, loads
+from skinwave.models import names
 from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
 from skinwave.scene import BASES
-from skinwave.simulation import MODELS, compute, simulate
+from skinwave.simulation import compute, simulate
 
 
 def numbers(low, high):
@@ -161,7 +162,7 @@ def small_scene(tacton, **pressure):
     return Scene(pressure=load, body=SMALL, probes=WATCHED)
 
 
-@pytest.mark.parametrize("model", [m for m in MODELS if m != "auto" and "nonlinear" not in m])
+@pytest.mark.parametrize("model", [m for m in names() if "nonlinear" not in m])
 @settings(max_examples=6)
 @given(tactons, numbers(0.01, 100))
 def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):

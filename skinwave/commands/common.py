@@ -9,6 +9,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skinwave.models import names
 from skinwave.plain_text import printable, say
 
 if TYPE_CHECKING:
@@ -17,10 +18,6 @@ if TYPE_CHECKING:
     from skinwave.planning.plan import Plan
     from skinwave.scene import Scene
 
-MODELS = (
-    "point-kernel", "point-kernel-published", "flat-body", "flat-body-harmonic",
-    "fem", "fem-harmonic", "fem-transient", "fem-nonlinear", "fem-nonlinear-transient",
-)  # fmt: skip
 TOLERANCE = "relative error of waveforms"
 
 
@@ -53,7 +50,7 @@ def add_mesh(parser: argparse.ArgumentParser) -> None:
 
 def add_model(parser: argparse.ArgumentParser) -> None:
     """Options of the model: its name, its tolerance and its time step."""
-    parser.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    parser.add_argument("--model", choices=("auto", *names()), default="auto")
     parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
     parser.add_argument("--dt", type=float, metavar="S", help="time step of transient models, s")
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from skinwave.commands.common import (
-    MODELS,
     TOLERANCE,
     add_mesh,
     add_reporting,
@@ -18,6 +17,7 @@ from skinwave.commands.common import (
     progress_of,
     summarise,
 )
+from skinwave.models import names
 from skinwave.plain_text import say
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="processes (default), threads, or the address of a Dask scheduler",
     )  # fmt: skip
     parser.add_argument("--workers", type=int, metavar="N", help="runs at a time on this machine")
-    parser.add_argument("--model", choices=("auto", *MODELS), default="auto")
+    parser.add_argument("--model", choices=("auto", *names()), default="auto")
     parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
     add_mesh(parser)
     parser.add_argument("--csv", action="store_true", help="write rows.csv, too")

@@ -1,1 +1,136 @@
-"""Models of a body: meshed, reduced, integrated in time or solved line by line."""
+"""Models: a `Model` for each, which its file registers; loaded when it is first asked for.
+
+Importing this room loads no numerical library, because the command line lists the names.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from math import nan
+from typing import TYPE_CHECKING, Any
+
+from skinwave import extensions
+
+if TYPE_CHECKING:
+    from meshes.tetmesh import Floats
+    from simple_model import Response
+    from skinwave.bodies import Body
+    from skinwave.effort import Progress
+    from skinwave.scene import Scene
+
+Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
+
+BUILT_IN = {  # name -> the file that registers it
+    "point-kernel": "point_kernel",
+    "point-kernel-published": "point_kernel",
+    "flat-body": "flat_body",
+    "flat-body-harmonic": "flat_body",
+    "fem": "linear_elements",
+    "fem-harmonic": "linear_elements",
+    "fem-transient": "linear_elements",
+    "fem-nonlinear": "nonlinear_elements",
+    "fem-nonlinear-transient": "nonlinear_elements",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """Request of a response: sample `times` (t,) in s, relative error that may be made, whom to
+    `report` progress to, element size `h` in metre and time step `dt` in s if given, a backend of
+    `fem.linear_solver`, and a function like the built-in `map` for independent parts.
+    """
+
+    times: "Floats"
+    tolerance: float
+    report: "Progress"
+    h: float | None = None
+    dt: float | None = None
+    solver: str = "auto"
+    mapped: Map = map
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Model:
+    """Model: how it computes a scene's response, and what is known of that.
+
+    Parameters
+    ----------
+    name, label : str, in commands and tables; in legends
+    method : str, in a plan: what is computed, in a few words
+    words : str, on pages: what it computes and leaves out, one clause
+    solve : response of a scene to a request
+    refuse : raises a ValueError, with the reason, for a body that it is not for
+    error : expected relative error with elements of a size in metre, nan if it is unknown; None for
+        linear waves, whose error a plan estimates by reflections and transient, or mesh refinement
+    default_size : element size in metre for a body; None without a mesh
+    seconds, memory : predicted for a first response where a plan does not measure, s and bytes
+    colour : str, of figures
+    unit : str, "m", or "Pa" of a stimulation
+    needs_body : bool
+    is_reduced : bool, whether bodies are reduced once for all Tactons
+    is_infinite : bool, whether it leaves out reflections from the sides
+    is_steady : bool, whether it leaves out the initial transient
+    is_stepped : bool, whether its error depends on a time step
+    is_nonlinear : bool, whether it has large deflections
+    fits_damping : bool, whether a loss factor becomes Rayleigh damping
+    """
+
+    name: str
+    method: str
+    words: str
+    solve: "Callable[[Scene, Request], Response]"
+    refuse: "Callable[[Body], object]" = lambda body: None
+    error: "Callable[[Scene, float | None], float] | None" = lambda scene, h: nan
+    default_size: "Callable[[Body], float] | None" = None
+    seconds: float = 0.1
+    memory: float = 1e8
+    colour: str = "#56B4E9"
+    label: str = ""
+    unit: str = "m"
+    needs_body: bool = True
+    is_reduced: bool = False
+    is_infinite: bool = False
+    is_steady: bool = False
+    is_stepped: bool = False
+    is_nonlinear: bool = False
+    fits_damping: bool = False
+
+
+_MODELS: dict[str, Model] = {}
+
+
+def register(model: Model) -> Model:
+    """Add a model to those that scenes can be computed by.
+
+    Raises
+    ------
+    ValueError
+        If there is one of that name.
+    """
+    home = BUILT_IN.get(model.name)
+    if home and model.solve.__module__ != f"{__name__}.{home}":
+        raise ValueError(f"'{model.name}' is registered already; choose another name")
+    extensions.add(_MODELS, model.name, model, model.solve)
+    return model
+
+
+def names() -> tuple[str, ...]:
+    """All models by name, the built-in ones first."""
+    return (*BUILT_IN, *(name for name in _MODELS if name not in BUILT_IN))
+
+
+def named(name: str) -> Model:
+    """The model of a name.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    from simple_model.choices import choose
+
+    if name in BUILT_IN:
+        import_module(f"{__name__}.{BUILT_IN[name]}")
+    elif name not in _MODELS:
+        extensions.load()
+    return _MODELS[choose("model", name, names())]

@@ -1,11 +1,10 @@
 """Full-order models: direct time integration, and the steady state line by line."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import islice
 from math import ceil
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -27,10 +26,9 @@ from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
+from skinwave.models import Map
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import Body, Scene
-
-Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 CHECKED_EACH = 50  # steps of a transient
@@ -76,21 +74,6 @@ def energy_balance(
     return imbalance, radiated
 
 
-def vacuum_only(body: Body, model: str) -> None:
-    """Refuse a body with air, whose added-mass operator is dense.
-
-    Raises
-    ------
-    ValueError
-        If it has air.
-    """
-    if body.air:
-        raise ValueError(
-            f"{model} solves sparse equations, and the added mass of air is a dense operator; "
-            "leave air out, or use --model fem, fem-nonlinear or flat-body"
-        )
-
-
 def transient_answer(
     scene: Scene,
     times: Floats,
@@ -101,7 +84,6 @@ def transient_answer(
     solver: str = "auto",
 ) -> Response:
     """Direct time integration of all dofs in steps of dt, interpolated by a cubic spline."""
-    vacuum_only(scene.body, "fem-transient")
     dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
     clock = Clock()
@@ -190,7 +172,6 @@ def harmonic_answer(
 
     `mapped` is called like the built-in `map`; it may spread the lines over other machines.
     """
-    vacuum_only(scene.body, "fem-harmonic")
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
     ops = assembled(build, clock, report)

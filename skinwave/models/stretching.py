@@ -31,7 +31,7 @@ from simple_model.sampling import resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count, vacuum_only
+from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
 from skinwave.models.loads import surface_load
 from skinwave.scene import Body, Scene
 
@@ -124,8 +124,6 @@ def full_answer(
     solver: str = "auto",
 ) -> Response:
     """Direct time integration of all dofs, from equilibrium under the mean pressure."""
-    sheet_only(scene.body, "fem-nonlinear-transient")
-    vacuum_only(scene.body, "fem-nonlinear-transient")
     clock = Clock()
     with clock("assemble"):
         report("assemble", 0.0)
@@ -167,7 +165,6 @@ def reduced_answer(
     solver: str = "auto",
 ) -> Response:
     """Time integration of the sheet's bending modes, from equilibrium under the mean pressure."""
-    sheet_only(scene.body, "fem-nonlinear")
     clock = Clock()
     with clock("reduce"):
         report("reduce", 0.0)

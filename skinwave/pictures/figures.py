@@ -13,19 +13,19 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from skinwave.comparison import moving_rms
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.numbers import significant
 from skinwave.pictures.styles import LABELS, STYLES, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
 COLOURS = {
-    "point-kernel": "#000000",
-    "point-kernel-published": "#999999",
+    **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": "#D55E00",
     "skin-slab": "#0072B2",
 }
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-MARKERS = {"point-kernel": "o", "point-kernel-published": "x", "paper-sheet": "s"}
+MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s"}
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 REPORT = STYLES["report"]

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from simple_model.choices import choose
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 
 LABELS = {
-    "point-kernel": "kernel, same load",
-    "point-kernel-published": "kernel, as published",
+    **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": "paper sheet",
     "skin-slab": "skin slab",
 }

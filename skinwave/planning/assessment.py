@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.models import named
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import compared_with, convergence, quantity_of_interest
@@ -96,7 +97,7 @@ def sentences(
     h : float, metre, size of the elements of a linear model
     error : float, relative, expected of these elements; nan if it is not known
     """
-    if response.model.startswith("fem") and h:
+    if named(response.model).default_size and h:
         known = of_elements(scene, h, error, tolerance)
     else:
         known = plan(scene, tolerance, model=response.model).warnings

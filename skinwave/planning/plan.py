@@ -5,14 +5,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.sampling import resolving_step
-from skinwave.bodies.analytic import exact_waves
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
-from skinwave.models.flat_body import EXACT
-from skinwave.models.full import TRANSIENT_RATE, step_count, vacuum_only
+from skinwave.models import Model, named
+from skinwave.models.flat_body import FLAT_BODY, HARMONIC
+from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
-from skinwave.models.stretching import expected_error, sheet_only, stretching_size
 from skinwave.planning.estimates import (
     cutoff_frequency,
     has_wavenumber_solution,
@@ -26,9 +25,6 @@ from skinwave.planning.warnings import of_elements, over_tolerance
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
-UNREDUCED = ("fem-transient", "fem-harmonic", "fem-nonlinear-transient")
-KERNELS = ("point-kernel", "point-kernel-published")
-KERNEL_ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,22 +77,19 @@ def plan(
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    if model in UNREDUCED:
-        vacuum_only(scene.body, model)
+    asked = named(model) if model else None
     if dt is not None:
         step_count(float(sample_times(scene)[-1]), dt)
     if not scene.body.of_kind.discretise:
-        if model not in (None, *KERNELS):
+        if asked and asked.needs_body:
             raise ValueError(f"a scene without a body has no {model} response; use --model auto")
         kernel = model or "point-kernel"
         row = Row(what="model", value=kernel, reason="there is no body to move")
         return Plan(model=kernel, body=scene.body, rows=(row,))
-    if model in KERNELS:
-        return _kernel(scene, tolerance, model)
-    if model in ("fem-nonlinear", "fem-nonlinear-transient"):
-        return _nonlinear(scene, tolerance, model, h)
-    if model in EXACT:
-        exact_waves(scene.body, model)
+    if asked:
+        asked.refuse(scene.body)
+        if asked.error:
+            return _unplanned(scene, tolerance, asked, h)
     spectrum = response_spectrum(scene, tolerance)
     highest = cutoff_frequency(*spectrum, tolerance)
     rows = [
@@ -110,18 +103,18 @@ def plan(
     returned, start = (
         reflection_and_transient(scene) if has_wavenumber_solution(scene) else (1.0, 1.0)
     )
-    if model in EXACT or (model is None and returned <= WAVES_SHARE * tolerance):
-        return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
+    if asked.is_infinite if asked else returned <= WAVES_SHARE * tolerance:
+        return _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
     body: Body = scene.body
     cut: list[Row] = []
     if model is None or h is None:  # else all of it is meshed, as asked
         body, cut = extent(scene, tolerance, highest)
     rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene, returned)), *cut]
-    axes = symmetry(scene) if model in (None, "fem") else ""
+    axes = symmetry(scene) if asked is None or asked.is_reduced else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    step_error, start_error = _march_errors(scene, model, step)
+    step_error, start_error = _march_errors(scene, asked, step)
     return Plan(
         model=model or "fem", body=body, symmetry=axes, h=found.h, highest=highest,
         error=found.error + step_error + start_error,
@@ -139,48 +132,43 @@ def plan(
     )  # fmt: skip
 
 
-def _kernel(scene: Scene, tolerance: float, model: str) -> Plan:
-    row = Row(what="model", value=model, reason="as asked; nothing propagates in it")
-    warning = over_tolerance("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
-    return Plan(model=model, body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning)
-
-
-def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> Plan:
-    """Plan of a sheet at large deflection, whose element size does not come from the linear
-    response: stiffened by stretching it has longer waves and fewer resonances than the linear one.
+def _unplanned(scene: Scene, tolerance: float, model: Model, h: float | None) -> Plan:
+    """Plan of a model that states its own error. That of a sheet at large deflection does not come
+    from the linear response: stiffened by stretching it has longer waves and fewer resonances.
     """
-    sheet_only(scene.body, model)
-    size = h or stretching_size(scene.body, reduced=model == "fem-nonlinear")
-    check_mesh(scene.body, size)
-    error = expected_error(scene.body, size)
-    rows = (
-        Row(what="model", value=model, reason="as asked: large deflection about a static preload"),
-        Row(
-            what="element size", value=f"{1e3 * size:.2f} mm",
-            reason="as asked" if h else "by measured convergence of the default sheet",
-        ),
-        *(row for row in left_out(scene, 0.0) if row.what != "left out: stretching"),
+    rows = [Row(what="model", value=model.name, reason=f"as asked: {model.method}")]
+    what, size = f"the {model.method}", None
+    cure = "a model with waves is"
+    if model.default_size:
+        size = h or model.default_size(scene.body)
+        check_mesh(scene.body, size)
+        reason = "as asked" if h else f"the default of {model.name}"
+        rows.append(Row(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
+        others = left_out(scene, 0.0)
+        rows += [r for r in others if not (model.is_nonlinear and r.what.endswith("stretching"))]
+        what, cure = f"elements of {1e3 * size:.3g} mm", "smaller ones are"
+    error = model.error(scene, size) if model.error else np.nan
+    return Plan(
+        model=model.name, body=scene.body, h=size, error=error, rows=tuple(rows),
+        seconds=model.seconds, memory=model.memory,
+        warnings=over_tolerance(what, error, tolerance, cure),
     )  # fmt: skip
-    warnings = over_tolerance(
-        f"elements of {1e3 * size:.3g} mm", error, tolerance, "smaller ones are"
-    )
-    return Plan(model=model, body=scene.body, h=size, error=error, rows=rows, warnings=warnings)
 
 
 def _without_mesh(
     scene: Scene,
     tolerance: float,
-    model: str | None,
+    asked: Model | None,
     highest: float,
     returned: float,
     start: float,
     rows: list[Row],
 ) -> Plan:
-    if model is None:
+    if asked is None:
         # One is of the load's lines, the other of the body's own: their powers add.
         both = np.hypot(returned, start)
-        model = "flat-body-harmonic" if both <= tolerance else "flat-body"
-    left = start if model == "flat-body-harmonic" else 0.0
+        asked = HARMONIC if both <= tolerance else FLAT_BODY
+    model, left = asked.name, start if asked.is_steady else 0.0
     reason = "a homogeneous flat slab without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
@@ -201,7 +189,7 @@ def _without_mesh(
     ]
     return Plan(
         model=model, body=scene.body, highest=highest, error=float(np.hypot(returned, left)),
-        seconds=2.0, memory=3e8, rows=tuple(rows), warnings=warnings,
+        seconds=asked.seconds, memory=asked.memory, rows=tuple(rows), warnings=warnings,
     )  # fmt: skip
 
 
@@ -249,14 +237,14 @@ def _why_size(found: Refined, tolerance: float, h: float | None) -> str:
     return f"refined until less than {100 * tolerance:g} % is left"
 
 
-def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, float]:
+def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, float]:
     """Expected relative errors of a time step, and of leaving out the initial transient."""
-    if model not in ("fem-transient", "fem-harmonic"):
+    if asked is None or not (asked.is_stepped or asked.is_steady):
         return 0.0, 0.0
     known = sensitivity(scene)
     # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
     step = known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12
-    return (min(1.0, step), 0.0) if model == "fem-transient" else (0.0, known.start)
+    return (min(1.0, step), 0.0) if asked.is_stepped else (0.0, known.start)
 
 
 def _why_elements(scene: Scene, returned: float) -> str:

@@ -7,6 +7,7 @@ from fem.materials import rayleigh_damping
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.focus import spot_width
+from skinwave.models import named
 from skinwave.planning.estimates import mean_gain, response_spectrum
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
@@ -36,11 +37,8 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     unconstrained sheet is no deflection.
     """
     body, u = scene.body, response.displacement
-    if (
-        not body.of_kind.is_plate
-        or response.unit != "m"
-        or response.model.startswith("fem-nonlinear")
-    ):
+    linear = response.unit == "m" and not named(response.model).is_nonlinear
+    if not (body.of_kind.is_plate and linear):
         return ()
     bent = u if body.is_held else u - u.mean(axis=1, keepdims=True)
     clamped = body.sides == "clamped"

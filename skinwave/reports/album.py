@@ -22,6 +22,8 @@ from skinwave.effort import Progress
 from skinwave.fields import assessed_probes
 from skinwave.files import write_lines, write_run
 from skinwave.fitting import EFFORT, PLAN, TRUST, effort_of, fitting
+from skinwave.models import named
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.pictures.motion import Waves, waves
@@ -155,7 +157,7 @@ def answers(
             yield body_view(its, column, moved[column], part), run
         else:
             run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
-            yield kernel_view(its, KERNEL_REACH, part) if column == "point-kernel" else None, run
+            yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
 
 
 def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
@@ -230,7 +232,7 @@ def open_album(folder: Path) -> Album:
 
 def _order(path: Path) -> tuple[str, int, str]:
     """By Tacton, then the point kernels, then in the order in which bodies are named everywhere."""
-    column, known = path.parent.name, ["point-kernel-published", "point-kernel", *BODIES]
+    column, known = path.parent.name, [PUBLISHED.name, SAME_LOAD.name, *BODIES]
     place = known.index(column) if column in known else len(known)
     return str(path.parent.parent), place, column
 
@@ -244,9 +246,9 @@ def _kernel_of(path: Path, scene: Scene, model: str) -> str:
     """The model by which a file was written: the folder `none` of releases up to 0.2 holds the
     point kernel under the published load, by the name that now says the scene's own.
     """
-    old = path.parent.name == "none" and model == "point-kernel"
+    old = path.parent.name == "none" and model == SAME_LOAD.name
     if old and scene.pressure == published(scene.pressure):
-        return "point-kernel-published"
+        return PUBLISHED.name
     return model
 
 
@@ -262,7 +264,7 @@ def _run(path: Path) -> Run:
         model = _kernel_of(path, scene, name)
         response = Response(
             model=model, times=arrays["t"], probes=arrays["probes"], displacement=arrays[name],
-            unit="Pa" if model.startswith("point-kernel") else "m",
+            unit=named(model).unit,
             effort=effort_of(effort, "effort.json"),
             expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
         )  # fmt: skip

@@ -12,6 +12,7 @@ from PIL import features
 
 from skinwave import document, numbers
 from skinwave.effort import Progress
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.pictures import maps, render
 from skinwave.pictures.figures import drawn, label, tacton_figure
 from skinwave.pictures.films import film, lasts, seam
@@ -108,7 +109,7 @@ def flat(
 ) -> Iterable[tuple[str, Callable[[], Figure], str]]:  # fmt: skip
     """Name, how it is drawn and caption of every map."""
     bodies = [view for view in views if view.unit == "m"]
-    kernel = next((view for view in views if view.column == "point-kernel"), None)
+    kernel = next((view for view in views if view.column == SAME_LOAD.name), None)
     yield "rms", lambda: maps.rms_figure(views, style), RMS
     if kernel and bodies:
         yield "difference", lambda: maps.difference_figure(kernel, bodies, style), DIFFERENCE
@@ -133,9 +134,9 @@ def _waveforms(runs: Sequence[Run]) -> str:
     """Caption of a Tacton's waveforms, and the cause of each difference between them."""
     columns = [run.column for run in runs]
     text = "Waveforms and spectra. Rows are probes."
-    if {"point-kernel-published", "point-kernel"} <= set(columns):
+    if {PUBLISHED.name, SAME_LOAD.name} <= set(columns):
         text += f" {LOADS}"
-    if "point-kernel" in columns and any(run.response.unit == "m" for run in runs):
+    if SAME_LOAD.name in columns and any(run.response.unit == "m" for run in runs):
         text += f" {PROPAGATED}"
     return text
 

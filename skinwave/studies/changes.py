@@ -8,6 +8,7 @@ import numpy as np
 from meshes import cache
 from simple_model.response import SETTLE
 from skinwave.effort import versions
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.propagation import Propagation, propagation, share_outside
 from skinwave.run import Run
 from skinwave.scene import Scene
@@ -59,7 +60,7 @@ def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
     """The Tacton of the first screen; None where no body was run beside both kernels."""
     group = groups.get(first_of(groups), [])
     kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
-    published = next((r for r in group if r.model == "point-kernel-published"), None)
+    published = next((r for r in group if r.model == PUBLISHED.name), None)
     if kernel is None or published is None or not bodies:
         return None
     surfaces: dict[str, SurfaceMap] = {}
@@ -120,7 +121,7 @@ def element_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
 
 
 def _kernel(group: Sequence[Run]) -> Run | None:
-    return next((run for run in group if run.model == "point-kernel"), None)
+    return next((run for run in group if run.model == SAME_LOAD.name), None)
 
 
 def _error(run: Run) -> float:

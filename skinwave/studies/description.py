@@ -6,26 +6,11 @@ import numpy as np
 
 from fem.materials import Material
 from simple_model import Tacton
+from skinwave.models import named
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
 from skinwave.scene import Body
 
-ANSWERS = {
-    "point-kernel": "the moving pressure, weighted by the distance to the focus; nothing "
-    "propagates, and what it predicts is a stimulation in Pa",
-    "point-kernel-published": "the same under the load of Lim, Seifi and Park: the commanded "
-    "signal itself, without a mean",
-    "flat-body": "linear waves of a laterally infinite flat body, by the wavenumber integral",
-    "flat-body-harmonic": "the steady state of linear waves of a laterally infinite flat "
-    "body, by the wavenumber integral",
-    "fem": "linear waves on 10-node tetrahedra by a reduced-order model",
-    "fem-harmonic": "the steady state of linear waves on 10-node tetrahedra",
-    "fem-transient": "linear waves on 10-node tetrahedra, step by step",
-    "fem-nonlinear": "a sheet that stretches as it bends, in its modes, about its rest "
-    "under the mean pressure",
-    "fem-nonlinear-transient": "a sheet that stretches as it bends, on 10-node "
-    "tetrahedra, step by step",
-}
 NAMED = 4  # lines that a sentence names
 SPOTS = {
     "gaussian": "a Gaussian focus",
@@ -62,9 +47,9 @@ def untold(runs: Iterable[Run]) -> list[str]:
 
 def _answered(runs: list[Run]) -> str:
     """One body by one model."""
-    pressure, model = runs[0].scene.pressure, runs[0].model
+    pressure, model = runs[0].scene.pressure, named(runs[0].model)
     load = f"drive law {pressure.drive}, {SPOTS[pressure.focus]}"
-    text = f"{_sentence(answered(runs[0]))}: {ANSWERS[model]}; {load}."
+    text = f"{_sentence(answered(runs[0]))}: {model.words}; {load}."
     return text if runs[0].response.unit == "Pa" else f"{text} {_sentence(_body(runs))}"
 
 
@@ -125,8 +110,9 @@ def extent(body: Body) -> str:
 
 def _body(runs: list[Run]) -> str:
     body = runs[0].scene.body
-    is_layer = runs[0].model.startswith("flat-body")
-    depth_only = " of which the wavenumber integral takes only the depth," * is_layer
+    depth_only = (
+        " of which the wavenumber integral takes only the depth," * named(runs[0].model).is_infinite
+    )
     text = f"{extent(body)},{depth_only} of {_material(body.solid)}"
     text += above(body)
     if body.of_kind.is_plate:
@@ -169,17 +155,17 @@ def _material(solid: Material) -> str:
 
 
 def _sheet(runs: list[Run]) -> str:
-    text = ""
-    if runs[0].model in ("fem", "fem-transient") and runs[0].scene.body.solid.loss_factor:
+    text, model = "", named(runs[0].model)
+    if model.fits_damping and runs[0].scene.body.solid.loss_factor:
         text = "The loss factor is Rayleigh damping that fits it over 50-600 Hz. "
-    if runs[0].model.startswith("fem"):
+    if model.default_size:
         text += "The mesh is a thicker sheet of the same bending stiffness and mass per area. "
     text += (
         "Air moves along on both sides. Left out: its flow around the edge, and sound radiation"
         if runs[0].scene.body.air
         else "Left out: the air that moves along, a fifth to a third of the mass of office paper"
     )
-    if not runs[0].model.startswith("fem-nonlinear"):
+    if not model.is_nonlinear:
         depth = runs[0].scene.body.depth
         sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / depth
         text += (

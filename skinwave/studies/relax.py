@@ -20,6 +20,7 @@ from simple_model.drive import beyond_published
 from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
+from skinwave.models import named
 from skinwave.planning.assessment import sentences
 from skinwave.processes import apart
 from skinwave.run import JUDGED
@@ -163,7 +164,7 @@ def _answered(
     try:
         changed, model = drawn(scene, dropped)
         rung["model"] = model
-        size = h or default_size(scene.body) if model == "fem" else h
+        size = h or default_size(scene.body) if named(model).is_reduced else h
         response, seconds, memory = apart(_timed, changed, model, size)
     except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
         return Rung(**rung, error=str(error))  # type: ignore[arg-type]

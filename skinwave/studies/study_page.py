@@ -12,6 +12,7 @@ from simple_model import Effort
 from skinwave import document
 from skinwave.effort import Progress
 from skinwave.files import fill
+from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import Prepared
 from skinwave.numbers import decibel
 from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
@@ -172,7 +173,7 @@ def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str
 
 def _disagreements(verdicts: list[Verdict]) -> list[str]:
     """Claims measured on paper that a body contradicts, and whether propagation is the cause."""
-    of_kernel = {v.claim: v for v in verdicts if v.model == "point-kernel"}
+    of_kernel = {v.claim: v for v in verdicts if v.model == SAME_LOAD.name}
     texts = []
     for verdict in verdicts:
         kernel = of_kernel.get(verdict.claim)

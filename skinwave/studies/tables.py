@@ -8,6 +8,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort
 from skinwave.comparison import compare, moving_rms
 from skinwave.document import Markup, paragraph, table
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label
 from skinwave.propagation import strongest_component
@@ -48,7 +49,7 @@ def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Markup:
 def pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
     """Name of the change, and the two runs between which it is made."""
     found = {run.column: run for run in group}
-    kernel, published = found.get("point-kernel"), found.get("point-kernel-published")
+    kernel, published = found.get(SAME_LOAD.name), found.get(PUBLISHED.name)
     if kernel is None:
         return []
     bodies = [run for run in found.values() if run.response.unit == "m"]

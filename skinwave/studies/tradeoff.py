@@ -17,6 +17,8 @@ from skinwave import document
 from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
+from skinwave.models import named, names
+from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
@@ -27,11 +29,6 @@ from skinwave.simulation import compute
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.6, 0.5)  # of the two runs whose difference decides whether the reference is accepted
 BARS = (0.01, 0.05, 0.20)
-COLOURS = {
-    "point-kernel": "#000000", "flat-body-harmonic": "#E69F00", "flat-body": "#009E73",
-    "fem": "#0072B2",
-    "fem-transient": "#D55E00", "fem-harmonic": "#CC79A7",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +194,7 @@ def sentences(found: Study) -> list[str]:
             "as upper estimates."
         )
     texts = [said]
-    if any(m.candidate.model == "flat-body" for m in found.measured):
+    if any(m.candidate.model == FLAT_BODY.name for m in found.measured):
         texts.append(
             "flat-body is the analytic solution of a laterally infinite body; it differs from the "
             "meshed body by reflections at the latter's sides."
@@ -219,12 +216,13 @@ def figure(found: Study) -> Figure:
     panels = drawing.subplots(1, 2, sharey=True)
     front = found.front()
     for ax, when in zip(panels, ("cold", "warm"), strict=True):
-        for model, colour in COLOURS.items():
+        for model in names():
             if mine := [m for m in found.measured if m.candidate.model == model]:
                 ax.scatter(
                     [getattr(m, when) for m in mine], [100 * m.error for m in mine],
-                    s=[20 + m.memory / 2**22 for m in mine], color=colour, alpha=0.75, label=model,
-                    edgecolors="black", linewidths=[1.5 * (m in front) for m in mine],
+                    s=[20 + m.memory / 2**22 for m in mine], color=named(model).colour,
+                    alpha=0.75, label=model, edgecolors="black",
+                    linewidths=[1.5 * (m in front) for m in mine],
                 )  # fmt: skip
         ax.axhline(100 * found.self_convergence, color="0.5", ls=":", lw=1)
         ax.set(xscale="log", yscale="log")
@@ -249,7 +247,7 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
 
     os.environ["SKINWAVE_CACHE"] = ""  # a cold run
     started = time.perf_counter()
-    if candidate.model == "fem":
+    if named(candidate.model).is_reduced:
         knobs = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
         prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **knobs)  # type: ignore[arg-type]
         response = answer(prepared, scene)

@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from simple_model import Response, named_lines
+from simple_model.choices import choose
 from skinwave.effort import Progress, silent
+from skinwave.models import named, names
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
 from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Scene
-from skinwave.simulation import MODELS, answered, check_knobs
+from skinwave.simulation import answered, check_knobs
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import columns, commanded, measured
 from skinwave.sweeps.variation import Case
@@ -154,11 +156,9 @@ def model_of(scene: Scene, asked: str) -> str:
 
 def _check(knobs: Knobs) -> None:
     check_knobs(knobs.solver, h=knobs.h)
-    if knobs.model not in MODELS or not 0 < knobs.tolerance < 1:
-        raise ValueError(
-            f"model '{knobs.model}' and tolerance {knobs.tolerance} must be one of "
-            f"{', '.join(MODELS)} and between 0 and 1"
-        )
+    choose("model", knobs.model, ("auto", *names()))
+    if not 0 < knobs.tolerance < 1:
+        raise ValueError(f"tolerance = {knobs.tolerance} is outside 0 < tolerance < 1")
 
 
 Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
@@ -167,7 +167,11 @@ Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
 def _solid(case: Case, knobs: Knobs) -> Solid | None:
     """Body and probes by which a run shares a reduced body with others, if it does."""
     scene = case.scene
-    if scene is None or model_of(scene, knobs.model) != "fem" or not scene.body.of_kind.discretise:
+    if (
+        scene is None
+        or not named(model_of(scene, knobs.model)).is_reduced
+        or not scene.body.of_kind.discretise
+    ):
         return None
     return scene.body, scene.probes
 

@@ -1,0 +1,89 @@
+"""Linear finite elements: reduced-order model, steady state line by line, and time integration."""
+
+from functools import partial
+
+from simple_model import Response
+from skinwave.bodies.body import Body
+from skinwave.bodies.sizes import default_size
+from skinwave.models import Model, Request, register
+from skinwave.models.full import harmonic_answer, transient_answer
+from skinwave.models.prepared import answer, prepare, reduction_tolerance
+from skinwave.scene import Scene
+
+
+def vacuum_only(model: str, body: Body) -> None:
+    """Refuse a body with air, whose added-mass operator is dense.
+
+    Raises
+    ------
+    ValueError
+        If it has air.
+    """
+    if body.air:
+        raise ValueError(
+            f"{model} solves sparse equations, and the added mass of air is a dense operator; "
+            "leave air out, or use --model fem, fem-nonlinear or flat-body"
+        )
+
+
+def _reduced(scene: Scene, request: Request) -> Response:
+    prepared = prepare(
+        scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
+        tolerance=reduction_tolerance(request.tolerance),
+    )  # fmt: skip
+    return answer(prepared, scene, request.report)
+
+
+def _harmonic(scene: Scene, request: Request) -> Response:
+    return harmonic_answer(
+        scene, request.times, request.report, h=request.h, solver=request.solver,
+        threshold=request.tolerance / 50, mapped=request.mapped,
+    )  # fmt: skip
+
+
+def _transient(scene: Scene, request: Request) -> Response:
+    return transient_answer(
+        scene, request.times, request.report, h=request.h, dt=request.dt, solver=request.solver
+    )
+
+
+FEM = register(
+    Model(
+        name="fem",
+        method="10-node tetrahedra, reduced-order model",
+        words="linear waves on 10-node tetrahedra by a reduced-order model",
+        solve=_reduced,
+        error=None,
+        default_size=default_size,
+        colour="#0072B2",
+        is_reduced=True,
+        fits_damping=True,
+    )
+)
+HARMONIC = register(
+    Model(
+        name="fem-harmonic",
+        method="10-node tetrahedra, line by line",
+        words="the steady state of linear waves on 10-node tetrahedra",
+        solve=_harmonic,
+        refuse=partial(vacuum_only, "fem-harmonic"),
+        error=None,
+        default_size=default_size,
+        colour="#CC79A7",
+        is_steady=True,
+    )
+)
+TRANSIENT = register(
+    Model(
+        name="fem-transient",
+        method="10-node tetrahedra, step by step",
+        words="linear waves on 10-node tetrahedra, step by step",
+        solve=_transient,
+        refuse=partial(vacuum_only, "fem-transient"),
+        error=None,
+        default_size=default_size,
+        colour="#D55E00",
+        is_stepped=True,
+        fits_damping=True,
+    )
+)

@@ -1,0 +1,67 @@
+"""A sheet at large deflection, in its modes or with all dofs."""
+
+from functools import partial
+
+from simple_model import Response
+from skinwave.bodies.body import Body
+from skinwave.models import Model, Request, register
+from skinwave.models.linear_elements import vacuum_only
+from skinwave.models.stretching import (
+    expected_error,
+    full_answer,
+    reduced_answer,
+    sheet_only,
+    stretching_size,
+)
+from skinwave.scene import Scene
+
+METHOD = "large deflection about a static preload"
+
+
+def _error(scene: Scene, h: float | None) -> float:
+    assert h
+    return expected_error(scene.body, h)
+
+
+def _reduced(scene: Scene, request: Request) -> Response:
+    return reduced_answer(
+        scene, request.times, request.report, h=request.h, dt=request.dt, solver=request.solver
+    )
+
+
+def _full(scene: Scene, request: Request) -> Response:
+    return full_answer(
+        scene, request.times, request.report, h=request.h, dt=request.dt, solver=request.solver
+    )
+
+
+def _refuse_of_full(body: Body) -> None:
+    sheet_only(body, "fem-nonlinear-transient")
+    vacuum_only("fem-nonlinear-transient", body)
+
+
+REDUCED = register(
+    Model(
+        name="fem-nonlinear",
+        method=METHOD,
+        words="a sheet that stretches as it bends, in its modes, about its rest under the mean "
+        "pressure",
+        solve=_reduced,
+        refuse=lambda body: sheet_only(body, "fem-nonlinear"),
+        error=_error,
+        default_size=partial(stretching_size, reduced=True),
+        is_nonlinear=True,
+    )
+)
+FULL = register(
+    Model(
+        name="fem-nonlinear-transient",
+        method=METHOD,
+        words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
+        solve=_full,
+        refuse=_refuse_of_full,
+        error=_error,
+        default_size=partial(stretching_size, reduced=False),
+        is_nonlinear=True,
+    )
+)

@@ -1,0 +1,45 @@
+"""Point kernel under the scene's own load, and under that of the paper."""
+
+from simple_model import Response, point_kernel, point_kernel_published
+from skinwave.models import Model, Request, register
+from skinwave.scene import Scene
+
+ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
+
+
+def _same_load(scene: Scene, request: Request) -> Response:
+    return point_kernel(scene.pressure, scene.probe_points, request.times)
+
+
+def _published(scene: Scene, request: Request) -> Response:
+    return point_kernel_published(scene.pressure, scene.probe_points, request.times)
+
+
+SAME_LOAD = register(
+    Model(
+        name="point-kernel",
+        label="kernel, same load",
+        method="point kernel",
+        words="the moving pressure, weighted by the distance to the focus; nothing propagates, and "
+        "what it predicts is a stimulation in Pa",
+        solve=_same_load,
+        error=lambda scene, h: ERROR,
+        colour="#000000",
+        unit="Pa",
+        needs_body=False,
+    )
+)
+PUBLISHED = register(
+    Model(
+        name="point-kernel-published",
+        label="kernel, as published",
+        method="point kernel",
+        words="the same under the load of Lim, Seifi and Park: the commanded signal itself, "
+        "without a mean",
+        solve=_published,
+        error=lambda scene, h: ERROR,
+        colour="#999999",
+        unit="Pa",
+        needs_body=False,
+    )
+)

@@ -1,0 +1,38 @@
+"""A model from outside: static compliance of the surface times the pressure, at all times."""
+
+import numpy as np
+
+from simple_model import Response
+from skinwave.models import Model, Request, register
+from skinwave.scene import Body, Scene
+
+
+def per_pressure(body: Body) -> float:
+    """Deflection in metre of an elastic layer on a rigid base under a uniform pressure of 1 Pa."""
+    solid = body.solid
+    modulus = 2 * solid.shear_modulus * (1 - solid.poisson) / (1 - 2 * solid.poisson)
+    return body.depth / modulus
+
+
+def refuse(body: Body) -> None:
+    if body.base != "clamped" or not np.isfinite(body.depth):
+        raise ValueError(f"static-deflection needs a clamped base, not a {body.base} one; use fem")
+
+
+def solve(scene: Scene, request: Request) -> Response:
+    pressure = np.array([scene.pressure(scene.probe_points, t) for t in request.times])
+    return Response(
+        model="static-deflection", times=request.times, probes=scene.probe_points,
+        displacement=per_pressure(scene.body) * pressure,
+    )  # fmt: skip
+
+
+STATIC = register(
+    Model(
+        name="static-deflection",
+        method="static compliance times pressure",
+        words="the static deflection of a layer under the pressure of each time, without waves",
+        solve=solve,
+        refuse=refuse,
+    )
+)
