@@ -251,7 +251,25 @@ def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
 def tabulated(
     *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
 ) -> Material:
-    """Material by measured complex shear moduli (k,) in Pa at frequencies (k,) in Hz."""
+    """Material by measured complex shear moduli.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    poisson : float
+    frequencies : (k,) float, Hz, ascending
+    moduli : (k,) complex, Pa, at each frequency
+
+    Returns
+    -------
+    Material
+        Whose modulus at rest is the real part of the first.
+
+    Raises
+    ------
+    ValueError
+        As `ModulusTable` does.
+    """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))
     return Material(density=density, shear_modulus=table.moduli[0].real, poisson=poisson, law=table)
