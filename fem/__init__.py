@@ -42,7 +42,7 @@ from fem.load_and_probe import (
 )
 from fem.materials import PRESETS, Material, from_young
 from fem.maxwell import MaxwellBranch
-from fem.modal import Complex, Poles, exponential_sum, line_response, poles, respond
+from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
@@ -88,7 +88,6 @@ __all__ = [
     "pressure_force",
     "probe_operator",
     "reduce",
-    "respond",
     "static",
     "stored",
     "stretching_modes",

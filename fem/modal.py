@@ -2,8 +2,8 @@
 
     z' = pole z + inputs f(t),  probes = 2 Re(outputs z)
 
-Two ways in time, both exact for their loads: for any load, a recurrence from sample to sample;
-for a load of lines F exp(i w t), the lines themselves and the free vibration that the start leaves,
+For a load of lines F exp(i w t) the motion is that of the lines and the free vibration of the
+start,
 
     z(t) = inputs F [exp(i w t) - exp(pole t)] / (i w - pole)
 """
@@ -113,50 +113,3 @@ def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Float
     driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, -1)
     summed = within.real @ driven.real - within.imag @ driven.imag
     return summed.reshape(len(within), -1, p).swapaxes(0, 1).reshape(-1, p)[: len(times)]
-
-
-def respond(poles: Poles, footprints: Floats, position: Floats, gain: Floats, dt: float) -> Floats:
-    """Probe displacement from rest, exact for a load linear within each step.
-
-    Parameters
-    ----------
-    poles : Poles, of p outputs
-    footprints : (k, r) reduced forces at k positions of the focus, N kg^-1/2 per Pa
-    position : (t,) float, position of the focus, in 0..k-1; between two positions linear
-    gain : (t,) float, Pa, pressure at the focus
-    dt : float, s
-
-    Returns
-    -------
-    (t, p) float, metre
-    """
-    from scipy.signal import lfilter  # brings scipy.stats, half a second that few models need
-
-    low = np.minimum(position.astype(np.int64), max(len(footprints) - 2, 0))
-    part = position - low
-    high = np.minimum(low + 1, len(footprints) - 1)
-    at_low, at_high = gain * (1 - part), gain * part
-    displacement = np.zeros((len(poles.outputs), len(gain)))
-    for value, modal, output in zip(
-        poles.values, poles.inputs @ footprints.T, poles.outputs.T, strict=True
-    ):
-        drive = at_low * modal[low] + at_high * modal[high]
-        decay, end, start = _step_weights(value * dt)
-        # The initial condition of the filter makes z(0) = 0 whatever the load begins with.
-        z, _ = lfilter([dt * end, dt * start], [1, -decay], drive, zi=[-dt * end * drive[0]])
-        displacement += 2 * (output.real[:, None] * z.real - output.imag[:, None] * z.imag)
-    return displacement.T
-
-
-def _step_weights(x: complex) -> tuple[complex, complex, complex]:
-    """Exponential-integrator weights: exp(x), and those of the load at a step's end and start.
-
-    z(t + dt) = exp(x) z + dt int_0^1 exp(x (1 - s)) [(1 - s) g_0 + s g_1] ds
-    """
-    if abs(x) < 1e-2:  # series, where the closed forms cancel
-        end = 1 / 2 + x / 6 + x**2 / 24 + x**3 / 120 + x**4 / 720
-        whole = 1 + x / 2 + x**2 / 6 + x**3 / 24 + x**4 / 120 + x**5 / 720
-    else:
-        end = (np.exp(x) - 1 - x) / x**2
-        whole = (np.exp(x) - 1) / x
-    return np.exp(x), end, whole - end
