@@ -30,7 +30,7 @@ from scipy.sparse.linalg import aslinearoperator
 from fem.added_mass import AddedMass
 from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
-from fem.maxwell import Branch, MaxwellBranch, relaxing_stiffness
+from fem.maxwell import MaxwellBranch, relaxing_stiffness, with_internal
 from meshes.tetmesh import Floats
 
 Complex = NDArray[np.complex128]
@@ -100,7 +100,7 @@ def reduce(
     ValueError
         If the tolerance is out of reach, or no probe can move.
     """
-    free, branches = operators.free, operators.branches
+    free, branches = operators.free, with_internal(operators.branches)
     seeds = probes[:, free].toarray().T
     if not seeds.any():
         raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
@@ -296,7 +296,7 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
     return grown
 
 
-def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBranch, ...]:
+def _branches(small: list[Floats], large: tuple[MaxwellBranch, ...]) -> tuple[MaxwellBranch, ...]:
     """The full model's Maxwell branches with the reduced stiffness."""
     return tuple(MaxwellBranch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
 

@@ -11,6 +11,7 @@ from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models.bodies import EXACT, exact_waves
 from skinwave.models.full import Map, harmonic_answer, transient_answer
+from skinwave.models.laws import frequency_only
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
 from skinwave.planning.plan import Plan, plan
@@ -172,6 +173,7 @@ def _computed(
     mapped: Map,
 ) -> Response:
     times = sample_times(scene)
+    frequency_only(scene.body, model)
     if model in KERNELS:
         return KERNELS[model](scene.pressure, scene.probe_points, times)
     if model in EXACT:

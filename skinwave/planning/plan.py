@@ -6,8 +6,9 @@ import numpy as np
 
 from simple_model.sampling import resolving_step
 from skinwave.effort import Progress
-from skinwave.models.bodies import EXACT, check_mesh, exact_waves, vacuum_only
+from skinwave.models.bodies import EXACT, check_mesh, default_size, exact_waves, vacuum_only
 from skinwave.models.full import TRANSIENT_RATE, step_count
+from skinwave.models.laws import frequency_only, has_own_law
 from skinwave.models.prepared import BAND, Prepared, reduction_tolerance, sample_times
 from skinwave.models.stretching import expected_error, sheet_only, stretching_size
 from skinwave.planning.estimates import (
@@ -90,6 +91,8 @@ def plan(
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if model in KERNELS:
         return _kernel(scene, tolerance, model)
+    if has_own_law(scene.body):
+        return _own_law(scene, model, h)
     if model in ("fem-nonlinear", "fem-nonlinear-transient"):
         return _nonlinear(scene, tolerance, model, h)
     if model in EXACT:
@@ -140,6 +143,27 @@ def _kernel(scene: Scene, tolerance: float, model: str) -> Plan:
     row = Row(what="model", value=model, reason="as asked; nothing propagates in it")
     warning = over_tolerance("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
     return Plan(model=model, body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning)
+
+
+def _own_law(scene: Scene, model: str | None, h: float | None) -> Plan:
+    """Plan of a material with a modulus law of its own, a frequency at a time: meshes are compared
+    by reduced-order models, which it has none of, and so the error of elements is not known.
+    """
+    frequency_only(scene.body, model)
+    model = model or ("flat-body-harmonic" if has_wavenumber_solution(scene) else "fem-harmonic")
+    row = Row(what="model", value=model, reason="the material has a modulus law of its own")
+    said = "the error of this response is not estimated for a modulus law of its own; compare "
+    if model in EXACT:
+        exact_waves(scene.body, model)
+        said += "with fem-harmonic, which has the body's sides"
+        return Plan(model=model, body=scene.body, error=np.nan, rows=(row,), warnings=(said,))
+    h = h or default_size(scene.body)
+    check_mesh(scene.body, h)
+    size = Row(what="element size", value=f"{1e3 * h:.2f} mm", reason="as asked or by default")
+    return Plan(
+        model=model, body=scene.body, h=h, error=np.nan, rows=(row, size),
+        warnings=(f"{said}elements of {1e3 * h:.3g} mm with smaller ones",),
+    )  # fmt: skip
 
 
 def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> Plan:
@@ -259,7 +283,7 @@ def _march_errors(scene: Scene, model: str | None, dt: float) -> tuple[float, fl
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
-        return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus}'"
+        return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus_name}'"
     if body.kind in ("palm", "mesh"):
         return "a body that is not flat"
     if len(body.strata) > 1:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fem.materials import Material
-from simple_model import Tacton
+from simple_model import MovingPressure, Tacton
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
 from skinwave.scene import Body
@@ -38,6 +38,11 @@ UNCERTAIN = (
 )
 
 
+def spot_of(pressure: MovingPressure) -> str:
+    """The focal spot, in words."""
+    return SPOTS.get(pressure.focus_name, "a focal spot of its own")
+
+
 def modelled(runs: Iterable[Run]) -> list[str]:
     """A paragraph per body and model, and those true of all."""
     groups: dict[tuple[str, str], list[Run]] = {}
@@ -64,7 +69,7 @@ def untold(runs: Iterable[Run]) -> list[str]:
 def _answered(runs: list[Run]) -> str:
     """One body by one model."""
     pressure, model = runs[0].scene.pressure, runs[0].model
-    load = f"drive law {pressure.drive}, {SPOTS[pressure.focus]}"
+    load = f"drive law {pressure.drive}, {spot_of(pressure)}"
     text = f"{_sentence(answered(runs[0]))}: {ANSWERS[model]}; {load}."
     return text if runs[0].response.unit == "Pa" else f"{text} {_sentence(_body(runs))}"
 
