@@ -17,6 +17,11 @@ from scipy import sparse
 
 from meshes.tetmesh import Floats
 
+NO_INTERNAL = (
+    "a material with a modulus law of its own has no internal variables, which motion from rest "
+    "and reduced-order models need; give it Prony terms, or use fem-harmonic or flat-body-harmonic"
+)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MaxwellBranch:
@@ -56,11 +61,7 @@ class DispersiveBranch:
         ValueError
             Always.
         """
-        raise ValueError(
-            "a material with a modulus law of its own has no internal variables, which motion from "
-            "rest and reduced-order models need; give it Prony terms, or use fem-harmonic or "
-            "flat-body-harmonic"
-        )
+        raise ValueError(NO_INTERNAL)
 
     def share(self, s: Any) -> Any:
         """Factor of K in what is added to K, at complex frequencies s in rad/s."""
@@ -72,6 +73,20 @@ class DispersiveBranch:
 
 
 Branch = MaxwellBranch | DispersiveBranch
+
+
+def with_internal(branches: Sequence[Branch]) -> tuple[MaxwellBranch, ...]:
+    """Branches that each have an internal variable.
+
+    Raises
+    ------
+    ValueError
+        If one has none.
+    """
+    found = tuple(branch for branch in branches if isinstance(branch, MaxwellBranch))
+    if len(found) < len(branches):
+        raise ValueError(NO_INTERNAL)
+    return found
 
 
 def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:

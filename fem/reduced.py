@@ -40,7 +40,7 @@ from fem.added_mass import AddedMass
 from fem.assembly import Operators
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
-from fem.maxwell import Branch, MaxwellBranch
+from fem.maxwell import MaxwellBranch
 from fem.products import product
 from meshes.tetmesh import Floats
 
@@ -358,7 +358,7 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
     return whole
 
 
-def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBranch, ...]:
+def _branches(small: list[Floats], large: tuple[MaxwellBranch, ...]) -> tuple[MaxwellBranch, ...]:
     """The full model's Maxwell branches with the reduced stiffness."""
     return tuple(MaxwellBranch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
 

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import cg
 
 from fem.assembly import Operators
 from fem.linear_solver import factorise
-from fem.maxwell import branch_force, relaxing_stiffness
+from fem.maxwell import branch_force, relaxing_stiffness, with_internal
 from meshes.tetmesh import Floats
 
 
@@ -71,7 +71,7 @@ def transient(
     """
     a_m, a_f, beta, gamma = weights(dt, spectral_radius)
     K, C, M, free = operators.K, operators.C, operators.M, operators.free
-    branches = operators.branches
+    branches = with_internal(operators.branches)
     stiff = K + relaxing_stiffness(branches, 2 / dt)  # s of the trapezoidal rule
     system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * stiff)
     factor = factorise(system, backend=solver)

@@ -1,35 +1,51 @@
 """Tactons, the load that they put on the skin, and all models without a mesh."""
 
+from simple_model.drive import DRIVES, DriveLaw
 from simple_model.flat_body import flat_body, steady_state
-from simple_model.focus import array_field, focal_spot, relative_intensity
+from simple_model.focus import (
+    PressureMap,
+    array_field,
+    focal_spot,
+    read_pressure_map,
+    relative_intensity,
+)
 from simple_model.joined import evenly, joined
 from simple_model.line_names import named_lines
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
+from simple_model.material import Material, ModulusTable, PronyTerm, from_young, tabulated
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
 from simple_model.response import Effort, Response, lines, phasors, spectrum, told_apart
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
 from simple_model.threshold import sensation_level, threshold
-from simple_model.trajectory import SHAPES, Trajectory
+from simple_model.trajectory import SHAPES, Trajectory, arc_path, timed_path
 
 __all__ = [
+    "DRIVES",
     "SHAPES",
     "SUPERPOSITIONS",
+    "DriveLaw",
     "Effort",
     "LineTable",
+    "Material",
+    "ModulusTable",
     "MovingPressure",
+    "PressureMap",
+    "PronyTerm",
     "Response",
     "Rhythm",
     "Signal",
     "Tacton",
     "Trajectory",
     "Unnamed",
+    "arc_path",
     "array_field",
     "commanded",
     "evenly",
     "flat_body",
     "focal_spot",
+    "from_young",
     "joined",
     "line_table",
     "lines",
@@ -40,11 +56,14 @@ __all__ = [
     "point_kernel",
     "point_kernel_published",
     "published",
+    "read_pressure_map",
     "relative_intensity",
     "resolved_lines",
     "sensation_level",
     "spectrum",
     "steady_state",
+    "tabulated",
     "threshold",
+    "timed_path",
     "told_apart",
 ]

@@ -7,7 +7,11 @@ A 16 x 16 array of circular pistons (pitch 10.3 mm, 40 kHz, as Ultraleap's STRAT
 Its intensity |p|^2 near the focus is close to sinc^2(D/D0) with D0 growing with height.
 """
 
-from functools import cache
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +29,7 @@ GAUSSIAN_WIDTH = 4.35e-3  # m at 200 mm: the half width of sinc^2, and the force
 HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intensity
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
+FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in metre from the focus -> relative (...)
 
 # Force on a disc of radius 10 mm about the focus by height, relative to 200 mm: `array_field`.
 # A balance measures this force, and it alone has its maximum at 200 mm.
@@ -34,6 +39,86 @@ _FORCES = np.array(
     + [1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414]
 )
 _INTENSITY = PchipInterpolator(_HEIGHTS, _FORCES)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class PressureMap:
+    """Measured focal spot: pressures on a grid, relative to the largest, linear between its points
+    and 0 beyond them. It is the same at all heights of the focus.
+
+    Parameters
+    ----------
+    x, y : (i,) and (j,) metre from the focus, ascending
+    pressure : (i, j) of any unit, its largest above 0
+
+    Raises
+    ------
+    ValueError
+        If they are no such grid.
+    """
+
+    x: Floats
+    y: Floats
+    pressure: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "pressure"):
+            values = np.array(getattr(self, name), np.float64)
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+        lines = [line.ndim == 1 and len(line) > 1 and (np.diff(line) > 0).all()
+                 and np.isfinite(line).all() for line in (self.x, self.y)]  # fmt: skip
+        if not all(lines) or self.pressure.shape != (len(self.x), len(self.y)):
+            raise ValueError(
+                f"a pressure map of shape {self.pressure.shape} on {self.x.size} by {self.y.size} "
+                "lines is no grid; give rising x (i,) and y (j,) in metre and pressures (i, j)"
+            )
+        if not (np.isfinite(self.pressure).all() and self.pressure.max() > 0):
+            raise ValueError("a pressure map must be finite, and above 0 somewhere; check its data")
+
+    def __repr__(self) -> str:  # all of it, for a cache
+        parts = b"".join(each.tobytes() for each in (self.x, self.y, self.pressure))
+        return f"PressureMap({self.pressure.shape}, {hashlib.sha256(parts).hexdigest()})"
+
+    @property
+    def spacing(self) -> float:
+        """The least distance in metre between lines of the grid."""
+        return float(min(np.diff(self.x).min(), np.diff(self.y).min()))
+
+    def __call__(self, offsets: Floats) -> Floats:
+        """Pressure (...) relative to the largest at offsets (..., 2) in metre from the focus."""
+        return np.asarray(self._interpolated(offsets))
+
+    @cached_property
+    def _interpolated(self) -> RegularGridInterpolator:
+        relative = self.pressure / self.pressure.max()
+        return RegularGridInterpolator((self.x, self.y), relative, bounds_error=False, fill_value=0)
+
+
+def read_pressure_map(path: str | Path) -> PressureMap:
+    """Pressure map from a CSV file with a header and columns x and y in mm, pressure in any unit;
+    one row for each point of a grid, in any order.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or its points are no grid.
+    """
+    try:
+        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        (x, i), (y, j) = (np.unique(table[:, k] / 1e3, return_inverse=True) for k in (0, 1))
+        pressure = np.full((len(x), len(y)), np.nan)
+        pressure[i, j] = table[:, 2]
+    except (OSError, ValueError, IndexError) as error:
+        raise ValueError(
+            f"{path} is no pressure map ({error}); give columns x_mm, y_mm and pressure"
+        ) from None
+    if len(table) != pressure.size or np.isnan(pressure).any():
+        raise ValueError(
+            f"{path} has {len(table)} points, which are no grid of {len(x)} by {len(y)}; give each "
+            "x with each y once"
+        )
+    return PressureMap(x=x, y=y, pressure=pressure)
 
 
 def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:
@@ -76,25 +161,28 @@ def lobe_width(height: float) -> float:
 
 
 def focal_spot(
-    offsets: ArrayLike, height: float = NOMINAL_HEIGHT, focus: str = "main_lobe"
+    offsets: ArrayLike, height: float = NOMINAL_HEIGHT, focus: str | FocalSpot = "main_lobe"
 ) -> Floats:
     """Focal spot S: intensity relative to the focus (...) at offsets (..., 2) in metre from it.
 
     Parameters
     ----------
     focus : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; or "array",
-        the field of the array with its side lobes, as far as 60 mm along each axis.
+        the field of the array with its side lobes, as far as 60 mm along each axis; or a function
+        of the offsets
     """
     offsets = np.asarray(offsets, np.float64)
+    if not isinstance(focus, str):
+        return np.asarray(focus(offsets))
     if focus == "array":
         return _array_spot(height)(np.abs(offsets).clip(max=60e-3))
     scaled = (offsets / _scale(height, focus)) ** 2
     return _round_spot(np.asarray(scaled[..., 0] + scaled[..., 1]), focus)
 
 
-def moved_spot(points: Floats, centres: Floats, height: float, focus: str) -> Floats:
+def moved_spot(points: Floats, centres: Floats, height: float, focus: str | FocalSpot) -> Floats:
     """Focal spot S (..., n) at points (n, 2) for the focus at centres (..., 2), in metre."""
-    if focus == "array":
+    if focus == "array" or not isinstance(focus, str):
         return focal_spot(points - centres[..., None, :], height, focus)
     # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way.
     x, c = points / _scale(height, focus), centres / _scale(height, focus)
@@ -122,6 +210,14 @@ def spot_width(height: float) -> float:
     return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
 
 
+def spot_detail(height: float, focus: str | FocalSpot) -> float:
+    """Length in metre that samples of a focal spot along its path must resolve: the standard
+    deviation of the Gaussian, or the spacing of a map that is finer.
+    """
+    spacing = focus.spacing if isinstance(focus, PressureMap) else np.inf
+    return min(spot_width(height), spacing)
+
+
 def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
     """Relative intensity (...) on the axis at an offset (...) in metre above or below the focus.
 
@@ -132,7 +228,7 @@ def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 
-def spot_reach(height: float, focus: str) -> float:
+def spot_reach(height: float, focus: str | FocalSpot) -> float:
     """Radius in metre beyond which a focal spot is below 1e-7; infinite unless Gaussian."""
     return 5.7 * spot_width(height) if focus == "gaussian" else np.inf
 

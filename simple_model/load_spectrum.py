@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from simple_model.drive import DriveLaw
-from simple_model.focus import spot_reach, spot_width
+from simple_model.focus import spot_detail, spot_reach
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.tacton import Tacton, modulation_at_phases, tones
 from simple_model.trajectory import Floats
@@ -30,7 +30,7 @@ Complex = NDArray[np.complex128]
 FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
 KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
 PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
-MOST_PHASES = 2**20  # of all sinusoids together, for a drive law that is no polynomial
+MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all, for a drive law that is no polynomial
 ALIASED = 1e-4  # of the strongest: a drive law's harmonics beyond those that are sampled
 HIGHEST = 10_000.0  # Hz of the lines of pulses and recordings: the rest moves bodies by 0.1 %
 SAMPLED = 40_000.0  # Hz at which a rhythm or signal is averaged
@@ -192,7 +192,7 @@ def _knot_phases(pressure: MovingPressure) -> Floats:
     path = pressure.tacton.trajectory
     if path.is_static:
         return np.zeros(1)
-    width = spot_width(pressure.height)
+    width = spot_detail(pressure.height, pressure.focus)
     if path.shape == "recorded":
         enough, whole = _recorded_knots(pressure.tacton, width)
     else:
@@ -288,7 +288,8 @@ def gain_orders(
     """
     law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
     count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)
-    while count**n_tones <= MOST_PHASES or law.degree is not None:
+    each, together = MOST_PHASES
+    while law.degree is not None or (count <= each and count**n_tones <= together):
         orders, c = _at_phases(pressure, factors, count)
         beyond = (4 * np.abs(orders) >= count).any(axis=1)
         strongest = np.abs(c).max()

@@ -14,7 +14,14 @@ from numpy.typing import ArrayLike
 
 from simple_model.choices import choose
 from simple_model.drive import DRIVES, DriveLaw
-from simple_model.focus import FOCI, NOMINAL_HEIGHT, along_axis, moved_spot, relative_intensity
+from simple_model.focus import (
+    FOCI,
+    NOMINAL_HEIGHT,
+    FocalSpot,
+    along_axis,
+    moved_spot,
+    relative_intensity,
+)
 from simple_model.tacton import Tacton, level, modulation
 from simple_model.trajectory import Floats
 
@@ -32,7 +39,8 @@ class MovingPressure:
     Parameters
     ----------
     tacton : Tacton
-    focus : "gaussian", "main_lobe" or "array", the shape of the focal spot
+    focus : "gaussian", "main_lobe" or "array", the shape of the focal spot; a PressureMap; or any
+        function of offsets (..., 2) in metre, with details no finer than the Gaussian's
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
     depth_of_modulation : float, 0..1; the linear law has none
     peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a
@@ -46,14 +54,15 @@ class MovingPressure:
     """
 
     tacton: Tacton
-    focus: str = "gaussian"
+    focus: str | FocalSpot = "gaussian"
     drive: str | DriveLaw = "pressure_squared"
     depth_of_modulation: float = 1.0
     peak_pressure: float = 50.0
     height: float = NOMINAL_HEIGHT
 
     def __post_init__(self) -> None:
-        choose("focus", self.focus, FOCI)
+        if not callable(self.focus):
+            choose("focus", self.focus, FOCI)
         if not isinstance(self.drive, DriveLaw):
             choose("drive", self.drive, DRIVES)
         if not 0 <= self.depth_of_modulation <= 1:
@@ -81,6 +90,11 @@ class MovingPressure:
     def law(self) -> DriveLaw:
         """The drive law."""
         return self.drive if isinstance(self.drive, DriveLaw) else DRIVES[self.drive]
+
+    @property
+    def focus_name(self) -> str:
+        """Name of the focal spot, "own" if it has none."""
+        return self.focus if isinstance(self.focus, str) else "own"
 
     def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s.

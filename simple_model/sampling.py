@@ -12,7 +12,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from simple_model.focus import spot_width
+from simple_model.focus import spot_detail
 from simple_model.load_spectrum import ALIASED, gain_orders
 from simple_model.pressure import MovingPressure
 from simple_model.response import step
@@ -54,7 +54,7 @@ def _highest_order(pressure: MovingPressure) -> int:
 
 def highest_passing(pressure: MovingPressure) -> float:
     """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place."""
-    return PASSED * _speed(pressure.tacton) / spot_width(pressure.height)
+    return PASSED * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.focus)
 
 
 def reached(pressure: MovingPressure) -> float:

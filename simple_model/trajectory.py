@@ -4,6 +4,7 @@ Named shapes: Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are comput
 of the drawing period, never by adding steps, and so are as exact at 10 s as at 0.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, pi, sqrt
@@ -22,6 +23,7 @@ SWEEPS = ("there_and_back", "one_way", "sinusoidal")
 LARGEST = 0.060  # m, the size of a palm
 FURTHEST = 0.100  # m of a point's coordinates, which devices steer to
 MOST_POINTS = 1_000_000
+STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
 JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
 _TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
@@ -198,6 +200,54 @@ class Trajectory:
             return before, np.zeros_like(t)
         step = np.maximum(clock[before + 1] - clock[before], 1e-300)
         return before, np.clip((t - clock[before]) / step, 0.0, 1.0)
+
+
+def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajectory:
+    """Recorded path whose positions (k, 2) in metre are a function of times (k,) in s, from 0 to
+    `period`, within `STRAIGHT`.
+
+    Raises
+    ------
+    ValueError
+        If the function jumps, or returns no positions.
+    """
+    t = _resolving(position, period)
+    points = tuple(map(tuple, position(t).tolist()))
+    return Trajectory(shape="recorded", points=points, times=tuple(t.tolist()))
+
+
+def arc_path(position: Callable[[Floats], Floats], speed: float) -> Trajectory:
+    """Polyline at a constant speed in m/s whose positions (k, 2) in metre are a function of
+    parameters (k,) from 0 to 1, within `STRAIGHT`; closed if it ends where it begins.
+
+    Raises
+    ------
+    ValueError
+        If the function jumps, or returns no positions.
+    """
+    points = np.array(position(_resolving(position, 1.0)), np.float64)
+    if np.linalg.norm(points[-1] - points[0]) < STRAIGHT:
+        points[-1] = points[0]
+    return Trajectory(shape="polyline", points=tuple(map(tuple, points.tolist())), speed=speed)
+
+
+def _resolving(position: Callable[[Floats], Floats], end: float) -> Floats:
+    """Arguments (k,) from 0 to `end` between which the path is straight."""
+    count = 64
+    while count < MOST_POINTS:
+        u = np.linspace(0, end, count + 1)
+        x, between = (np.asarray(position(each), np.float64) for each in (u, u[1:] - u[1] / 2))
+        if x.shape != (count + 1, 2) or not np.isfinite(x).all():
+            raise ValueError(
+                f"the path's function gives shape {x.shape} for {count + 1} arguments; return "
+                "finite positions (k, 2) in metre"
+            )
+        if np.linalg.norm(between - (x[1:] + x[:-1]) / 2, axis=1).max() <= STRAIGHT:
+            return u
+        count *= 2
+    raise ValueError(
+        "the path's function jumps; give its points and times as a recorded Trajectory"
+    )
 
 
 def _check_points(path: Trajectory) -> None:

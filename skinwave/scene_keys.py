@@ -8,6 +8,8 @@ from typing import Any
 
 from simple_model import Rhythm, Signal
 from simple_model.choices import meant
+from simple_model.drive import DRIVES, DriveLaw
+from simple_model.focus import FOCI, FocalSpot
 from simple_model.material import Material, PronyTerm
 from simple_model.trajectory import Points
 from skinwave.scene import Layer, Relief
@@ -146,6 +148,24 @@ def _write_material(material: str | Material) -> Any:
     return {key: value for key, value in table.items() if value != []}
 
 
+def _write_drive(drive: str | DriveLaw) -> str:
+    if isinstance(drive, DriveLaw) and DRIVES.get(drive.name) is not drive:
+        raise ValueError(
+            f"drive law '{drive}' is a Python function, which a scene file cannot hold; take one "
+            f"of {', '.join(DRIVES)}, register it in DRIVES, or simulate it from Python"
+        )
+    return str(drive)
+
+
+def _write_profile(focus: str | FocalSpot) -> str:
+    if not isinstance(focus, str):
+        raise ValueError(
+            "the focus profile is a map or a Python function, which a scene file cannot hold; take "
+            f"one of {', '.join(FOCI)}, or simulate it from Python"
+        )
+    return focus
+
+
 def _prony(key: str, value: Any) -> tuple[PronyTerm, ...]:
     return tuple(PronyTerm(**values) for values in _tables(f"body.material.{key}", value, PRONY))
 
@@ -267,10 +287,10 @@ SECTIONS = {
     },
     "focus": {
         "height_mm": _scaled("height", 1e3),
-        "drive": _word("drive"),
+        "drive": Field("drive", as_text, _write_drive),
         "depth_of_modulation": _scaled("depth_of_modulation"),
         "peak_pressure_pa": _scaled("peak_pressure"),
-        "profile": _word("focus"),
+        "profile": Field("focus", as_text, _write_profile),
     },
     "body": {
         "kind": _word("kind"),

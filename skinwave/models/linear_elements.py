@@ -58,6 +58,7 @@ FEM = register(
         colour="#0072B2",
         is_reduced=True,
         fits_damping=True,
+        has_internal_variables=True,
     )
 )
 HARMONIC = register(
@@ -85,5 +86,6 @@ TRANSIENT = register(
         colour="#D55E00",
         is_stepped=True,
         fits_damping=True,
+        has_internal_variables=True,
     )
 )

@@ -51,6 +51,7 @@ REDUCED = register(
         error=_error,
         default_size=partial(stretching_size, reduced=True),
         is_nonlinear=True,
+        has_internal_variables=True,
     )
 )
 FULL = register(
@@ -63,5 +64,6 @@ FULL = register(
         error=_error,
         default_size=partial(stretching_size, reduced=False),
         is_nonlinear=True,
+        has_internal_variables=True,
     )
 )

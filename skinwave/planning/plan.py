@@ -5,11 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.sampling import resolving_step
-from skinwave.bodies.sizes import check_mesh
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress
 from skinwave.models import Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
+from skinwave.models.laws import frequency_only, has_own_law
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import (
@@ -88,8 +89,12 @@ def plan(
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if asked:
         asked.refuse(scene.body)
-        if asked.error:
+        if asked.error and not asked.needs_body:
             return _unplanned(scene, tolerance, asked, h)
+    if has_own_law(scene.body):
+        return _own_law(scene, asked, h)
+    if asked and asked.error:
+        return _unplanned(scene, tolerance, asked, h)
     spectrum = response_spectrum(scene, tolerance)
     highest = cutoff_frequency(*spectrum, tolerance)
     rows = [
@@ -129,6 +134,26 @@ def plan(
                       tolerance, "fem is"),
         ),
         prepared=found.prepared,
+    )  # fmt: skip
+
+
+def _own_law(scene: Scene, asked: Model | None, h: float | None) -> Plan:
+    """Plan of a material with a modulus law of its own, a frequency at a time: meshes are compared
+    by reduced-order models, which it has none of, and so the error of elements is not known.
+    """
+    model = asked or (HARMONIC if has_wavenumber_solution(scene) else named("fem-harmonic"))
+    frequency_only(scene.body, model)
+    row = Row(what="model", value=model.name, reason="the material has a modulus law of its own")
+    said = "the error of this response is not estimated for a modulus law of its own; compare "
+    if model.is_infinite:
+        said += "with fem-harmonic, which has the body's sides"
+        return Plan(model=model.name, body=scene.body, error=np.nan, rows=(row,), warnings=(said,))
+    h = h or default_size(scene.body)
+    check_mesh(scene.body, h)
+    size = Row(what="element size", value=f"{1e3 * h:.2f} mm", reason="as asked or by default")
+    return Plan(
+        model=model.name, body=scene.body, h=h, error=np.nan, rows=(row, size),
+        warnings=(f"{said}elements of {1e3 * h:.3g} mm with smaller ones",),
     )  # fmt: skip
 
 
@@ -250,7 +275,7 @@ def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, 
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
     if scene.pressure.focus != "gaussian":
-        return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus}'"
+        return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus_name}'"
     if not body.of_kind.compliance:
         return f"a body of kind '{body.kind}' has no wavenumber integral"
     if len(body.strata) > 1:

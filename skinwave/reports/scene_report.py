@@ -25,12 +25,12 @@ from skinwave.studies import summary, tables
 from skinwave.studies.changes import Drawn, beside_kernels, shown
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import (
-    SPOTS,
     above,
     extent,
     levels_of,
     modelled,
     path_of,
+    spot_of,
     tones_of,
     untold,
 )
@@ -149,7 +149,7 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
         ["focus", path_of(tacton)],
         ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
         ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
-        ["drive", f"{pressure.drive}{of_depth}, {SPOTS[pressure.focus]}, "
+        ["drive", f"{pressure.drive}{of_depth}, {spot_of(pressure)}, "
                   f"{pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
         ["body", extent(body) + above(body)],

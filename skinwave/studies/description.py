@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from fem.materials import Material
-from simple_model import Tacton
+from simple_model import MovingPressure, Tacton
 from skinwave.models import named
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
@@ -20,6 +20,11 @@ SPOTS = {
 UNCERTAIN = (
     "The pressure at the focus is uncertain by a factor of 2, and all displacements with it."
 )
+
+
+def spot_of(pressure: MovingPressure) -> str:
+    """The focal spot, in words."""
+    return SPOTS.get(pressure.focus_name, "a focal spot of its own")
 
 
 def modelled(runs: Iterable[Run]) -> list[str]:
@@ -48,7 +53,7 @@ def untold(runs: Iterable[Run]) -> list[str]:
 def _answered(runs: list[Run]) -> str:
     """One body by one model."""
     pressure, model = runs[0].scene.pressure, named(runs[0].model)
-    load = f"drive law {pressure.drive}, {SPOTS[pressure.focus]}"
+    load = f"drive law {pressure.drive}, {spot_of(pressure)}"
     text = f"{_sentence(answered(runs[0]))}: {model.words}; {load}."
     return text if runs[0].response.unit == "Pa" else f"{text} {_sentence(_body(runs))}"
 

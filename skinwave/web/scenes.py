@@ -98,7 +98,7 @@ def values_of(scene: Scene) -> Values:
         f"a depth_of_modulation of {pressure.depth_of_modulation:g}": pressure.law.uses_depth
         and pressure.depth_of_modulation != MovingPressure.depth_of_modulation,
         f"drive law '{pressure.law}'": pressure.drive not in CHOICES["drive"],
-        f"profile = {pressure.focus} of the focus": pressure.focus not in CHOICES["profile"],
+        f"profile = {pressure.focus_name} of the focus": pressure.focus not in CHOICES["profile"],
     }  # fmt: skip
     if said := [what for what, holds in beyond.items() if holds]:
         raise ValueError(f"{' and '.join(said)} cannot be set here; use skinwave run")

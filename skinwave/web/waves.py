@@ -146,7 +146,7 @@ def gaussian_only(pressure: MovingPressure) -> None:
     """
     if pressure.focus != "gaussian":
         raise ValueError(
-            f"focus profile '{pressure.focus}' has no wavenumber integral on a slab; choose "
+            f"focus profile '{pressure.focus_name}' has no wavenumber integral on a slab; choose "
             "'gaussian', which has the same half width and force"
         )
 
