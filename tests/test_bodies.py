@@ -473,7 +473,7 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(tmp_pat
     assert "Body from generic-hand-right.glb, -x towards the device" in page
     assert "thicker sheet" not in page
     assert "elements of 12 mm" in page  # of the map, too
-    assert "--up -x --h 12" in page
+    assert "--up -x --element-size 12" in page
     rows = list(csv.DictReader((tmp_path / "both/lines.csv").read_text().splitlines()))
     moved = [
         float(r["displacement_um"]) for r in rows if r["line"] == "f_AM" and r["body"] == "mesh"

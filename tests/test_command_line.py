@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from corpus import SMALL
 
-from skinwave.cli import main
+from skinwave.cli import main, parser
 from skinwave.commands.common import progress_of
 
 
@@ -224,3 +224,11 @@ def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monke
     assert "warning: elements of" in said
     assert "more than the tolerance of 0.1 %" in said
     assert "Take care: elements of" in (tmp_path / "scene-out/index.html").read_text()
+
+
+@pytest.mark.parametrize("command", ["run scene.toml", "relax scene.toml", "mesh hand.stl"])
+def test_the_element_size_has_its_name_of_0_2_too(command):
+    sizes = [
+        parser().parse_args([*command.split(), name, "3"]).h for name in ("--element-size", "--h")
+    ]
+    assert sizes == [3.0, 3.0]

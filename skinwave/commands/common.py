@@ -44,8 +44,13 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
 
 def add_mesh(parser: argparse.ArgumentParser) -> None:
     """Solver options: element size and direct solver."""
-    parser.add_argument("--h", type=float, metavar="MM", help="element size, mm (default: planned)")
+    add_size(parser, help="element size, mm (default: planned)")
     parser.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
+
+
+def add_size(parser: argparse.ArgumentParser, **how: Any) -> None:
+    """The element size in mm; `--h` is its name in version 0.2."""
+    parser.add_argument("--element-size", "--h", dest="h", type=float, metavar="MM", **how)
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:

@@ -94,7 +94,7 @@ def _again(options: argparse.Namespace) -> str:
     if options.body and Path(options.body).is_file():
         words += ["--unit", options.unit, "--up", options.up]
     if options.h:
-        words += ["--h", f"{options.h:g}"]
+        words += ["--element-size", f"{options.h:g}"]
     return shlex.join(["skinwave", "compare", options.scene, *words])
 
 

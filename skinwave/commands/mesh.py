@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, progress_of, summarise
+from skinwave.commands.common import add_reporting, add_size, progress_of, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -18,7 +18,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--clip", type=float, nargs=4, metavar=("XMIN", "XMAX", "YMIN", "YMAX"),
         help="keep this patch, mm from the middle of the palm",
     )  # fmt: skip
-    parser.add_argument("--h", type=float, default=4.0, metavar="MM", help="element size, mm (4)")
+    add_size(parser, default=4.0, help="element size, mm (4)")
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="of the mesher")
     parser.add_argument("--out", type=Path, metavar="FILE.vtu", help="file to write")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")

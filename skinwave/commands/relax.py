@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, metre, progress_of, summarise, warn
+from skinwave.commands.common import add_output, add_size, metre, progress_of, summarise, warn
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -12,7 +12,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "scene", metavar="SCENE", help="scene file, or paper-vs-skin: which mechanism makes which "
         "line of the 15 Tactons",
     )  # fmt: skip
-    parser.add_argument("--h", type=float, metavar="MM", help="element size of all steps, mm")
+    add_size(parser, help="element size of all steps, mm")
     parser.add_argument(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
         help="how often the device moves its focus: 20 or 40 kHz",

@@ -76,5 +76,5 @@ def _drawn(options: argparse.Namespace) -> list[str]:
 def _again(options: argparse.Namespace) -> str:
     """The command that makes the same report."""
     words = ["--beside", ",".join(options.beside)] if options.beside else []
-    words += ["--h", f"{options.h:g}"] if options.h else []
+    words += ["--element-size", f"{options.h:g}"] if options.h else []
     return shlex.join(["skinwave", "report", options.source.name, *words])
