@@ -40,7 +40,7 @@ from fem.added_mass import AddedMass
 from fem.assembly import Operators
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
-from fem.maxwell import MaxwellBranch
+from fem.maxwell import Branch, MaxwellBranch, with_internal
 from fem.products import product
 from meshes.tetmesh import Floats
 
@@ -298,7 +298,7 @@ def _moments(
     """Numbers, from 1, of the moments of start vectors (n, p), by each of which the space has
     been extended.
     """
-    branches = operators.branches
+    branches = with_internal(operators.branches)
     lags = [branch.time / (1 + point * branch.time) for branch in branches]
     scale = point or EXPANSION_POINT
     # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
@@ -358,9 +358,11 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
     return whole
 
 
-def _branches(small: list[Floats], large: tuple[MaxwellBranch, ...]) -> tuple[MaxwellBranch, ...]:
+def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBranch, ...]:
     """The full model's Maxwell branches with the reduced stiffness."""
-    return tuple(MaxwellBranch(K=K, time=b.time) for K, b in zip(small, large, strict=True))
+    return tuple(
+        MaxwellBranch(K=K, time=b.time) for K, b in zip(small, with_internal(large), strict=True)
+    )
 
 
 def _band_response(
