@@ -1,5 +1,7 @@
 """Tactons, the load that they put on the skin, and all models without a mesh."""
 
+import warnings
+
 from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import array_field, focal_spot, relative_intensity
 from simple_model.joined import evenly, joined
@@ -7,7 +9,7 @@ from simple_model.line_names import named_lines
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
-from simple_model.response import Effort, Response, lines, phasors, spectrum, told_apart
+from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
 from simple_model.threshold import sensation_level, threshold
@@ -25,6 +27,7 @@ __all__ = [
     "Tacton",
     "Trajectory",
     "Unnamed",
+    "are_resolved",
     "array_field",
     "commanded",
     "evenly",
@@ -46,5 +49,13 @@ __all__ = [
     "spectrum",
     "steady_state",
     "threshold",
-    "told_apart",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name != "told_apart":  # of version 0.2, which loads for one release
+        raise AttributeError(f"module 'simple_model' has no attribute '{name}'")
+    warnings.warn(
+        "simple_model.told_apart is now simple_model.are_resolved", DeprecationWarning, stacklevel=2
+    )
+    return are_resolved

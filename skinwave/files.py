@@ -16,7 +16,7 @@ from skinwave import outputs, record
 from skinwave.plain_text import csv_table
 from skinwave.run import Run
 from skinwave.scene_file import dumps
-from skinwave.studies.claims import Verdict
+from skinwave.studies.claims import AssessedClaim
 
 LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
@@ -110,10 +110,10 @@ def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
                 yield (*where, _short(frequency), um, mm_s, "")
 
 
-def write_claims(path: Path, verdicts: Iterable[Verdict]) -> None:
+def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
     """Every assessed claim per body and model."""
-    rows = ((*astuple(v)[:4], _short(v.value), v.bar, v.sentence) for v in verdicts)
-    path.write_bytes(csv_table([field.name for field in fields(Verdict)], rows))
+    rows = ((*astuple(v)[:4], _short(v.value), v.bar, v.sentence) for v in assessed_claims)
+    path.write_bytes(csv_table([field.name for field in fields(AssessedClaim)], rows))
 
 
 def write_effort(path: Path, effort: Effort) -> None:

@@ -107,7 +107,7 @@ def required_plan(
 ) -> Plan:
     """Plan of a request; raises what `simulate` does before any work."""
     choose("model", model, MODELS)
-    check_knobs(solver, h=h, dt=dt)
+    check_options(solver, h=h, dt=dt)
     asked = None if model == "auto" else model
     return plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
 
@@ -152,7 +152,7 @@ def compute(
     Arguments and exceptions are those of `simulate`.
     """
     choose("model", model, MODELS[1:])
-    check_knobs(solver, h=h, dt=dt)
+    check_options(solver, h=h, dt=dt)
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     found = _computed(scene, model, tolerance, progress or silent, h, dt, solver, mapped)
@@ -199,7 +199,7 @@ def warned(response: Response, sentences: tuple[str, ...]) -> Response:
     return replace(response, effort=replace(response.effort, warnings=sentences))
 
 
-def check_knobs(solver: str, **lengths: float | None) -> None:
+def check_options(solver: str, **lengths: float | None) -> None:
     """Refuse a solver that is not installed and sizes that are no sizes, before any work.
 
     Raises

@@ -30,8 +30,8 @@ LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25, trajectory=
 SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
 
 
-def answered(body, **knobs):
-    return compute(replace(SKIN, body=body), "fem", h=0.006, **knobs).displacement
+def answered(body, **model_options):
+    return compute(replace(SKIN, body=body), "fem", h=0.006, **model_options).displacement
 
 
 def test_two_layers_of_one_material_are_one():

@@ -53,7 +53,7 @@ from skinwave.web import (
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
 from skinwave.web.session import told
-from skinwave.web.shown import untold
+from skinwave.web.shown import unresolved
 from skinwave.web.worker import Worker
 
 
@@ -355,10 +355,12 @@ def test_lines_too_near_to_each_other_are_left_out_and_counted():
     scene = scenes.scene_of(STARTS | {"am": 3, "duration": 0.5, "shape": "point"})
     answer = model.kernel(scene)
     assert answer.lines == ()
-    count = len(model.untold_lines(scene, answer.response))
+    count = len(model.unresolved_lines(scene, answer.response))
     assert count == 5
-    assert untold(count, 0.5) == ("5 lines cannot be resolved in 0.5 s; make the Tacton longer.")
-    assert untold(0, 0.5) == ""
+    assert unresolved(count, 0.5) == (
+        "5 lines cannot be resolved in 0.5 s; make the Tacton longer."
+    )
+    assert unresolved(0, 0.5) == ""
 
 
 def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
@@ -368,7 +370,7 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
     found = model.kernel_map(pressure)
     assert np.abs(found.rms - sampled).max() < 0.05 * sampled.max()
     # On the borderline the strongest component is at its own threshold.
-    outermost = max(found.felt, key=lambda line: np.abs(line).max())
+    outermost = max(found.threshold, key=lambda line: np.abs(line).max())
     times = np.arange(10_000) / 10_000
     table = line_table(pressure, point_kernel(pressure, outermost[::7], times))
     level = [sensation_level(table.amplitudes[name], f, unit="Pa")
@@ -378,22 +380,22 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
 
 def test_nothing_is_felt_of_what_does_not_vibrate_nor_on_paper():
     still = scenes.scene_of(STARTS | {"shape": "point", "am": 0})
-    assert model.kernel_map(still.pressure).felt == ()
-    assert model.kernel_map(scenes.scene_of(STARTS | {"shape": "point"}).pressure).felt
+    assert model.kernel_map(still.pressure).threshold == ()
+    assert model.kernel_map(scenes.scene_of(STARTS | {"shape": "point"}).pressure).threshold
     scene = scenes.scene_of(STARTS | {"body": "skin-slab", "duration": 0.2})
     f, motion = (
         np.array([140.0]),
         np.full((1, model.SIDE**2), 1e-6) * np.linspace(0, 1, model.SIDE**2),
     )
-    assert waves.motion_map(scene, f, motion).felt
+    assert waves.motion_map(scene, f, motion).threshold
     paper = replace(scene, body=BODIES["paper-sheet"])
-    assert waves.motion_map(paper, f, motion).felt == ()
+    assert waves.motion_map(paper, f, motion).threshold == ()
 
 
 def test_map_and_table_agree_under_a_rhythm():
     """The level of the strongest line where the borderline runs is 0 dB in the table."""
     scene = scenes.scene_of(STARTS | PUBLISHED | {"shape": "point", "am": 150, "pulses": "50/50"})
-    outermost = max(model.kernel_map(scene.pressure).felt, key=lambda line: np.abs(line).max())
+    outermost = max(model.kernel_map(scene.pressure).threshold, key=lambda line: np.abs(line).max())
     response = point_kernel(scene.pressure, outermost[:1], np.arange(10_000) / 10_000)
     table = line_table(scene.pressure, response)
     level = sensation_level(table.amplitudes["f_AM"][0], 150.0, unit="Pa")
@@ -506,7 +508,7 @@ def test_silence_moves_nothing_and_is_drawn_as_zero(more, moving):
     scene = scenes.scene_of(given)
     kernel, shown = model.kernel(scene), waves.Waves()(scene, nothing, moving)
     assert not shown.response.displacement.any()
-    assert (shown.lines, shown.map.felt) == ((), ())
+    assert (shown.lines, shown.map.threshold) == ((), ())
     assert not shown.map.rms.any()
     assert (shown.moving is not None) == moving
     curves = plots.Curves(kernel=kernel, waves=shown)
@@ -854,13 +856,13 @@ def test_the_first_sentences_say_what_each_difference_changes(session):
     answer = waves.Waves()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number, answer)
-    propagation, drive, felt = session.state.summary
+    propagation, drive, threshold = session.state.summary
     share = float(re.search(r"carry (\d+) %", propagation)[1])
     exact = share_outside(model.kernel_map(session.scene.pressure).rms, answer.map.rms)
     assert share == round(100 * exact)
     assert 5 < share < 60
     assert "not propagation, adds f_" in drive
-    assert "dB re threshold" in felt
+    assert "dB re threshold" in threshold
     with session.state:
         session.state.body = "none"
     assert session.state.summary == [drive]

@@ -78,7 +78,7 @@ def refined(
         return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
-    sizes = ladder(body)
+    sizes = element_sizes(body)
     before = compared_with(body, h) if h else sizes[0]
     size = h or _finer(sizes, before)[0]
     coarse, other = answered(before)
@@ -96,7 +96,7 @@ def refined(
         size = finer[abs(np.log(finer / max(wanted, size / LARGEST_FACTOR))).argmin()]
 
 
-def ladder(body: Body) -> Floats:
+def element_sizes(body: Body) -> Floats:
     """Sequence of element sizes (k,) in metre that a body may be meshed with, descending."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
     if body.kind in hands.KINDS:  # whose coarser meshes cut the rim off, and layers

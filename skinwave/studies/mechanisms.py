@@ -21,7 +21,7 @@ from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.plain_text import csv_table
-from skinwave.run import JUDGED
+from skinwave.run import ASSESSED
 from skinwave.scene import BODIES, PROBES, Body, Scene
 from skinwave.simulation import compute
 from skinwave.studies.paper15 import MEASURED_ON, tactons
@@ -151,7 +151,7 @@ def _lines(
 ) -> list[Line]:
     # A stretching sheet has lines that no load has: those that claims are about are looked for.
     later = steady(response)
-    names, _ = resolved_lines(pressure, later, candidates=JUDGED, highest=700.0)
+    names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=700.0)
     amplitudes = lines(later, list(names.values())).max(axis=1)
     return [
         Line(tacton=tacton, body=body, mechanism=mechanism, line=name, frequency=f,

@@ -9,7 +9,7 @@ import numpy as np
 from simple_model import Response, named_lines, point_kernel, sensation_level
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import JUDGED, Run, is_skin
+from skinwave.run import ASSESSED, Run, is_skin
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import Case
 
@@ -17,7 +17,7 @@ WEAKEST, MOST = 1e-2, 40  # of the strongest line of a load, and lines, that hav
 SETTLE = 0.25  # of a response, before which it is not looked at
 TEXTS = (
     "key", "status", "error", "model", "asked_model", "version", "name", "scene",
-    "felt_line", "solver", "warnings",
+    "sensation_line", "solver", "warnings",
 )  # fmt: skip
 NUMBERS = (
     "tolerance", "asked_h_mm", "h_mm", "expected_error", "drawing_frequency_hz",
@@ -53,7 +53,7 @@ def columns(cases: Iterable[Case]) -> dict[str, str]:
 
 def _columned(scene: Scene) -> Iterable[str]:
     """Lines that have columns: the strongest of the load, and those that claims are about."""
-    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=JUDGED)
+    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
 
 
 def commanded(case: Case) -> dict[str, Any]:
@@ -91,7 +91,7 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     row |= _kernel(kernel, agreement) | _effort(response)
     if response.unit == "m":
         row |= _motion(response, agreement) | {f"{n}_um": 1e6 * a for n, a in found.items()}
-        row |= _felt(run) if is_skin(scene.body) else {}
+        row |= _above_threshold(run) if is_skin(scene.body) else {}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 
@@ -117,13 +117,13 @@ def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _felt(run: Run) -> dict[str, Any]:
+def _above_threshold(run: Run) -> dict[str, Any]:
     """Sensation levels of lines and, if all are resolved, the line with the highest."""
     levels = {n: sensation_level(a, run.frequencies[n]) for n, a in run.lines.items()}
     row: dict[str, Any] = {f"{name}_db": level for name, level in levels.items()}
-    if levels and not run.untold:
+    if levels and not run.unresolved:
         row["level_db"] = np.max(list(levels.values()), axis=0)
-        row["felt_line"] = max(levels, key=lambda name: levels[name].max())
+        row["sensation_line"] = max(levels, key=lambda name: levels[name].max())
     return row
 
 

@@ -45,9 +45,9 @@ class Case:
     scene: Scene | None = None
     error: str = ""
 
-    def name(self, *knobs: object) -> str:
+    def name(self, *model_options: object) -> str:
         """A hash of the complete scene, of the file of its body, and of the solver options."""
-        digest = hashlib.sha256(repr((self.text, *knobs)).encode())
+        digest = hashlib.sha256(repr((self.text, *model_options)).encode())
         if self.scene and self.scene.body.file:
             digest.update(_content(self.scene.body.file))
         return digest.hexdigest()[:24]

@@ -59,13 +59,13 @@ def balanced(mu: float, lam: float) -> Manufactured:
 
 def no_locking() -> Case:
     """Errors on one mesh do not grow towards incompressibility."""
-    ladder = (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999)
+    ratios = (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999)
     errors = []
-    for poisson in ladder:
+    for poisson in ratios:
         material = unit(poisson)
         errors.append(_errors(10, material, balanced(1.0, material.first_lame)))
     values, slopes = np.array(errors).T
-    at = [1 / (1 - 2 * poisson) for poisson in ladder]
+    at = [1 / (1 - 2 * poisson) for poisson in ratios]
     return Case(
         title="No locking: pressure and shear of like size, nu = 0.3 to 0.49999",
         source=f"{MANUFACTURED}; Brenner and Sung, Math Comp 59:321 (1992): uniform in lambda "

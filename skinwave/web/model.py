@@ -27,7 +27,7 @@ from simple_model.joined import parted
 from simple_model.line_names import level_factor
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.tacton import CARRIER, level, tones
-from skinwave.run import JUDGED, is_skin
+from skinwave.run import ASSESSED, is_skin
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.web.moving import Moving
@@ -54,7 +54,7 @@ class Map:
     """
 
     rms: Floats
-    felt: tuple[Floats, ...]
+    threshold: tuple[Floats, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,25 +122,25 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
     """The lines of a load in a response, the strongest first; and by their kind peaks that are no
     single one of them, such as a free vibration.
     """
-    table = line_table(scene.pressure, response, candidates=JUDGED, most=MOST_LINES,
+    table = line_table(scene.pressure, response, candidates=ASSESSED, most=MOST_LINES,
                        highest=HIGHEST, settle=UNTRUSTED)  # fmt: skip
-    felt = response.unit == "m" and is_skin(scene.body)
+    threshold = response.unit == "m" and is_skin(scene.body)
     peaks = table.unnamed[:MOST_PEAKS]
     amplitudes = [(n, f, float(table.amplitudes[n][0])) for n, f in table.frequencies.items()]
     amplitudes += [(f"{x.kind}, {x.frequency:.0f} Hz", x.frequency, float(x.amplitudes[0]))
                    for x in peaks]  # fmt: skip
     found = [
         Line(name=name, frequency=f, amplitude=a,
-             sensation=float(sensation_level(a, f)) if felt else None)
+             sensation=float(sensation_level(a, f)) if threshold else None)
         for name, f, a in amplitudes
     ]  # fmt: skip
     found.sort(key=lambda line: -line.amplitude)
     return tuple(x for x in found if x.amplitude > FAINTEST * max(found[0].amplitude, 1e-300))
 
 
-def untold_lines(scene: Scene, response: Response) -> tuple[str, ...]:
+def unresolved_lines(scene: Scene, response: Response) -> tuple[str, ...]:
     """Names of lines that the response is too short to tell from 0 Hz or from each other."""
-    return tuple(resolved_lines(scene.pressure, response, candidates=JUDGED, highest=HIGHEST,
+    return tuple(resolved_lines(scene.pressure, response, candidates=ASSESSED, highest=HIGHEST,
                                 settle=UNTRUSTED)[1])  # fmt: skip
 
 
@@ -165,8 +165,8 @@ def kernel_map(pressure: MovingPressure) -> Map:
     f, amplitudes = f[f > 1e-6], np.abs(amplitudes[f > 1e-6])
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
-    felt = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
-    return Map(rms=rms, felt=borderline(np.maximum(felt, FAINTEST_LEVEL), 0.0))
+    threshold = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
+    return Map(rms=rms, threshold=borderline(np.maximum(threshold, FAINTEST_LEVEL), 0.0))
 
 
 def mean_level(pressure: MovingPressure) -> float:

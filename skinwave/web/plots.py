@@ -153,7 +153,7 @@ def waves_name(answer: Answer, stale: bool = False) -> str:
 def _threshold_curve(highest: float) -> dict[str, Any]:
     f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
     return {
-        "role": "felt", "name": f"threshold (±{BAND:g} dB)", "dash": "dash", "axis": "y2",
+        "role": "threshold", "name": f"threshold (±{BAND:g} dB)", "dash": "dash", "axis": "y2",
         "x": numbers(f), "y": numbers(1e6 * threshold(f)),
     }  # fmt: skip
 
@@ -161,8 +161,8 @@ def _threshold_curve(highest: float) -> dict[str, Any]:
 def _pressure_curve(highest: float) -> dict[str, Any]:
     f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
     return {
-        "role": "felt", "name": "threshold on skin, from AM at 200 Hz", "dash": "dash", "axis": "y",
-        "x": numbers(f), "y": numbers(pressure_threshold(f)),
+        "role": "threshold", "name": "threshold on skin, from AM at 200 Hz", "dash": "dash",
+        "axis": "y", "x": numbers(f), "y": numbers(pressure_threshold(f)),
     }  # fmt: skip
 
 

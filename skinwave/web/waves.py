@@ -227,12 +227,12 @@ def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> Map:
     a rhythm with its pauses as in the table of lines, is at the threshold, which a sheet has not.
     """
     amplitudes = np.abs(motion)
-    felt = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
-    shown = felt if is_skin(scene.body) else felt[:0]
+    threshold = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
+    shown = threshold if is_skin(scene.body) else threshold[:0]
     level = shown.max(axis=0, initial=FAINTEST_LEVEL)
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = np.where(np.isnan(rms), np.nan, level.reshape(SIDE, SIDE))
-    return Map(rms=rms, felt=borderline(level, 0.0))
+    return Map(rms=rms, threshold=borderline(level, 0.0))
 
 
 def _steady(pressure: MovingPressure) -> MovingPressure:
