@@ -10,7 +10,7 @@ from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models.bodies import EXACT, exact_waves
-from skinwave.models.full import Map, harmonic_answer, transient_answer
+from skinwave.models.full import MapFunction, harmonic_answer, transient_answer
 from skinwave.models.prepared import answer, prepare, reduction_tolerance, sample_times
 from skinwave.models.stretching import full_answer, reduced_answer
 from skinwave.planning.plan import Plan, plan
@@ -33,7 +33,7 @@ def simulate(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Simulate a scene: the motion of its probes, with its expected error.
 
@@ -84,7 +84,7 @@ def answered(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """The response of `simulate`, for callers that show its warnings themselves."""
     required = required_plan(
@@ -121,7 +121,7 @@ def follow(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Response of a plan, with its expected error and all warnings; arguments are those of the
     plan.
@@ -146,7 +146,7 @@ def compute(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Response of one model, not planned: its expected error is unknown, and it gives no warnings.
     Arguments and exceptions are those of `simulate`.
@@ -169,7 +169,7 @@ def _computed(
     h: float | None,
     dt: float | None,
     solver: str,
-    mapped: Map,
+    mapped: MapFunction,
 ) -> Response:
     times = sample_times(scene)
     if model in KERNELS:

@@ -89,7 +89,7 @@ def verified(folder):
 
 
 def mechanised(folder):
-    line = mechanisms.Line(
+    line = mechanisms.MechanismLine(
         tacton=HOSTILE, body=HOSTILE, mechanism=HOSTILE, line=HOSTILE, frequency=1.0, amplitude=1e-6
     )
     found = mechanisms.Findings(lines=(line,), ratios=(), failed=(HOSTILE,))

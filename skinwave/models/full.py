@@ -35,7 +35,7 @@ from skinwave.models.bodies import (
 from skinwave.models.bodies import build as build_body
 from skinwave.scene import Body, Scene
 
-Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
+MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 CHECKED_EACH = 50  # steps of a transient
@@ -173,7 +173,7 @@ def harmonic_answer(
     h: float | None = None,
     solver: str = "auto",
     threshold: float = 1e-3,
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Steady state: one factorisation for each line of the load above the threshold, but for the
     mean if the body is unconstrained.

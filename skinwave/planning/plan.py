@@ -16,7 +16,7 @@ from skinwave.planning.estimates import (
     reflection_and_transient,
     response_spectrum,
 )
-from skinwave.planning.extent import Row, extent, left_out, symmetry
+from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
 from skinwave.planning.refinement import Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import of_elements, over_tolerance
@@ -47,7 +47,7 @@ class Plan:
     error: float = 0.0
     seconds: float = 0.1
     memory: float = 1e8
-    rows: tuple[Row, ...] = ()
+    rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
 
@@ -86,7 +86,7 @@ def plan(
         if model not in (None, *KERNELS):
             raise ValueError(f"a scene without a body has no {model} response; use --model auto")
         kernel = model or "point-kernel"
-        row = Row(what="model", value=kernel, reason="there is no body to move")
+        row = PlanRow(what="model", value=kernel, reason="there is no body to move")
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if model in KERNELS:
         return _kernel(scene, tolerance, model)
@@ -97,7 +97,7 @@ def plan(
     spectrum = response_spectrum(scene, tolerance)
     highest = cutoff_frequency(*spectrum, tolerance)
     rows = [
-        Row(
+        PlanRow(
             what="highest line",
             value=f"{highest:.0f} Hz",
             reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
@@ -110,10 +110,13 @@ def plan(
     if model in EXACT or (model is None and returned <= WAVES_SHARE * tolerance):
         return _without_mesh(scene, tolerance, model, highest, returned, start, rows)
     body: Body = scene.body
-    cut: list[Row] = []
+    cut: list[PlanRow] = []
     if model is None or h is None:  # else all of it is meshed, as asked
         body, cut = extent(scene, tolerance, highest)
-    rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene, returned)), *cut]
+    rows += [
+        PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
+        *cut,
+    ]
     axes = symmetry(scene) if model in (None, "fem") else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
@@ -137,7 +140,7 @@ def plan(
 
 
 def _kernel(scene: Scene, tolerance: float, model: str) -> Plan:
-    row = Row(what="model", value=model, reason="as asked; nothing propagates in it")
+    row = PlanRow(what="model", value=model, reason="as asked; nothing propagates in it")
     warning = over_tolerance("the point kernel", KERNEL_ERROR, tolerance, "a model with waves is")
     return Plan(model=model, body=scene.body, error=KERNEL_ERROR, rows=(row,), warnings=warning)
 
@@ -151,8 +154,10 @@ def _nonlinear(scene: Scene, tolerance: float, model: str, h: float | None) -> P
     check_mesh(scene.body, size)
     error = expected_error(scene.body, size)
     rows = (
-        Row(what="model", value=model, reason="as asked: large deflection about a static preload"),
-        Row(
+        PlanRow(
+            what="model", value=model, reason="as asked: large deflection about a static preload"
+        ),
+        PlanRow(
             what="element size", value=f"{1e3 * size:.2f} mm",
             reason="as asked" if h else "by measured convergence of the default sheet",
         ),
@@ -171,7 +176,7 @@ def _without_mesh(
     highest: float,
     returned: float,
     start: float,
-    rows: list[Row],
+    rows: list[PlanRow],
 ) -> Plan:
     if model is None:
         # One is of the load's lines, the other of the body's own: their powers add.
@@ -193,7 +198,7 @@ def _without_mesh(
     )
     rows = [
         *rows,
-        Row(what="model", value=model, reason="as asked" if warnings else reason),
+        PlanRow(what="model", value=model, reason="as asked" if warnings else reason),
         *left_out(scene, highest),
     ]
     return Plan(
@@ -204,18 +209,18 @@ def _without_mesh(
 
 def _element_rows(
     scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
-) -> list[Row]:
+) -> list[PlanRow]:
     effort = found.prepared.effort
     kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
     return [
-        Row(
+        PlanRow(
             what="symmetry",
             value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[axes],
             reason=f"the load is its own mirror image across {' and '.join(axes)} = 0"
             if axes
             else "all of the body is modelled",
         ),
-        Row(
+        PlanRow(
             what="element size",
             value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} dofs",
             reason=f"{_why_size(found, tolerance, h)}: those of "
@@ -224,13 +229,13 @@ def _element_rows(
             if np.isfinite(found.error)
             else "the file's own, without another to compare it with",
         ),
-        Row(
+        PlanRow(
             what="reduction",
             value=f"{effort.reduced_dofs} dofs, {effort.estimate:.0e} up to {BAND:.0f} Hz",
             reason=f"asked for {reduction_tolerance(tolerance):.1g}: it costs little",
         ),
         *left_out(scene, highest),
-        Row(
+        PlanRow(
             what="cost",
             value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
             reason=f"the last mesh{kept}; 0.05 s for each further Tacton on the same body",

@@ -28,7 +28,7 @@ from skinwave.studies.changes import (
 )
 from skinwave.studies.claims import evaluate
 from skinwave.studies.study_page import (
-    Outcome,
+    StudyOutcome,
     again,
     effort_section,
     efforts,
@@ -65,7 +65,7 @@ def run_study(
     command: str,
     h: float | None = None,
     solver: str = "auto",
-) -> Outcome:
+) -> StudyOutcome:
     """Run every scene, writing each run as it is finished, then the tables and the page.
 
     An interrupt ends the runs early; those that are finished are still compared and written.
@@ -81,7 +81,7 @@ def run_study(
         groups, prepared, figures = _answered(scenes, folder, aside, bodies, progress, h, solver)
         figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
-        outcome = Outcome(
+        outcome = StudyOutcome(
             assessed_claims=evaluate(runs),
             warnings=document.worst_warnings(efforts(runs)),
             runs=len(runs),

@@ -26,7 +26,7 @@ EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figu
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class StudyOutcome:
     """Outcome of a comparison: assessed claims, warnings, cost, and how much of it was done."""
 
     assessed_claims: list[AssessedClaim]
@@ -59,7 +59,7 @@ def page_parts(
     folder: Path,
     groups: Mapping[str, list[Run]],
     first: Shown | None,
-    outcome: Outcome,
+    outcome: StudyOutcome,
     progress: Progress,
     figures: Mapping[str, Future[bytes]],
 ) -> list[str]:
@@ -109,7 +109,7 @@ def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
 
 
 def effort_section(
-    groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: Outcome
+    groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: StudyOutcome
 ) -> str:
     """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]
@@ -155,7 +155,7 @@ def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:
     return document.picture(image, caption, name)
 
 
-def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str]:
+def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> list[str]:
     if outcome.runs == outcome.planned:
         state = f"{len(groups)} Tacton{'s' * (len(groups) != 1)}, {outcome.runs} runs."
     else:

@@ -11,7 +11,7 @@ from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
 from skinwave.run import ASSESSED, Run, is_skin
 from skinwave.scene import Scene
-from skinwave.sweeps.variation import Case
+from skinwave.sweeps.variation import DesignPoint
 
 WEAKEST, MOST = 1e-2, 40  # of the strongest line of a load, and lines, that have columns
 SETTLE = 0.25  # of a response, before which it is not looked at
@@ -31,7 +31,7 @@ AT_PROBES = (
 )  # fmt: skip
 
 
-def columns(cases: Iterable[Case]) -> dict[str, str]:
+def columns(cases: Iterable[DesignPoint]) -> dict[str, str]:
     """The columns of a sweep and whether each is "text", "whole", "number" or, at each probe,
     "numbers".
     """
@@ -56,7 +56,7 @@ def _columned(scene: Scene) -> Iterable[str]:
     return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
 
 
-def commanded(case: Case) -> dict[str, Any]:
+def commanded(case: DesignPoint) -> dict[str, Any]:
     """The part of a row that is known before the run."""
     row: dict[str, Any] = {"status": "failed", "error": case.error, "scene": case.text, **case.keys}
     if case.scene:

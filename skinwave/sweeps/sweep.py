@@ -21,7 +21,7 @@ from skinwave.scene import Body, Scene
 from skinwave.simulation import MODELS, answered, check_options
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import columns, commanded, measured
-from skinwave.sweeps.variation import Case
+from skinwave.sweeps.variation import DesignPoint
 
 BATCH = 8  # runs of one body that are handed out together, at most
 KEPT = 4  # bodies that a worker caches in memory, on two meshes each
@@ -49,7 +49,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class SweepOutcome:
     """Result of a sweep: rows `planned`, `found` there before, `done` and `failed` now."""
 
     planned: int
@@ -66,7 +66,7 @@ class Outcome:
 
 
 def sweep(
-    wanted: Sequence[Case],
+    wanted: Sequence[DesignPoint],
     folder: Path,
     model_options: ModelOptions,
     progress: Progress | None = None,
@@ -74,7 +74,7 @@ def sweep(
     scheduler: str = "processes",
     workers: int | None = None,
     command: Mapping[str, Any] | None = None,
-) -> Outcome:
+) -> SweepOutcome:
     """Run every case that the folder has no row of, and append a row for each.
 
     Parameters
@@ -130,7 +130,7 @@ def sweep(
         )
     except KeyboardInterrupt:
         interrupted = True
-    return Outcome(
+    return SweepOutcome(
         planned=len(named),
         found=len(named) - len(left),
         **tally,
@@ -165,7 +165,7 @@ def _check(model_options: ModelOptions) -> None:
 Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
 
 
-def _solid(case: Case, model_options: ModelOptions) -> Solid | None:
+def _solid(case: DesignPoint, model_options: ModelOptions) -> Solid | None:
     """Body and probes by which a run shares a reduced body with others, if it does."""
     scene = case.scene
     if scene is None or model_of(scene, model_options.model) != "fem" or scene.body.kind == "none":
@@ -174,7 +174,11 @@ def _solid(case: Case, model_options: ModelOptions) -> Solid | None:
 
 
 def _shared_meshes(
-    runs: dict[str, Case], model_options: ModelOptions, scheduler: str, count: int, report: Progress
+    runs: dict[str, DesignPoint],
+    model_options: ModelOptions,
+    scheduler: str,
+    count: int,
+    report: Progress,
 ) -> dict[Solid, Mesh]:
     """Find a mesh for each body that several runs share, and reduce it, each body once."""
     hardest: dict[Solid, Scene] = {}
@@ -226,12 +230,12 @@ def _prepared(
 class Batch:
     """Runs by name that are handed out together, and the mesh that they share."""
 
-    runs: dict[str, Case]
+    runs: dict[str, DesignPoint]
     mesh: Mesh | None
 
 
 def _batches(
-    runs: dict[str, Case], model_options: ModelOptions, meshes: dict[Solid, Mesh], count: int
+    runs: dict[str, DesignPoint], model_options: ModelOptions, meshes: dict[Solid, Mesh], count: int
 ) -> list[Batch]:
     """Runs on one body follow each other; others are alone."""
     groups: dict[Solid | None, list[str]] = {}
@@ -254,7 +258,7 @@ def _rows(model_options: ModelOptions, batch: Batch) -> list[dict[str, Any]]:
     ]
 
 
-def _row(case: Case, model_options: ModelOptions, mesh: Mesh | None) -> dict[str, Any]:
+def _row(case: DesignPoint, model_options: ModelOptions, mesh: Mesh | None) -> dict[str, Any]:
     row, started = commanded(case), time.perf_counter()
     assert case.scene
     try:

@@ -9,7 +9,7 @@ import fem
 import meshes
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from skinwave.verify.case import Case, Plot, below, order, slope
-from skinwave.verify.elements import Field, held_outside, unit
+from skinwave.verify.elements import DisplacementField, held_outside, unit
 from skinwave.verify.references import Floats
 
 DIRECTION = np.array([1.0, 2.0, 3.0])
@@ -21,9 +21,9 @@ MANUFACTURED = "Roache, Verification and Validation in Computational Science and
 class Manufactured:
     """A field (..., 3), its gradient (..., i, j) and the body force (..., 3) that it needs."""
 
-    u: Field
-    gradient: Field
-    force: Field
+    u: DisplacementField
+    gradient: DisplacementField
+    force: DisplacementField
 
 
 def divergence_free(mu: float, lam: float) -> Manufactured:

@@ -48,7 +48,7 @@ SMOOTH = 16  # and of the fastest modulation, whose peaks are then within 2 %
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Map:
+class AreaMap:
     """A quantity over the area: `rms` (y, x) of it about its mean, in its unit, NaN outside the
     body, and its detection contour, closed lines (k, 2) in metre.
     """
@@ -58,7 +58,7 @@ class Map:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Line:
+class LineAtPoint:
     """A line at a point: `amplitude` in the unit of the model, and `sensation` in dB above the
     threshold of detection, None of a pressure.
     """
@@ -79,8 +79,8 @@ class Answer:
     response: Response
     frequencies: Floats
     spectrum: Floats
-    lines: tuple[Line, ...]
-    map: Map
+    lines: tuple[LineAtPoint, ...]
+    map: AreaMap
     moving: Moving | None = None
 
 
@@ -108,7 +108,9 @@ def as_published(scene: Scene) -> Answer:
     )
 
 
-def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:
+def answer_of(
+    scene: Scene, response: Response, found: AreaMap, moving: Moving | None = None
+) -> Answer:
     """Spectrum, named lines and map of a response at one point, as a page shows them."""
     f, amplitude = spectrum(response)
     shown = f <= HIGHEST
@@ -118,7 +120,7 @@ def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | Non
     )  # fmt: skip
 
 
-def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
+def named_lines(scene: Scene, response: Response) -> tuple[LineAtPoint, ...]:
     """The lines of a load in a response, the strongest first; and by their kind peaks that are no
     single one of them, such as a free vibration.
     """
@@ -130,7 +132,7 @@ def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
     amplitudes += [(f"{x.kind}, {x.frequency:.0f} Hz", x.frequency, float(x.amplitudes[0]))
                    for x in peaks]  # fmt: skip
     found = [
-        Line(name=name, frequency=f, amplitude=a,
+        LineAtPoint(name=name, frequency=f, amplitude=a,
              sensation=float(sensation_level(a, f)) if threshold else None)
         for name, f, a in amplitudes
     ]  # fmt: skip
@@ -151,7 +153,7 @@ def places(side: int = SIDE) -> Floats:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-def kernel_map(pressure: MovingPressure) -> Map:
+def kernel_map(pressure: MovingPressure) -> AreaMap:
     """RMS pressure about its mean, of a rhythm while a pulse is on; and the contour where the line
     with the highest sensation level, of a rhythm with its pauses, is at the threshold of skin.
     """
@@ -166,7 +168,7 @@ def kernel_map(pressure: MovingPressure) -> Map:
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
     threshold = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
-    return Map(rms=rms, threshold=borderline(np.maximum(threshold, FAINTEST_LEVEL), 0.0))
+    return AreaMap(rms=rms, threshold=borderline(np.maximum(threshold, FAINTEST_LEVEL), 0.0))
 
 
 def mean_level(pressure: MovingPressure) -> float:
