@@ -23,7 +23,7 @@ from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
 
 FINEST = 0.7  # of the default element size
-RUNGS = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
+COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
 
 
@@ -68,9 +68,9 @@ def error(candidate: Response, reference: Response) -> float:
     return float((np.linalg.norm(u - v, axis=0) / np.linalg.norm(v, axis=0)).max())
 
 
-def timed(scene: Scene, model: str, **knobs: float) -> tuple[Response, float]:
+def timed(scene: Scene, model: str, **model_options: float) -> tuple[Response, float]:
     started = time.perf_counter()
-    return compute(scene, model, **knobs), time.perf_counter() - started
+    return compute(scene, model, **model_options), time.perf_counter() - started
 
 
 def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, float]:
@@ -89,7 +89,7 @@ def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, floa
     return chosen.model, found, seconds, planning - prepared
 
 
-def judge(seed: int) -> tuple[bool, bool, bool]:
+def assess(seed: int) -> tuple[bool, bool, bool]:
     """Print one row; whether the planned response is within the tolerance, and whether its price is
     fair without and with planning.
     """
@@ -102,16 +102,16 @@ def judge(seed: int) -> tuple[bool, bool, bool]:
     model, planned, seconds, planning = followed(asked, tolerance)
     wrong = error(planned, reference)
     good = []
-    candidates = [("point-kernel", {}), *(("fem", {"h": h * rung}) for rung in RUNGS)]
+    candidates = [("point-kernel", {}), *(("fem", {"h": h * ratio}) for ratio in COARSER)]
     if body.of_kind.is_layer:
         candidates[1:1] = [("flat-body-harmonic", {}), ("flat-body", {})]
-    for other, knobs in candidates:
-        found, cost = timed(asked, other, **knobs)
+    for other, model_options in candidates:
+        found, cost = timed(asked, other, **model_options)
         if error(found, reference) <= tolerance:
-            good.append((cost, other, knobs))
+            good.append((cost, other, model_options))
             break  # by rising cost: the first within the tolerance is the cheapest
-    cost, best, knobs = min(good, default=(np.inf, "none", {}))
-    name = best + "".join(f" {1e3 * v:.1f} mm" for v in knobs.values())
+    cost, best, model_options = min(good, default=(np.inf, "none", {}))
+    name = best + "".join(f" {1e3 * v:.1f} mm" for v in model_options.values())
     shape, am = asked.tacton.trajectory.shape, asked.tacton.am_frequency
     print(
         f"{seed:>3} {body.kind:<6}{body.sides:<10} {shape:<7}{am:5.0f} Hz"
@@ -128,6 +128,6 @@ if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print("    body             path       f_AM  asked   error   chosen                   planning"
           "  cheapest in tolerance    ratio   with")  # fmt: skip
-    held = np.array([judge(seed) for seed in range(count)]).sum(axis=0)
+    held = np.array([assess(seed) for seed in range(count)]).sum(axis=0)
     print(f"{held[0]} of {count} within the tolerance; {held[1]} at no more than five times the "
           f"cheapest, {held[2]} with planning")  # fmt: skip

@@ -66,7 +66,7 @@ def own_share(moves: int) -> None:
             spent.append(time.process_time() - before)
         row(f"{key}: the process behind the page, CPU", spent)
     session.worker.close()
-    answered = waves.Waves()
+    answered = waves.BodyResponses()
     for key, first in (("am", 100), ("height", 180)):
         spent = []
         for value in first + np.arange(moves + 1):

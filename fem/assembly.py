@@ -30,7 +30,7 @@ from fem.geometry import gradients, jacobians, shape_nodes
 from fem.materials import Material, rayleigh_damping
 from fem.maxwell import Branch, DispersiveBranch, MaxwellBranch, on_free
 from fem.pressure_projection import projected_divergence
-from fem.sparsity import UPPER, Pattern, from_components, from_nodal, slabs
+from fem.sparsity import UPPER, SparsityPattern, from_components, from_nodal, slabs
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
@@ -100,7 +100,7 @@ def assemble(
         If a facet set is unknown or an element is inverted.
     """
     materials, region = by_region(mesh, material)
-    pattern = Pattern.of(mesh.tets, len(mesh.points))
+    pattern = SparsityPattern.of(mesh.tets, len(mesh.points))
     free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
@@ -129,7 +129,7 @@ def _of(materials: list[Material], name: str) -> Floats:
 
 
 def _volume_operators(
-    mesh: TetMesh, pattern: Pattern, materials: list[Material], region: Ints
+    mesh: TetMesh, pattern: SparsityPattern, materials: list[Material], region: Ints
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
     """K, C, M and the branches of all materials, on all dofs."""
     rho, mu, lam = (_of(materials, name) for name in ("density", "shear_modulus", "first_lame"))
@@ -240,12 +240,12 @@ def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]
         yield slab, (weights @ NN).reshape(1, -1, n_nodes, n_nodes)
 
 
-def _mass(mesh: TetMesh, pattern: Pattern, rho: Floats) -> sparse.csr_array:
+def _mass(mesh: TetMesh, pattern: SparsityPattern, rho: Floats) -> sparse.csr_array:
     """Consistent mass matrix int rho N_a N_b dV (3 n, 3 n)."""
     return from_nodal(pattern, pattern.sum(element_masses(mesh, rho), 1)[0])
 
 
-def _drag(mesh: TetMesh, pattern: Pattern, rate: Floats) -> sparse.csr_array:
+def _drag(mesh: TetMesh, pattern: SparsityPattern, rate: Floats) -> sparse.csr_array:
     """Mass-proportional damping matrix of a rate (m,) in kg/m3/s that is 0 in most elements."""
     layer = np.flatnonzero(rate)
     R = _mass(_part(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])

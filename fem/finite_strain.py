@@ -21,7 +21,7 @@ from fem.assembly import LOSS_BAND, Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.sparsity import UPPER, Pattern, from_components, slabs
+from fem.sparsity import UPPER, SparsityPattern, from_components, slabs
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 
@@ -72,7 +72,7 @@ class Part:
     mu: Floats
     D: sparse.csr_array
     D_transposed: sparse.csr_array
-    pattern: Pattern
+    pattern: SparsityPattern
 
     @staticmethod
     def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> "Part":
@@ -82,7 +82,7 @@ class Part:
         D = sparse.csr_array((G.ravel(), (rows, columns)), shape=(G[..., 0].size, n))
         return Part(
             nodes=nodes, G=G, volume=volume, lam=lam, mu=mu, D=D,
-            D_transposed=D.T.tocsr(), pattern=Pattern.of(nodes, n),
+            D_transposed=D.T.tocsr(), pattern=SparsityPattern.of(nodes, n),
         )  # fmt: skip
 
 

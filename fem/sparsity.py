@@ -14,7 +14,7 @@ UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and ab
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pattern:
+class SparsityPattern:
     """CSR sparsity pattern on nodes, with the slot that each pair of element nodes is summed in."""
 
     indptr: Ints
@@ -22,7 +22,7 @@ class Pattern:
     slot: Ints  # (e, a, b)
 
     @staticmethod
-    def of(tets: Ints, n_nodes: int) -> "Pattern":
+    def of(tets: Ints, n_nodes: int) -> "SparsityPattern":
         """The pattern of a mesh; one sort of pair number and origin packed into one integer."""
         key = (tets[:, :, None] * n_nodes + tets[:, None, :]).ravel()
         bits = int(key.size).bit_length()
@@ -40,7 +40,7 @@ class Pattern:
         slot = np.empty(key.size, index)
         slot[origin] = np.cumsum(first, dtype=index) - index(1)
         indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
-        return Pattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
+        return SparsityPattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
 
     def sum(self, slabs: Iterable[tuple[slice, Floats]], parts: int) -> Floats:
         """Assemble element matrices (parts, e, a, b), some at a time, into slots (parts, slots)."""
@@ -70,7 +70,7 @@ class Pattern:
         return lambda i: first + i * further, np.append(starts.ravel(), 3 * self.indptr[-1])
 
 
-def from_components(pattern: Pattern, summed: Floats) -> sparse.csr_array:
+def from_components(pattern: SparsityPattern, summed: Floats) -> sparse.csr_array:
     """Symmetric matrix (3 n, 3 n) of slots (6, slots) for the components UPPER."""
     mirrored, (places, indptr) = pattern.mirrored(), pattern.rows()
     n, slots, index = len(indptr) - 1, len(mirrored), _index(9 * len(mirrored))
@@ -85,7 +85,7 @@ def from_components(pattern: Pattern, summed: Floats) -> sparse.csr_array:
     return sparse.csr_array((data.ravel(), columns.ravel(), indptr), shape=(n, n))
 
 
-def from_nodal(pattern: Pattern, summed: Floats) -> sparse.csr_array:
+def from_nodal(pattern: SparsityPattern, summed: Floats) -> sparse.csr_array:
     """The matrix (3 n, 3 n) of slots (slots,), the same for each of the three components."""
     places, indptr = pattern.rows()
     n, slots, index = len(indptr) - 1, len(summed), _index(3 * len(summed))

@@ -75,11 +75,11 @@ def transient(
     stiff = K + relaxing_stiffness(branches, 2 / dt)  # s of the trapezoidal rule
     system = (1 - a_m) * M + (1 - a_f) * (gamma * dt * C + beta * dt**2 * stiff)
     factor = factorise(system, backend=solver)
-    felt = np.array([[branch.share(2 / dt)] for branch in branches]).reshape(-1, 1)
+    shares = np.array([[branch.share(2 / dt)] for branch in branches]).reshape(-1, 1)
 
     start = initial or at_rest(operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
-    d = np.array([part[free] for part in start.stretch]) if start.stretch else 0 * felt * u
+    d = np.array([part[free] for part in start.stretch]) if start.stretch else 0 * shares * u
     f = force(start.time)[free]
     a = acceleration(operators, f - C @ v - K @ u - branch_force(branches, d))
     step = 0
@@ -101,13 +101,13 @@ def transient(
         f_next = force(start.time + step * dt)[free]
         u_next = u + dt * v + dt**2 * (0.5 - beta) * a
         v_next = v + dt * (1 - gamma) * a
-        d_next = (2 * felt - 1) * d + felt * (u_next - u)
+        d_next = (2 * shares - 1) * d + shares * (u_next - u)
         inner = (1 - a_f) * f_next + a_f * f - a_m * (M @ a)
         inner -= K @ ((1 - a_f) * u_next + a_f * u) + C @ ((1 - a_f) * v_next + a_f * v)
         inner -= branch_force(branches, (1 - a_f) * d_next + a_f * d)
         a = factor.solve(inner)
         u, v, f = u_next + dt**2 * beta * a, v_next + dt * gamma * a, f_next
-        d = d_next + felt * (dt**2 * beta * a)
+        d = d_next + shares * (dt**2 * beta * a)
 
 
 def weights(dt: float, spectral_radius: float) -> tuple[float, float, float, float]:

@@ -1,5 +1,7 @@
 """Tactons, the load that they put on the skin, and all models without a mesh."""
 
+import warnings
+
 from simple_model.drive import DRIVES, DriveLaw
 from simple_model.flat_body import flat_body, steady_state
 from simple_model.focus import (
@@ -15,7 +17,7 @@ from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lin
 from simple_model.material import Material, ModulusTable, PronyTerm, from_young, tabulated
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
-from simple_model.response import Effort, Response, lines, phasors, spectrum, told_apart
+from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
 from simple_model.threshold import sensation_level, threshold
@@ -40,6 +42,7 @@ __all__ = [
     "Trajectory",
     "Unnamed",
     "arc_path",
+    "are_resolved",
     "array_field",
     "commanded",
     "evenly",
@@ -65,5 +68,13 @@ __all__ = [
     "tabulated",
     "threshold",
     "timed_path",
-    "told_apart",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name != "told_apart":  # of version 0.2, which loads for one release
+        raise AttributeError(f"module 'simple_model' has no attribute '{name}'")
+    warnings.warn(
+        "simple_model.told_apart is now simple_model.are_resolved", DeprecationWarning, stacklevel=2
+    )
+    return are_resolved

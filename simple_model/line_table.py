@@ -12,11 +12,11 @@ from simple_model.response import (
     ALIKE,
     SETTLE,
     Response,
+    are_resolved,
     fit_lines,
     hidden,
     resolution,
     step,
-    told_apart,
     unmixed,
 )
 from simple_model.trajectory import Floats
@@ -113,7 +113,7 @@ def resolved_lines(
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, candidates=candidates), highest)
     f, least = found.frequencies, resolution(response, settle=settle)
-    known = told_apart(response, f, settle=settle, strengths=_floored(found))
+    known = are_resolved(response, f, settle=settle, strengths=_floored(found))
     lost = ~known & ~_near(f, f[known], least)
     return _named(found, known), _named(found, lost)
 

@@ -152,7 +152,7 @@ def phasors(
     under a Kaiser window, so that neither the position of a line between two bins nor a line
     left out nor a dying transient leaks into another; a lower window, as far as needed, where
     lines lie closer than 2.5 over the fitted time. Lines closer than one over the fitted
-    time are unresolved and share one amplitude: see `told_apart`. 0 Hz gives the mean.
+    time are unresolved and share one amplitude: see `are_resolved`. 0 Hz gives the mean.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def resolution(response: Response, *, settle: float = SETTLE) -> float:
     return 1 / float((1 - settle) * np.ptp(response.times))
 
 
-def told_apart(
+def are_resolved(
     response: Response,
     frequencies: ArrayLike,
     *,

@@ -53,23 +53,23 @@ class Propagation:
     ----------
     column : the body, as `Run.column`
     strongest, kernel_strongest : the component of largest amplitude
-    felt_most : the component of highest sensation level, None of what is not skin
+    highest_sensation : the component of highest sensation level, None of what is not skin
     delay : float, s, of the strongest component behind the kernel's at the probe next to the path
         where both move, or None
     share, spread, kernel_spread : of the maps, None where there is none
-    felt : reach of what is above threshold with half the pressure, as it is, and with twice;
-        None each where nothing is, and no tuple for what is not skin or has no map
+    above_threshold : its reach with half the pressure, as it is, and with twice; None each where
+        nothing is, and no tuple for what is not skin or has no map
     """
 
     column: str
     strongest: Component | None
     kernel_strongest: Component | None
-    felt_most: Component | None
+    highest_sensation: Component | None
     delay: float | None
     share: float | None = None
     spread: Reach | None = None
     kernel_spread: Reach | None = None
-    felt: tuple[Reach | None, ...] = ()
+    above_threshold: tuple[Reach | None, ...] = ()
 
 
 def propagation(
@@ -99,7 +99,7 @@ def propagation(
         column=run.column,
         strongest=strongest,
         kernel_strongest=strongest_component(kernel),
-        felt_most=strongest_component(run, felt=True) if run.is_skin else None,
+        highest_sensation=strongest_component(run, by_sensation=True) if run.is_skin else None,
         delay=None if strongest is None else _delay(run, kernel, strongest.frequency),
     )
     if surface is None or kernel_surface is None or not surface.rms.any():
@@ -111,7 +111,7 @@ def propagation(
             "share": share_outside(kernel_surface.rms, surface.rms),
             "spread": reach_of(surface.rms >= _level(surface.rms, NEAR), away),
             "kernel_spread": reach_of(kernel_surface.rms >= _level(kernel_surface.rms, NEAR), away),
-            "felt": _felt(surface, away) if run.scene.body.is_skin else (),
+            "above_threshold": _above_threshold(surface, away) if run.scene.body.is_skin else (),
         }
     )
 
@@ -136,9 +136,9 @@ def distance_from_path(scene: Scene, surface: SurfaceMap) -> Floats:
     return np.asarray(cKDTree(path_points(scene, 1441)).query(surface.places)[0])
 
 
-def strongest_component(run: Run, *, felt: bool = False) -> Component | None:
-    """Line of largest amplitude at any probe or, if `felt`, of highest sensation level; None of
-    none.
+def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | None:
+    """Line of largest amplitude at any probe or, `by_sensation`, of highest sensation level; None
+    of none.
     """
     names = [name for name, f in run.frequencies.items() if f > 0]
     if not names:
@@ -148,7 +148,7 @@ def strongest_component(run: Run, *, felt: bool = False) -> Component | None:
         return None
     frequencies = np.array([run.frequencies[name] for name in names])
     levels = sensation_level(amplitudes, frequencies[:, None])
-    heard = levels if felt else amplitudes
+    heard = levels if by_sensation else amplitudes
     line, probe = np.unravel_index(int(np.argmax(heard)), heard.shape)
     return Component(
         name=names[line],
@@ -185,7 +185,7 @@ def _delay(run: Run, kernel: Run, frequency: float) -> float | None:
     return float(delays[nearest]) if np.isfinite(away[nearest]) else None
 
 
-def _felt(surface: SurfaceMap, away: Floats) -> tuple[Reach | None, ...]:
+def _above_threshold(surface: SurfaceMap, away: Floats) -> tuple[Reach | None, ...]:
     insides = [surface.level >= -more for more in (-FACTOR_OF_TWO, 0.0, FACTOR_OF_TWO)]
     return tuple(reach_of(inside, away) if inside.any() else None for inside in insides)
 

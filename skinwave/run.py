@@ -9,7 +9,7 @@ from simple_model.line_names import SAME, line_frequency
 from skinwave.scene import Scene
 
 # Lines that claims are about, of one focus, whether or not the load has them.
-JUDGED = (
+ASSESSED = (
     "f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM", "f_d", "2f_d", "3f_d",
     "f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM",
 )  # fmt: skip
@@ -39,7 +39,7 @@ class Run:
     @cached_property
     def table(self) -> LineTable:
         """All lines of the response, each once."""
-        candidates = JUDGED if len(self.scene.tacton.foci) == 1 else ()
+        candidates = ASSESSED if len(self.scene.tacton.foci) == 1 else ()
         return line_table(self.scene.pressure, self.response, candidates=candidates)
 
     @property
@@ -63,7 +63,7 @@ class Run:
         return {name: self.table.amplitudes[own] for name, own in self._own.items()}
 
     @property
-    def untold(self) -> tuple[str, ...]:
+    def unresolved(self) -> tuple[str, ...]:
         """Unresolved lines: too close to 0 Hz or to each other for the length of the response."""
         return tuple(self.table.unresolved)
 
@@ -72,7 +72,7 @@ class Run:
         """The listed name of each name."""
         tacton, same = self.scene.tacton, SAME / self.scene.tacton.duration
         own = {name: name for name in self.listed}
-        for name in JUDGED:
+        for name in ASSESSED:
             f = line_frequency(tacton, name)
             near = [] if f is None else [n for n, g in self.listed.items() if abs(f - g) <= same]
             own |= {name: near[0]} if near else {}

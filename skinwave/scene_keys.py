@@ -16,7 +16,7 @@ from skinwave.scene import Layer, Relief
 
 
 @dataclass(frozen=True)
-class Field:
+class SceneKey:
     """A key of the file: the attribute behind it and how it is read and written."""
 
     name: str
@@ -99,7 +99,7 @@ def _pulses(key: str, value: Any) -> Points:
     return tuple((on / 1e3, gap / 1e3) for on, gap in (_pair(key, pulse) for pulse in value))
 
 
-def _inner(cls: type, keys: dict[str, Field]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def _inner(cls: type, keys: dict[str, SceneKey]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """How a table within [tacton] is read as a record, and written."""
 
     def read(key: str, value: Any) -> Any:
@@ -175,7 +175,7 @@ def _write_prony(terms: tuple[PronyTerm, ...]) -> Any:
             for term in terms]  # fmt: skip
 
 
-def _tables(key: str, value: Any, keys: dict[str, Field]) -> list[dict[str, Any]]:
+def _tables(key: str, value: Any, keys: dict[str, SceneKey]) -> list[dict[str, Any]]:
     """Values of each of the tables under [[key]], all of whose keys are needed."""
     if not isinstance(value, list):
         raise ValueError(f"{key} = {_shown(value)} must be tables, each under [[{key}]]")
@@ -210,9 +210,9 @@ def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     return x / 1e3, y / 1e3
 
 
-def _scaled(name: str, per_unit: float = 1.0) -> Field:
+def _scaled(name: str, per_unit: float = 1.0) -> SceneKey:
     """A number whose unit in the file is `per_unit` times smaller than inside."""
-    return Field(
+    return SceneKey(
         name,
         lambda key, value: _number(key, value) / per_unit,
         lambda value: _in_units(value, per_unit),
@@ -228,8 +228,8 @@ def _in_units(value: float, per_unit: float) -> float:
     return next((x for x in nearest if x / per_unit == value), near)
 
 
-def _word(name: str) -> Field:
-    return Field(name, as_text, str)
+def _word(name: str) -> SceneKey:
+    return SceneKey(name, as_text, str)
 
 
 MATERIAL = {
@@ -238,7 +238,7 @@ MATERIAL = {
     "poisson": _scaled("poisson"),
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
-    "prony": Field("prony", _prony, _write_prony),
+    "prony": SceneKey("prony", _prony, _write_prony),
 }
 PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
 MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
@@ -248,15 +248,15 @@ MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
-    "material": Field("material", _material, _write_material),
+    "material": SceneKey("material", _material, _write_material),
 }
 PULSES = {
-    "pulses_ms": Field("pulses", _pulses, _write_points),
+    "pulses_ms": SceneKey("pulses", _pulses, _write_points),
     "ramp_ms": _scaled("ramp", 1e3),
 }
 SIGNAL = {
     "rate_hz": _scaled("rate"),
-    "samples": Field("samples", _numbers, list),
+    "samples": SceneKey("samples", _numbers, list),
     "role": _word("role"),
 }
 REQUIRED = {"rhythm": 1, "signal": 2}  # how many of the keys, from the first
@@ -268,55 +268,55 @@ SECTIONS = {
         "amplitude_percent": _scaled("amplitude", 100),
         "am_frequency_hz": _scaled("am_frequency"),
         "second_am_frequency_hz": _scaled("second_am_frequency"),
-        "superposition": Field("superposition", _pair, list),
+        "superposition": SceneKey("superposition", _pair, list),
         "envelope_frequency_hz": _scaled("envelope_frequency"),
         "duration_s": _scaled("duration"),
         "shape": _word("shape"),
         "size_mm": _scaled("size", 1e3),
         "speed_m_per_s": _scaled("speed"),
         "sweep": _word("sweep"),
-        "centre_mm": Field("centre", _place, lambda xy: [_in_units(x, 1e3) for x in xy]),
-        "points_mm": Field("points", _points, _write_points),
-        "times_s": Field("times", _numbers, list),
-        "levels": Field("levels", _numbers, list),
-        "hold": Field("hold", _switch, bool),
-        "foci": Field("foci", _numbers, lambda phases: [float(phase) for phase in phases]),
+        "centre_mm": SceneKey("centre", _place, lambda xy: [_in_units(x, 1e3) for x in xy]),
+        "points_mm": SceneKey("points", _points, _write_points),
+        "times_s": SceneKey("times", _numbers, list),
+        "levels": SceneKey("levels", _numbers, list),
+        "hold": SceneKey("hold", _switch, bool),
+        "foci": SceneKey("foci", _numbers, lambda phases: [float(phase) for phase in phases]),
         "sharing": _word("sharing"),
-        "rhythm": Field("rhythm", *_inner(Rhythm, PULSES)),
-        "signal": Field("signal", *_inner(Signal, SIGNAL)),
+        "rhythm": SceneKey("rhythm", *_inner(Rhythm, PULSES)),
+        "signal": SceneKey("signal", *_inner(Signal, SIGNAL)),
     },
     "focus": {
         "height_mm": _scaled("height", 1e3),
-        "drive": Field("drive", as_text, _write_drive),
+        "drive": SceneKey("drive", as_text, _write_drive),
         "depth_of_modulation": _scaled("depth_of_modulation"),
         "peak_pressure_pa": _scaled("peak_pressure"),
-        "profile": Field("focus", as_text, _write_profile),
+        "profile": SceneKey("focus", as_text, _write_profile),
     },
     "body": {
         "kind": _word("kind"),
-        "material": Field("material", _material, _write_material),
+        "material": SceneKey("material", _material, _write_material),
         "width_mm": _scaled("width", 1e3),
         "height_mm": _scaled("height", 1e3),
         "depth_mm": _scaled("depth", 1e3),
         "base": _word("base"),
         "sides": _word("sides"),
-        "layers": Field("layers", _layers, _write_layers),
-        "relief": Field("relief", _relief, _write_relief),
+        "layers": SceneKey("layers", _layers, _write_layers),
+        "relief": SceneKey("relief", _relief, _write_relief),
         "file": _word("file"),
         "unit": _word("unit"),
         "up": _word("up"),
-        "air": Field("air", _switch, bool),
+        "air": SceneKey("air", _switch, bool),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
         "tilt_y_deg": _scaled("tilt_y", 180 / pi),
-        "offset_mm": Field(
+        "offset_mm": SceneKey(
             "offset", _pair_in_mm, lambda offset: [_in_units(x, 1e3) for x in offset]
         ),
         "lift_mm": _scaled("lift", 1e3),
     },
     "probes": {
-        "points_mm": Field("probes", _points, _write_points),
+        "points_mm": SceneKey("probes", _points, _write_points),
     },
 }
 
@@ -329,7 +329,7 @@ def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[
             hint = meant(key, keys) or f"; it may have {', '.join(keys)}"
             raise ValueError(f"{where} has the unknown key {_shown(key)}{hint}")
         field = keys[key]
-        if isinstance(field, Field):
+        if isinstance(field, SceneKey):
             values[field.name] = field.read(key, value)
         else:
             values[key] = field(key, value)

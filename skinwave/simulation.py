@@ -9,7 +9,7 @@ import fem
 from simple_model import Response
 from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
-from skinwave.models import Map, Request, named
+from skinwave.models import MapFunction, Request, named
 from skinwave.models.laws import frequency_only
 from skinwave.models.prepared import answer, sample_times
 from skinwave.planning.plan import Plan, plan
@@ -26,7 +26,7 @@ def simulate(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Simulate a scene: the motion of its probes, with its expected error.
 
@@ -77,7 +77,7 @@ def answered(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """The response of `simulate`, for callers that show its warnings themselves."""
     required = required_plan(
@@ -100,7 +100,7 @@ def required_plan(
 ) -> Plan:
     """Plan of a request; raises what `simulate` does before any work."""
     asked = None if model == "auto" else named(model).name
-    check_knobs(solver, h=h, dt=dt)
+    check_options(solver, h=h, dt=dt)
     return plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
 
 
@@ -113,7 +113,7 @@ def follow(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Response of a plan, with its expected error and all warnings; arguments are those of the
     plan.
@@ -138,13 +138,13 @@ def compute(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Response of one model, not planned: its expected error is unknown, and it gives no warnings.
     Arguments and exceptions are those of `simulate`.
     """
     known = named(model)
-    check_knobs(solver, h=h, dt=dt)
+    check_options(solver, h=h, dt=dt)
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     known.refuse(scene.body)
@@ -164,7 +164,7 @@ def warned(response: Response, sentences: tuple[str, ...]) -> Response:
     return replace(response, effort=replace(response.effort, warnings=sentences))
 
 
-def check_knobs(solver: str, **lengths: float | None) -> None:
+def check_options(solver: str, **lengths: float | None) -> None:
     """Refuse a solver that is not installed and sizes that are no sizes, before any work.
 
     Raises

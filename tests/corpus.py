@@ -115,7 +115,7 @@ WHOLE_FILES = {
     "incompressible": "[body.material]\n" + MATERIAL.replace("0.45", "0.5"),
     "beyond Poisson": "[body.material]\n" + MATERIAL.replace("0.45", "-1.0"),
     "unconstrained": "[body]\nbase = 'free'\nsides = 'free'",
-    "endless sheet": "[body]\nkind = 'sheet'\ndepth_mm = inf",
+    "infinite sheet": "[body]\nkind = 'sheet'\ndepth_mm = inf",
     "path off the body": "[tacton]\nshape = 'square'\nsize_mm = 60\n[body]\nwidth_mm = 59",
     "drawn too fast": "[tacton]\nshape = 'circle'\nsize_mm = 1e-300\nspeed_m_per_s = 1e300",
     "polyline without points": "[tacton]\nshape = 'polyline'",

@@ -28,15 +28,15 @@ from skinwave.studies.assumptions import (
     as_one,
     as_relaxing,
     as_viscous,
-    beside,
     can_be_alone,
+    droppable,
     held,
-    ladder,
     relaxed,
+    side_step,
     strongest_line,
 )
 from skinwave.studies.mechanisms import paper_vs_skin, signatures, write
-from skinwave.studies.relax import Ladder, Rung, climb, line_changes
+from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_changes
 
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
@@ -45,30 +45,31 @@ PAPER = replace(SKIN, body=replace(BODIES["paper-sheet"], width=0.05, height=0.0
 
 
 def test_a_slab_and_a_sheet_have_their_own_ladders():
-    assert ladder(SKIN) == (
-        "linear drive", "sinc^2 profile", "no propagation", "little loss", "endless",
+    assert droppable(SKIN) == (
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "laterally-infinite",
         "main lobe only", "continuous path", "one material", "flat",
     )  # fmt: skip
-    assert beside(SKIN) == (
+    assert side_step(SKIN) == (
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
     )  # fmt: skip
-    assert beside(PAPER) == ()
-    assert ladder(PAPER) == (
-        "linear drive", "sinc^2 profile", "no propagation", "endless", "vacuum", "main lobe only",
+    assert side_step(PAPER) == ()
+    assert droppable(PAPER) == (
+        "linear drive", "sinc^2 profile", "no propagation", "laterally-infinite", "vacuum",
+        "main lobe only",
         "continuous path", "small deflection",
     )  # fmt: skip
     with pytest.raises(ValueError, match="keeps every assumption"):
-        ladder(replace(SKIN, body=BODIES["none"]))
+        droppable(replace(SKIN, body=BODIES["none"]))
 
 
 @pytest.mark.parametrize("depth", [0.004, np.inf])
 def test_a_body_without_room_for_a_palm_stays_flat(depth):
     body = replace(SKIN.body, depth=depth)
-    names = ladder(replace(SKIN, body=body))
+    names = droppable(replace(SKIN, body=body))
     assert "flat" not in names
     assert "no propagation" in names
     layers = (Layer(thickness=0.001, material="dermis"), Layer(thickness=0.002, material="fat"))
-    assert "one material" in ladder(replace(SKIN, body=replace(body, layers=layers)))
+    assert "one material" in droppable(replace(SKIN, body=replace(body, layers=layers)))
 
 
 def test_nothing_dropped_is_the_published_model():
@@ -81,7 +82,7 @@ def test_nothing_dropped_is_the_published_model():
 @pytest.mark.parametrize("own", [SKIN, PAPER])
 def test_the_step_of_propagation_changes_propagation_alone(own):
     """The load before it is the scene's own, by the name that it has everywhere."""
-    names = ladder(own)
+    names = droppable(own)
     k = names.index("no propagation")
     before, kernel = relaxed(own, names[:k])
     after, waves = relaxed(own, names[: k + 1])
@@ -92,47 +93,48 @@ def test_the_step_of_propagation_changes_propagation_alone(own):
 
 @pytest.mark.parametrize("own", [SKIN, PAPER])
 def test_each_step_of_the_load_changes_one_thing(own):
-    loads = [relaxed(own, ladder(own)[:k])[0].pressure for k in range(3)]
+    loads = [relaxed(own, droppable(own)[:k])[0].pressure for k in range(3)]
     assert loads[1] == replace(loads[0], drive="pressure_squared")
     assert loads[2] == replace(loads[1], focus="gaussian")
     # With and without propagation the load is the same, whatever else is dropped.
-    for name in ladder(own):
-        kept = [n for n in ladder(own) if n != name]
+    for name in droppable(own):
+        kept = [n for n in droppable(own) if n != name]
         still = [n for n in kept if n != "no propagation"]
         assert relaxed(own, kept)[0].pressure == relaxed(own, still)[0].pressure
 
 
 def test_a_profile_that_no_integral_has_is_answered_by_elements():
-    names = [name for name in ladder(SKIN)[:3] if name != "sinc^2 profile"]
+    names = [name for name in droppable(SKIN)[:3] if name != "sinc^2 profile"]
     scene, model = relaxed(SKIN, names)
     assert (scene.pressure.focus, scene.body.sides, model) == ("main_lobe", "absorbing", "fem")
-    assert not can_be_alone("sinc^2 profile", ladder(SKIN), SKIN)  # the array's field has none
+    assert not can_be_alone("sinc^2 profile", droppable(SKIN), SKIN)  # the array's field has none
 
 
 def test_an_endless_body_of_elements_has_sides_that_absorb():
     thin = replace(SKIN, body=replace(SKIN.body, depth=0.004, sides="clamped"))
-    names = ladder(thin)
+    names = droppable(thin)
     body = {
-        name: relaxed(thin, [n for n in names if n != name])[0].body for name in ("endless", "flat")
+        name: relaxed(thin, [n for n in names if n != name])[0].body
+        for name in ("laterally-infinite", "flat")
     }
-    assert body["endless"].sides == "absorbing"
+    assert body["laterally-infinite"].sides == "absorbing"
     assert body["flat"].sides == "clamped"
-    assert can_be_alone("endless", names, thin)
+    assert can_be_alone("laterally-infinite", names, thin)
     for kept in ({"sides": "absorbing"}, {"base": "free"}):  # no other body; none that stays
         other = replace(thin, body=replace(thin.body, **kept))
-        assert not can_be_alone("endless", ladder(other), other)
-    assert not can_be_alone("endless", ladder(SKIN), SKIN)  # a palm ends
-    assert not can_be_alone("endless", ladder(PAPER), PAPER)
+        assert not can_be_alone("laterally-infinite", droppable(other), other)
+    assert not can_be_alone("laterally-infinite", droppable(SKIN), SKIN)  # a palm ends
+    assert not can_be_alone("laterally-infinite", droppable(PAPER), PAPER)
 
 
 def test_all_dropped_is_the_richest():
-    scene, model = relaxed(SKIN, ladder(SKIN))
+    scene, model = relaxed(SKIN, droppable(SKIN))
     assert model == "fem"
     assert scene.body.kind == "palm"
     assert (scene.pressure.drive, scene.pressure.focus) == ("pressure_squared", "array")
     assert scene.tacton.trajectory.hold
     assert len(scene.body.layers) == 1
-    sheet, model = relaxed(PAPER, ladder(PAPER))
+    sheet, model = relaxed(PAPER, droppable(PAPER))
     assert model == "fem-nonlinear"
     assert sheet.body == replace(PAPER.body, air=True)
 
@@ -171,7 +173,7 @@ def test_a_device_that_cannot_be_is_refused_before_anything_is_computed(device, 
         held(PATH, *device)
     names = dict(zip(("update_rate", "points"), device, strict=False))
     with pytest.raises(ValueError, match=said):
-        climb(SKIN, lambda phase, done: pytest.fail("computed"), **names)
+        hierarchy_of(SKIN, lambda phase, done: pytest.fail("computed"), **names)
 
 
 def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
@@ -224,8 +226,8 @@ def test_the_law_of_loss_is_one_rung():
     assert laws[1] == pytest.approx(laws[0], rel=1e-9)
     # A body that relaxes keeps its own law at the end, and has its viscous twin before.
     own = replace(SKIN, body=replace(SKIN.body, material="palm-zener"))
-    assert "viscous loss" in ladder(own)
-    assert beside(own) == ()
+    assert "viscous loss" in droppable(own)
+    assert side_step(own) == ()
     before, _ = relaxed(own, ("no propagation", "little loss"))
     after, _ = relaxed(own, ("no propagation", "little loss", "viscous loss"))
     assert before.body.solid.fast_modulus == 0 < before.body.solid.viscosity
@@ -236,8 +238,8 @@ def test_the_square_of_a_sine_makes_its_second_harmonic_and_no_third():
     """q = ((1 + sin) / 2)^2 has 2f at a quarter of f, and nothing at 3f."""
     times = np.arange(10_000) / 10_000
     still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory(), duration=1.0))
-    felt = point_kernel(still, np.array([[0.0, 0.0]]), times)
-    f, twice, thrice = lines(felt, [140.0, 280.0, 420.0])[:, 0]
+    load = point_kernel(still, np.array([[0.0, 0.0]]), times)
+    f, twice, thrice = lines(load, [140.0, 280.0, 420.0])[:, 0]
     assert twice / f == pytest.approx(0.25, rel=1e-9)
     assert thrice / f < 1e-5  # -100 dB
 
@@ -253,8 +255,8 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
     monkeypatch.setattr(
-        "skinwave.studies.relax.ladder",
-        lambda scene: tuple(n for n in ladder(scene) if n not in ("flat", "one material")),
+        "skinwave.studies.relax.droppable",
+        lambda scene: tuple(n for n in droppable(scene) if n not in ("flat", "one material")),
     )
     (tmp_path / "scene.toml").write_text(dumps(scene))
     assert main(["relax", "scene.toml", "--h", "9", "--quiet"]) == 0
@@ -267,7 +269,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     )
     assert set(effects) == {
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
-        "endless", "main lobe only", "continuous path",
+        "laterally-infinite", "main lobe only", "continuous path",
     }  # fmt: skip
     # with a mean in the load its lines at multiples of f_d come from nothing
     assert effects["linear drive"]["decibel"]["f_d"] > 40
@@ -275,10 +277,10 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     # One is a side step, absorbing sides stand for an infinite body anyway, and the array's field
     # has no profile of its own.
     told = {name for name, e in effects.items() if e["alone"] is not None}
-    assert told == set(effects) - {"viscous loss", "endless", "sinc^2 profile"}
-    assert all(rung["seconds"] > 0 for rung in record["rungs"])
+    assert told == set(effects) - {"viscous loss", "laterally-infinite", "sinc^2 profile"}
+    assert all(step["seconds"] > 0 for step in record["steps"])
     with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
-        assert {"t", "probes", "as published", "endless"} <= set(kept.files)
+        assert {"t", "probes", "as published", "laterally-infinite"} <= set(kept.files)
     with open(tmp_path / "scene-relaxed/relax.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     # In so short a Tacton 2 f_AM is not resolved from 3 f_d - 2 f_AM.
@@ -289,7 +291,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
 
 
 def test_little_loss_is_that_of_layers_too():
-    dropped = [name for name in ladder(SKIN) if name not in ("little loss", "flat")]
+    dropped = [name for name in droppable(SKIN) if name not in ("little loss", "flat")]
     body = relaxed(SKIN, dropped)[0].body
     for layer in body.layers:
         known = next(x for x in LAYERS if x.thickness == layer.thickness)
@@ -301,20 +303,20 @@ def test_little_loss_is_that_of_layers_too():
 def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
     times = np.arange(4.0)
     told = Response(model="fem", times=times, probes=np.zeros((1, 2)), displacement=times[:, None])
-    rungs = [
-        Rung(name=name, dropped=dropped, model="fem", response=response)
+    steps = [
+        HierarchyStep(name=name, dropped=dropped, model="fem", response=response)
         for name, dropped, response in (
             ("as published", (), told), ("a", ("a",), None), ("b", ("a", "b"), told),
             ("c", ("a", "b", "c"), told),
         )
     ]  # fmt: skip
-    found = Ladder(scene=SKIN, rungs=tuple(rungs), beside=(), but_one=())
+    found = Hierarchy(scene=SKIN, steps=tuple(steps), side_steps=(), leave_one_out=())
     assert [(a.name, b.name) for a, b in found.pairs()] == [("b", "c")]
 
 
 def test_a_rung_that_fails_leaves_the_others(monkeypatch):
     monkeypatch.setattr(
-        "skinwave.studies.relax.ladder", lambda scene: ("linear drive", "one material")
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "one material")
     )
     monkeypatch.setattr(
         "skinwave.studies.relax.relaxed",
@@ -322,9 +324,9 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
             replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
         ) if not dropped else (scene, "no such model"),
     )  # fmt: skip
-    found = climb(SKIN, lambda phase, done: None)
-    assert found.rungs[0].response is not None
-    assert all("no such model" in rung.error for rung in found.rungs[1:])
+    found = hierarchy_of(SKIN, lambda phase, done: None)
+    assert found.steps[0].response is not None
+    assert all("no such model" in step.error for step in found.steps[1:])
     assert found.effects() == []
 
 

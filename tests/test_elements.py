@@ -11,7 +11,7 @@ import meshes
 from fem.assembly import element_stiffness
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
 from fem.pressure_projection import macroelements, projected_divergence
-from fem.sparsity import Pattern, from_components
+from fem.sparsity import SparsityPattern, from_components
 from meshes import TetMesh
 
 
@@ -63,7 +63,7 @@ def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
         assert found @ found == pytest.approx(squared, rel=1e-12)
     rough = np.random.default_rng(0).standard_normal(mesh.n_dofs)
     lam = np.ones(len(mesh.tets))
-    pattern = Pattern.of(mesh.tets, len(x))
+    pattern = SparsityPattern.of(mesh.tets, len(x))
     direct = from_components(pattern, pattern.sum(element_stiffness(mesh, 0 * lam, lam), 6))
     found = projected_divergence(mesh) @ rough
     assert found @ found < 0.6 * (rough @ direct @ rough)

@@ -170,8 +170,16 @@ def test_a_full_or_read_only_disk_is_said_and_nothing_is_left(
     commands = {"compare": ["--h", "6"], "run": ["--model", "flat-body"]}
     if what in ("pathlib.Path.write_bytes", "os.replace"):
         del commands["run"]  # writes no pictures beside the page, and in one step
-    for command, knobs in commands.items():
-        arguments = [command, "good.toml", *knobs, "--quiet", "--overwrite", "--out", "above/out"]
+    for command, model_options in commands.items():
+        arguments = [
+            command,
+            "good.toml",
+            *model_options,
+            "--quiet",
+            "--overwrite",
+            "--out",
+            "above/out",
+        ]
         with monkeypatch.context() as patch:
             patch.setenv("SKINWAVE_CACHE", "")
             patch.setattr("skinwave.commands.run.required_plan", lambda *asked: PLANNED)

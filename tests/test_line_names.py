@@ -27,7 +27,7 @@ from simple_model.line_names import SYMBOLS, line_frequency, line_name, line_nam
 from simple_model.line_table import FREE, UNNAMED, UNRESOLVED
 from simple_model.response import SETTLE, fit_lines
 from skinwave.files import line_rows
-from skinwave.run import JUDGED, Run
+from skinwave.run import ASSESSED, Run
 from skinwave.scene import BODIES, Body, Scene
 from skinwave.simulation import compute
 
@@ -153,8 +153,8 @@ def test_coinciding_lines_are_listed_once_by_the_simplest_name():
 
 def test_lines_that_are_judged_are_listed_even_if_they_are_absent():
     load, response = answered(am_frequency=140, trajectory=circle(190.986))
-    table = line_table(load, response, candidates=JUDGED)
-    assert set(JUDGED) <= table.frequencies.keys()
+    table = line_table(load, response, candidates=ASSESSED)
+    assert set(ASSESSED) <= table.frequencies.keys()
     assert table.amplitudes["2f_d"].max() < 1e-6 * table.amplitudes["f_AM"].max()
     assert "2f_d" not in named_lines(load)
 

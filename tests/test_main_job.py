@@ -60,11 +60,11 @@ def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
 def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):
     """The same components exist in the kernel under the same load and in linear bodies."""
     for claim in ("S1", "S2", "S3", "S5", "M1", "M2", "M3"):
-        verdicts = {
+        assessed_claims = {
             column: claims[column, claim]["holds"]
             for column in ("point-kernel", "paper-sheet", "skin-slab")
         }
-        assert len(set(verdicts.values())) == 1, (claim, verdicts)
+        assert len(set(assessed_claims.values())) == 1, (claim, assessed_claims)
     assert claims["point-kernel", "M3"]["holds"] == "True"
     assert claims["point-kernel", "M1"]["holds"] == "False"  # a square has no third harmonic
 

@@ -85,14 +85,14 @@ def test_wrong_usage_ends_with_two(folder, capsys, arguments):
 def test_what_no_machine_can_solve_is_refused_with_number_limit_and_cure(
     folder, capsys, command, name
 ):
-    body, size, *knobs = corpus.ABSURD[name]
+    body, size, *model_options = corpus.ABSURD[name]
     scene = corpus.GOOD.replace("[body]", f"[body]\n{body}")
     for line in size.splitlines():
         key = line.split(" =")[0]
         scene = "\n".join(line if old.startswith(key) else old for old in scene.splitlines())
     (folder / "huge.toml").write_text(scene)
     model = [] if command == "compare" else ["--model", "fem"]
-    sentence = said(capsys, folder, [command, "huge.toml", *model, *knobs])
+    sentence = said(capsys, folder, [command, "huge.toml", *model, *model_options])
     assert "degrees of freedom or more, the limit is 3,000,000; take larger elements" in sentence
 
 

@@ -397,8 +397,8 @@ def page(folder, *given):
                                      pytest.param("compare", marks=pytest.mark.slow)])  # fmt: skip
 def test_folders_of_every_command_are_marked_and_replaced(folder, monkeypatch, drawn, command):
     """Every command that writes a folder; what is slow is not computed here."""
-    found = Namespace(effects=list, rungs=[], every=[], accepted=[], failed=[])
-    for name in ("relax.climb", "tradeoff.study", "mechanisms.paper_vs_skin"):
+    found = Namespace(effects=list, steps=[], every=[], accepted=[], failed=[])
+    for name in ("relax.hierarchy_of", "tradeoff.study", "mechanisms.paper_vs_skin"):
         monkeypatch.setattr(f"skinwave.studies.{name}", lambda *given, **options: found)
     for name in ("relax_page.write", "tradeoff.write", "mechanisms.write"):
         monkeypatch.setattr(f"skinwave.studies.{name}", page)

@@ -21,7 +21,7 @@ from skinwave.document import Markup
 from skinwave.scene_file import loads
 from skinwave.studies import mechanisms, relax_page, tradeoff
 from skinwave.studies.assumptions import ASSUMPTIONS
-from skinwave.studies.relax import Ladder, Rung
+from skinwave.studies.relax import Hierarchy, HierarchyStep
 from skinwave.studies.tradeoff import Candidate, Measured, Study
 from skinwave.verify import page as verify_page
 from skinwave.verify.case import Case, Check, Entry, Result
@@ -52,18 +52,18 @@ def response(model="point-kernel", **fields):
 
 
 def relaxed(folder):
-    rungs = [Rung(name="a", dropped=(), model=HOSTILE, response=response())]
-    rungs += [
-        Rung(
+    steps = [HierarchyStep(name="a", dropped=(), model=HOSTILE, response=response())]
+    steps += [
+        HierarchyStep(
             name=FIRST_ASSUMPTION,
             dropped=(FIRST_ASSUMPTION,),
             model="m",
             response=response("other"),
         )
     ]
-    failed = Rung(name="f", dropped=(), model="m", error=HOSTILE)
+    failed = HierarchyStep(name="f", dropped=(), model="m", error=HOSTILE)
     scene = loads(table())
-    found = Ladder(scene=scene, rungs=(*rungs, failed), beside=(), but_one=())
+    found = Hierarchy(scene=scene, steps=(*steps, failed), side_steps=(), leave_one_out=())
     relax_page.write(folder, found)
 
 
@@ -89,7 +89,7 @@ def verified(folder):
 
 
 def mechanised(folder):
-    line = mechanisms.Line(
+    line = mechanisms.MechanismLine(
         tacton=HOSTILE, body=HOSTILE, mechanism=HOSTILE, line=HOSTILE, frequency=1.0, amplitude=1e-6
     )
     found = mechanisms.Findings(lines=(line,), ratios=(), failed=(HOSTILE,))

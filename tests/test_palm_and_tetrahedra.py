@@ -309,7 +309,7 @@ def test_no_unsound_surface_reaches_the_mesher(no_mesher, name):
 
 
 @pytest.mark.parametrize(
-    ("knobs", "said"),
+    ("model_options", "said"),
     [
         ({"epsilon": 0.0}, "epsilon = 0.0 m must be from"),
         ({"epsilon": -1e-4}, "epsilon = -0.0001 m must be from"),
@@ -327,9 +327,9 @@ def test_no_unsound_surface_reaches_the_mesher(no_mesher, name):
         ({"sizing": lambda points: np.full(len(points), np.nan)}, "finite edge length"),
     ],
 )
-def test_no_absurd_knob_reaches_the_mesher(no_mesher, knobs, said):
+def test_no_absurd_knob_reaches_the_mesher(no_mesher, model_options, said):
     with pytest.raises(MeshError, match=said):
-        meshes.tetrahedralise(cube(), **({"h": 5e-3} | knobs))
+        meshes.tetrahedralise(cube(), **({"h": 5e-3} | model_options))
 
 
 def test_a_sheet_is_too_thin_for_the_mesher(no_mesher):
@@ -461,10 +461,10 @@ def test_a_mesher_that_crashes_takes_nobody_with_it(tmp_path, monkeypatch):
 def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plain = inputs(SPHERE)
-    endless = {"h": np.array(1e-4), "grid_sizes": np.full_like(plain["grid_sizes"], 1e-4)}
+    infinite = {"h": np.array(1e-4), "grid_sizes": np.full_like(plain["grid_sizes"], 1e-4)}
     started = time.perf_counter()
     with pytest.raises(TimeoutError, match="stopped after 3 s; take larger elements or a longer"):
-        tetra._run(plain | endless, 3.0)
+        tetra._run(plain | infinite, 3.0)
     assert time.perf_counter() - started < 6
     assert not list(tmp_path.iterdir())
 

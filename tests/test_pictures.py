@@ -357,7 +357,7 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     np.testing.assert_allclose(grid.points, view.points)
 
 
-FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "felt-1")
+FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "sensation-1")
 
 
 @pytest.mark.parametrize("name", FIGURES)

@@ -13,7 +13,7 @@ from simple_model import (
     point_kernel,
     spectrum,
 )
-from skinwave.run import JUDGED
+from skinwave.run import ASSESSED
 
 TIMES = np.arange(10_000) / 10_000
 PROBES = [[0.0, 0.0], [0.005, 0.0], [0.010, 0.0], [0.015, 0.0], [0.020, 0.0]]
@@ -60,7 +60,7 @@ def test_the_spectrum_shows_amplitudes(window):
 
 def test_am_alone_has_a_single_line():
     load, response = kernel(am=140)
-    found = line_table(load, response, candidates=JUDGED).amplitudes
+    found = line_table(load, response, candidates=ASSESSED).amplitudes
     assert found["f_AM"][0] == pytest.approx(1.0)
     assert max(found[f"{n}f_AM"].max() for n in (2, 3, 4, 5)) < 1e-12
 
@@ -85,7 +85,7 @@ def test_stm_alone_has_the_kernels_own_lines(size, speed, probe, expected):
 @pytest.mark.parametrize("am", [80.0, 140.0, 210.0])
 def test_am_and_stm_have_pairs_and_nothing_at_multiples_of_f_d(am, size, speed):
     load, response = kernel(am=am, size=size, speed=speed)
-    found = line_table(load, response, candidates=JUDGED).amplitudes
+    found = line_table(load, response, candidates=ASSESSED).amplitudes
     strongest = found["f_AM"].max()
     assert max(found[n].max() for n in ("f_d", "2f_d", "3f_d")) < 1e-6 * strongest  # -120 dB
     for pair in ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM"):

@@ -17,7 +17,7 @@ import skinwave
 from skinwave.cli import main
 from skinwave.commands import common
 from skinwave.plain_text import cell, csv_table, printable, say
-from skinwave.studies.claims import Verdict, write_claims
+from skinwave.studies.claims import AssessedClaim, write_claims
 from skinwave.sweeps import dataset
 
 HOSTILE = "a\x1b[2Jb\x07c\x9bd\x7fe\u202ef\u2066g\x00h\ud800i"
@@ -130,10 +130,10 @@ def test_text_that_a_spreadsheet_would_compute_is_marked(tmp_path):
         assert cell(text) == f"'{text}"
     for value in ("-1.5", "+3e-4", "-inf", -2.0, "f_AM", "", None):
         assert cell(value) == value
-    verdict = Verdict(
+    assessed = AssessedClaim(
         claim="M1", body="b", model="m", holds=True, value=-1.0, bar=0.0, sentence="=cmd"
     )
-    write_claims(tmp_path / "claims.csv", [verdict])
+    write_claims(tmp_path / "claims.csv", [assessed])
     (row,) = csv.DictReader((tmp_path / "claims.csv").read_text().splitlines())
     assert (row["sentence"], row["value"]) == ("'=cmd", "-1")
     dataset.write_csv(tmp_path, [{"key": "@a", "error": "=b", "level": -3.0}])

@@ -182,7 +182,7 @@ def test_harmonics_are_judged_in_the_plural():
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=Body())
     t = np.arange(10_000) / 1e4
 
-    def verdict(third):
+    def assessed(third):
         wave = np.sin(2 * pi * 140 * t) + 0.2 * np.sin(2 * pi * 280 * t)
         wave += third * np.sin(2 * pi * 420 * t)
         motion = 1e-6 * wave[:, None] * np.ones(5)
@@ -190,23 +190,23 @@ def test_harmonics_are_judged_in_the_plural():
         run = Run(tacton="am", body="slab", scene=scene, response=response)
         return next(v for v in evaluate([run]) if v.claim == "M1")
 
-    assert verdict(0.05).holds
-    assert not verdict(0.0).holds
-    assert "3 f_AM at < -120 dB" in verdict(0.0).sentence
+    assert assessed(0.05).holds
+    assert not assessed(0.0).holds
+    assert "3 f_AM at < -120 dB" in assessed(0.0).sentence
 
 
 def test_the_first_screen_says_what_each_difference_changes():
     scene = Scene(pressure=MovingPressure(tacton=BOTH), body=Body())
     first = shown({"one": beside_kernels(_run(scene, "flat-body-harmonic"))}, quick_maps)
-    waves, drive, felt = sentences(first)
+    waves, drive, above_threshold = sentences(first)
     share = first.changes["skin-slab"].share
     assert f"Waves carry {100 * share:.0f} % of the motion" in waves
     assert "same load" in waves
     assert "f_d" in drive
     assert "not propagation" in drive
-    assert "Above threshold out to" in felt
-    assert "half or twice the pressure" in felt
-    assert "varied one by one, the share is" in felt
+    assert "Above threshold out to" in above_threshold
+    assert "half or twice the pressure" in above_threshold
+    assert "varied one by one, the share is" in above_threshold
     rows = small_table(list(first.changes.values()), "one")
     assert f"{OUTSIDE:g} dB region" in rows
     assert rows.count("<tr>") == 6
@@ -230,8 +230,8 @@ def test_the_strongest_component_is_one_of_amplitude_in_kernel_and_body():
     _, kernel, run = beside_kernels(_run(scene, "flat-body-harmonic"))
     found = propagation(run, kernel)
     assert found.kernel_strongest.name == found.strongest.name == "f_AM"
-    assert found.felt_most.name == "2f_AM"
-    assert found.felt_most.amplitude < found.strongest.amplitude
+    assert found.highest_sensation.name == "2f_AM"
+    assert found.highest_sensation.amplitude < found.strongest.amplitude
 
 
 def test_paper_has_no_sensation_level():

@@ -166,10 +166,12 @@ def small_scene(tacton, **pressure):
 @settings(max_examples=6)
 @given(tactons, numbers(0.01, 100))
 def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
-    knobs = {"h": 0.006, "dt": 1e-3 if tacton.duration > 2e-3 else None}
-    once = compute(small_scene(tacton, peak_pressure=10.0), model, 0.3, **knobs).displacement
+    model_options = {"h": 0.006, "dt": 1e-3 if tacton.duration > 2e-3 else None}
+    once = compute(
+        small_scene(tacton, peak_pressure=10.0), model, 0.3, **model_options
+    ).displacement
     scaled = small_scene(tacton, peak_pressure=10.0 * factor)
-    many = compute(scaled, model, 0.3, **knobs).displacement
+    many = compute(scaled, model, 0.3, **model_options).displacement
     np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
 
 

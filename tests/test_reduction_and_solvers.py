@@ -398,8 +398,8 @@ def test_a_march_that_blows_up_stops_within_a_few_steps(monkeypatch):
     marched = fem.transient
     steps = []
 
-    def exploding(operators, force, dt, **knobs):
-        for k, state in enumerate(marched(operators, force, dt, **knobs)):
+    def exploding(operators, force, dt, **model_options):
+        for k, state in enumerate(marched(operators, force, dt, **model_options)):
             steps.append(k)
             yield replace(state, displacement=state.displacement * 2.0 ** max(0, k - 60))
 

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import simple_model
 from simple_model import MovingPressure, Response, Rhythm, Signal, Tacton, Trajectory
 from skinwave.files import line_rows
-from skinwave.pictures.levels import felt_lines
+from skinwave.pictures.levels import sensation_levels
 from skinwave.reports.scene_report import _asked_rows
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import modelled, untold
+from skinwave.studies.description import modelled, unresolved
 from skinwave.studies.study_page import caption, write_single
 from skinwave.sweeps.measures import measured
 
@@ -79,17 +80,24 @@ def at_the_focus(seconds, **tacton):
     return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
 
 
-def test_lines_that_cannot_be_told_apart_are_not_reported():
+def test_a_name_of_the_last_release_loads_with_a_warning():
+    with pytest.warns(DeprecationWarning, match="is now simple_model.are_resolved"):
+        assert simple_model.told_apart is simple_model.are_resolved
+    assert not hasattr(simple_model, "nothing")
+
+
+def test_lines_that_cannot_be_resolved_are_not_reported():
     short, long = at_the_focus(0.5, am_frequency=2), at_the_focus(2.0, am_frequency=2)
-    assert short.frequencies == short.lines == felt_lines(short, 0) == {}
-    assert short.untold == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
+    assert short.frequencies == short.lines == sensation_levels(short, 0) == {}
+    assert short.unresolved == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
     assert list(line_rows(short)) == []
     assert (
-        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be resolved in 0.5 s" in untold([short])[0]
+        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be resolved in 0.5 s"
+        in unresolved([short])[0]
     )
     assert evaluate([short]) == []
-    assert long.untold == ()
-    assert untold([long]) == []
+    assert long.unresolved == ()
+    assert unresolved([long]) == []
     assert long.lines["f_AM"][0] == pytest.approx(2e-6, rel=1e-3)
     assert long.lines["2f_AM"][0] == pytest.approx(1e-6, rel=1e-3)
     row = measured(short.scene, short.response)
@@ -102,19 +110,19 @@ def test_lines_beside_those_that_cannot_be_told_are_not_judged_either():
     """
     near = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 141)
     one = at_the_focus(0.5, am_frequency=140, trajectory=near)
-    assert {"f_AM", "f_d", "2f_d-f_AM", "f_d-f_AM"} <= set(one.untold)
-    assert "5f_AM" in one.untold
+    assert {"f_AM", "f_d", "2f_d-f_AM", "f_d-f_AM"} <= set(one.unresolved)
+    assert "5f_AM" in one.unresolved
     assert one.frequencies == {}
     assert evaluate([one]) == []
     row = measured(one.scene, one.response)
     assert "5f_AM_um" not in row
-    assert not {"level_db", "felt_line"} & row.keys()
+    assert not {"level_db", "sensation_line"} & row.keys()
 
 
 def test_two_names_of_one_frequency_are_told():
     half = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 70)
     one = at_the_focus(0.5, am_frequency=140, trajectory=half)
-    assert one.untold == ()
+    assert one.unresolved == ()
     assert one.lines["2f_d"][0] == pytest.approx(2e-6, rel=1e-3)
 
 

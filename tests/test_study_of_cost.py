@@ -30,7 +30,7 @@ from skinwave.planning.refinement import (
     coarser_by,
     compared_with,
     convergence,
-    ladder,
+    element_sizes,
     refined,
 )
 from skinwave.planning.sensitivity import sensitivity
@@ -172,7 +172,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
 @pytest.mark.parametrize("depth", [1, 8.4, 15, 60, 300])
 def test_slabs_are_refined_along_all_axes_alike(depth):
     body = loads(f"[body]\ndepth_mm = {depth}").body
-    sizes = ladder(body)
+    sizes = element_sizes(body)
     layers = np.array([cell_layers(body, h) for h in sizes])
     assert (np.diff(sizes) < 0).all()
     assert (np.diff(layers) > 0).all()

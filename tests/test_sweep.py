@@ -355,7 +355,9 @@ def test_a_plot_of_what_is_not_there_is_one_sentence(scene, capsys):
     assert "column 'peak' is unknown" in refused(capsys, "plot", "short-sweep", "--column", "peak")
     assert "did you mean 'peak_um'" in refused(capsys, "plot", "short-sweep", "--column", "peak")
     assert "two varied keys" in refused(capsys, "plot", "short-sweep", "--heat")
-    assert "no finite number" in refused(capsys, "plot", "short-sweep", "--column", "felt_line")
+    assert "no finite number" in refused(
+        capsys, "plot", "short-sweep", "--column", "sensation_line"
+    )
 
 
 COSTS = ("seconds", "peak_memory_gib")  # which differ from run to run

@@ -53,7 +53,7 @@ from skinwave.web import (
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
 from skinwave.web.session import told
-from skinwave.web.shown import untold
+from skinwave.web.shown import unresolved
 from skinwave.web.worker import Worker
 
 
@@ -331,7 +331,7 @@ def test_scenes_and_addresses_of_earlier_versions_load(request):
 def test_a_main_lobe_on_a_slab_is_refused_rather_than_answered_as_a_gaussian():
     scene = scenes.scene_of(STARTS | {"profile": "main_lobe", "duration": 0.1})
     with pytest.raises(ValueError, match="'main_lobe' has no wavenumber integral on a slab"):
-        waves.Waves()(scene, nothing)
+        waves.BodyResponses()(scene, nothing)
 
 
 # What is shown
@@ -355,10 +355,12 @@ def test_lines_too_near_to_each_other_are_left_out_and_counted():
     scene = scenes.scene_of(STARTS | {"am": 3, "duration": 0.5, "shape": "point"})
     answer = model.kernel(scene)
     assert answer.lines == ()
-    count = len(model.untold_lines(scene, answer.response))
+    count = len(model.unresolved_lines(scene, answer.response))
     assert count == 5
-    assert untold(count, 0.5) == ("5 lines cannot be resolved in 0.5 s; make the Tacton longer.")
-    assert untold(0, 0.5) == ""
+    assert unresolved(count, 0.5) == (
+        "5 lines cannot be resolved in 0.5 s; make the Tacton longer."
+    )
+    assert unresolved(0, 0.5) == ""
 
 
 def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
@@ -368,7 +370,7 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
     found = model.kernel_map(pressure)
     assert np.abs(found.rms - sampled).max() < 0.05 * sampled.max()
     # On the borderline the strongest component is at its own threshold.
-    outermost = max(found.felt, key=lambda line: np.abs(line).max())
+    outermost = max(found.threshold, key=lambda line: np.abs(line).max())
     times = np.arange(10_000) / 10_000
     table = line_table(pressure, point_kernel(pressure, outermost[::7], times))
     level = [sensation_level(table.amplitudes[name], f, unit="Pa")
@@ -378,22 +380,22 @@ def test_the_map_is_the_rms_of_the_pressure_about_its_mean():
 
 def test_nothing_is_felt_of_what_does_not_vibrate_nor_on_paper():
     still = scenes.scene_of(STARTS | {"shape": "point", "am": 0})
-    assert model.kernel_map(still.pressure).felt == ()
-    assert model.kernel_map(scenes.scene_of(STARTS | {"shape": "point"}).pressure).felt
+    assert model.kernel_map(still.pressure).threshold == ()
+    assert model.kernel_map(scenes.scene_of(STARTS | {"shape": "point"}).pressure).threshold
     scene = scenes.scene_of(STARTS | {"body": "skin-slab", "duration": 0.2})
     f, motion = (
         np.array([140.0]),
         np.full((1, model.SIDE**2), 1e-6) * np.linspace(0, 1, model.SIDE**2),
     )
-    assert waves.motion_map(scene, f, motion).felt
+    assert waves.motion_map(scene, f, motion).threshold
     paper = replace(scene, body=BODIES["paper-sheet"])
-    assert waves.motion_map(paper, f, motion).felt == ()
+    assert waves.motion_map(paper, f, motion).threshold == ()
 
 
 def test_map_and_table_agree_under_a_rhythm():
     """The level of the strongest line where the borderline runs is 0 dB in the table."""
     scene = scenes.scene_of(STARTS | PUBLISHED | {"shape": "point", "am": 150, "pulses": "50/50"})
-    outermost = max(model.kernel_map(scene.pressure).felt, key=lambda line: np.abs(line).max())
+    outermost = max(model.kernel_map(scene.pressure).threshold, key=lambda line: np.abs(line).max())
     response = point_kernel(scene.pressure, outermost[:1], np.arange(10_000) / 10_000)
     table = line_table(scene.pressure, response)
     level = sensation_level(table.amplitudes["f_AM"][0], 150.0, unit="Pa")
@@ -460,7 +462,7 @@ def test_a_thinned_curve_keeps_its_peaks():
 
 
 def test_tabulated_waves_are_the_exact_ones(scene):
-    shown = waves.Waves()(scene, nothing)
+    shown = waves.BodyResponses()(scene, nothing)
     exact = compute(scene, "flat-body").displacement[:, 0]
     error = shown.response.displacement[:, 0] - exact
     assert np.linalg.norm(error) < 2e-3 * np.linalg.norm(exact)
@@ -474,7 +476,7 @@ def test_tabulated_waves_are_the_exact_ones(scene):
 def test_tabulated_waves_follow_pulses_and_foci(scene):
     tacton = scenes.scene_of(STARTS | {"pulses": "30/20", "foci": 3, "duration": 0.15}).tacton
     scene = replace(scene, pressure=replace(scene.pressure, tacton=tacton))
-    shown = waves.Waves()(scene, nothing).response.displacement[:, 0]
+    shown = waves.BodyResponses()(scene, nothing).response.displacement[:, 0]
     exact = compute(scene, "flat-body").displacement[:, 0]
     assert np.linalg.norm(shown - exact) < 5e-3 * np.linalg.norm(exact)
 
@@ -490,7 +492,7 @@ def test_one_grid_of_wavenumbers_serves_every_height(body, height):
 
 
 def test_another_height_evaluates_no_compliance_anew(scene, monkeypatch):
-    answered = waves.Waves()
+    answered = waves.BodyResponses()
     answered(scene, nothing)
     monkeypatch.setattr(slabs, "compliance", None)
     higher = replace(scene, pressure=replace(scene.pressure, height=0.23))
@@ -504,9 +506,9 @@ def test_another_height_evaluates_no_compliance_anew(scene, monkeypatch):
 def test_silence_moves_nothing_and_is_drawn_as_zero(more, moving):
     given = STARTS | {"body": "skin-slab", "amplitude": 0, "duration": 0.1} | more
     scene = scenes.scene_of(given)
-    kernel, shown = model.kernel(scene), waves.Waves()(scene, nothing, moving)
+    kernel, shown = model.kernel(scene), waves.BodyResponses()(scene, nothing, moving)
     assert not shown.response.displacement.any()
-    assert (shown.lines, shown.map.felt) == ((), ())
+    assert (shown.lines, shown.map.threshold) == ((), ())
     assert not shown.map.rms.any()
     assert (shown.moving is not None) == moving
     curves = plots.Curves(kernel=kernel, waves=shown)
@@ -520,7 +522,7 @@ def test_silence_moves_nothing_and_is_drawn_as_zero(more, moving):
 def test_tabulated_waves_follow_paths_of_their_own(scene, more):
     values = STARTS | OWN | {"body": "skin-slab", "duration": 0.1} | more
     scene = scenes.scene_of(values)
-    shown = waves.Waves()(scene, nothing)
+    shown = waves.BodyResponses()(scene, nothing)
     exact = compute(scene, "flat-body").displacement[:, 0]
     error = shown.response.displacement[:, 0] - exact
     assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(exact)
@@ -532,7 +534,7 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
     paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
     values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
-    answered, scene = waves.Waves(), scenes.scene_of(values, own)
+    answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
     shown = answered(scene, nothing, moving=True)
     alone = compute(scene, "fem", h=5e-3).displacement[:, 0]
     assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
@@ -554,7 +556,7 @@ def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
     monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=air)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
-    answered, scene = waves.Waves(), scenes.scene_of(values, own)
+    answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
     shown = answered(scene, nothing)
     alone = compute(scene, "fem", h=5e-3).displacement[:, 0]
     assert np.linalg.norm(shown.response.displacement[:, 0] - alone) < 0.02 * np.linalg.norm(alone)
@@ -575,7 +577,7 @@ def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
 def test_a_palm_answers(monkeypatch):
     monkeypatch.setitem(waves.SIZES, "palm", 12e-3)
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
-    answered, said = waves.Waves(), []
+    answered, said = waves.BodyResponses(), []
     shown = answered(scenes.scene_of(values), lambda *told: said.append(told), moving=True)
     assert list(dict.fromkeys(phase for phase, _ in said)) == [
         "mesh", "assemble", "factorise", "reduce", "read the surface",
@@ -595,7 +597,7 @@ def test_the_moving_body_is_what_its_probe_sees(scene):
     """Steady motion about its mean, through the period that the load has."""
     tacton = scenes.scene_of(STARTS | {"am": 100.0, "speed": 2 * np.pi, "duration": 0.3}).tacton
     steady = replace(scene, pressure=replace(scene.pressure, tacton=tacton), probes=((0.0, 0.0),))
-    shown = waves.Waves()(steady, nothing, moving=True)
+    shown = waves.BodyResponses()(steady, nothing, moving=True)
     seen, response = shown.moving, shown.response
     assert seen.repeats
     assert seen.period == pytest.approx(0.01)
@@ -677,7 +679,7 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
             raise found
         return found
 
-    monkeypatch.setattr(waves.Waves, "__call__", answer)
+    monkeypatch.setattr(waves.BodyResponses, "__call__", answer)
     monkeypatch.setattr(worker, "end_with_parent", lambda: None)
     monkeypatch.setattr(worker.os, "nice", lambda _: None)
     worker.answer_forever(Pipe())
@@ -806,7 +808,7 @@ def test_a_wrong_value_is_marked_and_what_is_shown_stays(session):
 def test_waves_are_stale_until_they_are_answered(session):
     assert session.state.waves_stale
     assert [d["name"] for d in session.state.waveform_plot["data"]] == ["kernel, same load, Pa"]
-    answer = waves.Waves()(session.scene, nothing)
+    answer = waves.BodyResponses()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number - 1, answer)
     assert session.state.waves_stale, "an older response is not shown"
@@ -835,7 +837,7 @@ def test_waves_are_stale_until_they_are_answered(session):
 
 
 def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
-    answer = waves.Waves()(session.scene, nothing)
+    answer = waves.BodyResponses()(session.scene, nothing)
     effort = replace(
         answer.response.effort,
         warnings=("relative error of about 18 %", "relative error of about 18 %"),
@@ -851,16 +853,16 @@ def test_warnings_of_the_answer_that_is_shown_are_said_once(session):
 
 
 def test_the_first_sentences_say_what_each_difference_changes(session):
-    answer = waves.Waves()(session.scene, nothing)
+    answer = waves.BodyResponses()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number, answer)
-    propagation, drive, felt = session.state.summary
+    propagation, drive, threshold = session.state.summary
     share = float(re.search(r"carry (\d+) %", propagation)[1])
     exact = share_outside(model.kernel_map(session.scene.pressure).rms, answer.map.rms)
     assert share == round(100 * exact)
     assert 5 < share < 60
     assert "not propagation, adds f_" in drive
-    assert "dB re threshold" in felt
+    assert "dB re threshold" in threshold
     with session.state:
         session.state.body = "none"
     assert session.state.summary == [drive]
@@ -868,10 +870,10 @@ def test_the_first_sentences_say_what_each_difference_changes(session):
 
 def test_answers_carry_the_warnings_of_the_command_line(scene):
     """Sides that reflect are left out by the wavenumber integral, and that is said."""
-    assert waves.Waves()(scene, nothing).response.effort.warnings == ()
+    assert waves.BodyResponses()(scene, nothing).response.effort.warnings == ()
     small = replace(scene.body, width=0.04, height=0.04, sides="clamped")
     reflecting = replace(scene, body=small)
-    said = waves.Waves()(reflecting, nothing).response.effort.warnings
+    said = waves.BodyResponses()(reflecting, nothing).response.effort.warnings
     assert said == plan(reflecting, model="flat-body").warnings
     assert "which leaves out reflections from the sides" in said[0]
 

@@ -23,7 +23,7 @@ from meshes.surface.repair import repaired
 from meshes.surface.triangulation import Surface
 from meshes.tetmesh import Floats, MeshError
 
-Field = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
+LevelSet = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
 EPSILON = 0.2  # of h: how far the straight mesh may lie from the surface
 PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: where the fingers begin
 
@@ -128,7 +128,7 @@ def level_set_and_gradient(
     return lambda points: level_set(palm, points), lambda points: gradient(palm, points)
 
 
-def _field(palm: Palm, points: Floats) -> Field:
+def _field(palm: Palm, points: Floats) -> LevelSet:
     bend = palm.cup_depth * np.array([2 / palm.breadth, 2 / palm.length]) ** 2
     flat = points.copy()
     flat[:, 2] -= points[:, :2] ** 2 @ bend
@@ -153,7 +153,7 @@ def _mounds(palm: Palm) -> Iterator[tuple[float, Floats, Floats]]:
             yield height, np.array([x, y, height - half]), np.array([across, along, half])
 
 
-def _box_distance(palm: Palm, points: Floats) -> Field:
+def _box_distance(palm: Palm, points: Floats) -> LevelSet:
     """Distance from a box with rounded corners in its plan and rounded edges."""
     half = np.array([palm.breadth, palm.length]) / 2
     middle = points + [0, 0, palm.thickness / 2]
@@ -164,7 +164,7 @@ def _box_distance(palm: Palm, points: Floats) -> Field:
     return value, sign * np.column_stack([share[:, :1] * across, share[:, 1]])
 
 
-def _rounded(beyond: Floats, radius: float) -> Field:
+def _rounded(beyond: Floats, radius: float) -> LevelSet:
     """Distance (n,) from a corner of that radius, of points so far beyond its two sides (n, 2)."""
     inner = beyond + radius
     outside = np.maximum(inner, 0)
@@ -175,7 +175,7 @@ def _rounded(beyond: Floats, radius: float) -> Field:
     return value, np.where((length > 0)[:, None], round_part, nearest)
 
 
-def _ellipsoid(points: Floats, half_axes: Floats) -> Field:
+def _ellipsoid(points: Floats, half_axes: Floats) -> LevelSet:
     """First-order distance k (k - 1) / |grad k^2 / 2|, with k = |p / half_axes|."""
     scaled, twice = points / half_axes, points / half_axes**2
     k = np.maximum(np.linalg.norm(scaled, axis=1), 1e-9)
@@ -186,7 +186,7 @@ def _ellipsoid(points: Floats, half_axes: Floats) -> Field:
     return value, slope
 
 
-def _join(one: Field, other: Field, width: float) -> Field:
+def _join(one: LevelSet, other: LevelSet, width: float) -> LevelSet:
     """Smooth minimum: cubic, so that second derivatives are continuous."""
     (a, slope_a), (b, slope_b) = one, other
     gap = np.maximum(width - np.abs(a - b), 0) / width

@@ -67,13 +67,13 @@ def run(options: argparse.Namespace) -> int:
         )  # fmt: skip
         record.write(folder, record.of_command(options), scene=asked)
     warn(outcome.warnings)
-    held = sum(verdict.holds for verdict in outcome.verdicts)
+    held = sum(assessed.holds for assessed in outcome.assessed_claims)
     summary = {
         "out": str(out),
         "runs": outcome.runs,
         "planned": outcome.planned,
-        "statements_held": held,
-        "statements_judged": len(outcome.verdicts),
+        "claims_held": held,
+        "claims_assessed": len(outcome.assessed_claims),
         "warnings": outcome.warnings,
         "seconds": round(outcome.seconds, 1),
         "peak_memory_gib": round(outcome.peak_memory / 2**30, 2),
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
         options,
         summary,
         f"{outcome.runs} of {outcome.planned} runs in {outcome.seconds:.0f} s, "
-        f"{outcome.peak_memory / 2**30:.2f} GiB; {held} of {len(outcome.verdicts)} claims "
+        f"{outcome.peak_memory / 2**30:.2f} GiB; {held} of {len(outcome.assessed_claims)} claims "
         f"hold; open {out}/index.html",
     )
     return 0 if outcome.runs == outcome.planned else 1

@@ -30,13 +30,13 @@ def run(options: argparse.Namespace) -> int:
     from skinwave import document, record
     from skinwave.outputs import output_folder
     from skinwave.scene_file import read
-    from skinwave.simulation import check_knobs
+    from skinwave.simulation import check_options
     from skinwave.studies.assumptions import DEVICE_RATES, check_rate
-    from skinwave.studies.relax import climb
+    from skinwave.studies.relax import hierarchy_of
     from skinwave.studies.relax_page import efforts, sentence, write
 
     h = metre(options.h)
-    check_knobs("auto", h=h)
+    check_options("auto", h=h)
     rate = 1e3 * options.update_rate
     check_rate(rate)
     if options.scene == "paper-vs-skin":
@@ -51,13 +51,13 @@ def run(options: argparse.Namespace) -> int:
     inputs = [options.scene, scene.body.file]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
-            found = climb(scene, progress, h=h, update_rate=rate, points=options.points)
+            found = hierarchy_of(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
         record.write(folder, record.of_command(options), scene=scene)
     warnings = document.worst_warnings(efforts(found))
     warn(warnings)
     sentences = [sentence(effect) for effect in found.effects()]
-    failed = [f"'{rung.name}' failed: {rung.error}" for rung in found.rungs if rung.error]
+    failed = [f"'{step.name}' failed: {step.error}" for step in found.steps if step.error]
     summary = {"out": str(out), "sentences": sentences, "failed": failed, "warnings": warnings}
     summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
     return 0

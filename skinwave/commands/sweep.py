@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
-    from skinwave.sweeps.sweep import Knobs, sweep
+    from skinwave.sweeps.sweep import ModelOptions, sweep
     from skinwave.sweeps.variation import cases, combinations, parse
 
     if options.seed < 0:
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     variations = [parse(text) for text in options.vary]
     combined = combinations(variations, options.design, options.samples, options.seed)
     wanted = cases(options.scene, combined)
-    knobs = Knobs(
+    model_options = ModelOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
     out = options.out or Path(f"{options.scene.stem}-sweep")
@@ -73,8 +73,8 @@ def run(options: argparse.Namespace) -> int:
         dataset.refuse_changed(out, dataset.CSV)  # now, not when all is computed
     with _progress(options, len(wanted)) as progress:
         found = sweep(
-            wanted, out, knobs, progress, scheduler=options.scheduler, workers=options.workers,
-            command=record.of_command(options),
+            wanted, out, model_options, progress, scheduler=options.scheduler,
+            workers=options.workers, command=record.of_command(options),
         )  # fmt: skip
     if options.csv and found.planned > found.missing:
         dataset.write_csv(out, dataset.read(out))

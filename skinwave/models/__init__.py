@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from skinwave.effort import Progress
     from skinwave.scene import Scene
 
-Map = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
+MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 
 BUILT_IN = {  # name -> the file that registers it
     "point-kernel": "point_kernel",
@@ -46,7 +46,7 @@ class Request:
     h: float | None = None
     dt: float | None = None
     solver: str = "auto"
-    mapped: Map = map
+    mapped: MapFunction = map
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

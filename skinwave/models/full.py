@@ -26,7 +26,7 @@ from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models import Map
+from skinwave.models import MapFunction
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import Body, Scene
 
@@ -165,7 +165,7 @@ def harmonic_answer(
     h: float | None = None,
     solver: str = "auto",
     threshold: float = 1e-3,
-    mapped: Map = map,
+    mapped: MapFunction = map,
 ) -> Response:
     """Steady state: one factorisation for each line of the load above the threshold, but for the
     mean if the body is unconstrained.

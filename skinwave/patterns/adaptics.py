@@ -26,7 +26,7 @@ from skinwave.patterns.focal_points import recorded
 from skinwave.patterns.pattern import Options, Pattern, one_height
 
 ENGINE_RATE = 20_000.0  # Hz
-ENDLESS = 1.0  # s that stand for a pattern that nothing ends
+UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
 NONE = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=100.0)
 
 
@@ -42,8 +42,8 @@ def read(content: bytes, options: Options) -> Pattern:
     notes = list(animation.notes)
     duration = animation.duration
     if duration == 0:
-        duration = ENDLESS
-        notes.append(f"the pattern has no end: {ENDLESS:g} s of it")
+        duration = UNBOUNDED
+        notes.append(f"the pattern has no end: {UNBOUNDED:g} s of it")
     if duration > LONGEST:
         raise ValueError(f"the pattern lasts {duration:g} s, longer than {LONGEST:g} s; cut it")
     places = np.array(animation.places.values or ((0.0, 0.0, 200.0),))

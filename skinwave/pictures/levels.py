@@ -41,7 +41,7 @@ def strongest_probe(runs: Sequence[Run]) -> int:
     return int(np.argmax(sum(x / max(float(x.max()), 1e-300) for x in level)))
 
 
-def felt_lines(run: Run, probe: int) -> dict[str, float]:
+def sensation_levels(run: Run, probe: int) -> dict[str, float]:
     """Names of lines and their levels in dB above threshold at a probe, the highest first; none
     of what is no skin.
     """
@@ -92,7 +92,7 @@ def _draw_threshold(ax: Axes) -> None:
 def _shown(run: Run, probe: int) -> list[str]:
     """Lines that are drawn, by sensation level or, on a sheet, by amplitude, the highest first."""
     if run.is_skin:
-        return [n for n, level in felt_lines(run, probe).items() if level > LOWEST_LEVEL]
+        return [n for n, level in sensation_levels(run, probe).items() if level > LOWEST_LEVEL]
     return sorted(run.listed, key=lambda name: -run.table.amplitudes[name][probe])
 
 

@@ -25,7 +25,7 @@ PIXELS = 201  # of a map's side
 DEEPEST = -40.0  # dB shown
 FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
 DROPS = {-6: "solid", -20: "dashed"}
-FELT = "#ff2fd0"  # the detection contour
+THRESHOLD = "#ff2fd0"  # the detection contour
 MAP, LEGEND = 3.4, 0.4  # inch, side of a map and height of a legend
 
 
@@ -106,7 +106,7 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
             "path of the focus": {"color": style.ink, "ls": "dotted"},
         }
         if any((view.sensation > 0).any() for view in views):
-            entries[f"detection threshold (and ±{BAND:g} dB)"] = {"color": FELT, "ls": "solid"}
+            entries[f"detection threshold (and ±{BAND:g} dB)"] = {"color": THRESHOLD, "ls": "solid"}
         _legend(figure, entries)
     return figure
 
@@ -239,7 +239,7 @@ def _draw_borderline(ax: Axes, raster: Raster, level: Floats) -> None:
     """Where the strongest line is at its threshold, and the band about that."""
     for drop, width, dashes in ((-BAND, 0.7, "dotted"), (0.0, 1.6, "solid"), (BAND, 0.7, "dotted")):
         if np.nanmin(level) < drop < np.nanmax(level):
-            ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors=FELT,
+            ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors=THRESHOLD,
                        linewidths=width, linestyles=dashes)  # fmt: skip
 
 

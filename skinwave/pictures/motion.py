@@ -24,7 +24,7 @@ from skinwave.models.reduction import (
     respond,
 )
 from skinwave.scene import Scene
-from skinwave.simulation import check_knobs
+from skinwave.simulation import check_options
 
 MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB
 
@@ -60,7 +60,7 @@ def waves(
     solver: str = "auto",
 ) -> Waves:
     """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
-    check_knobs(solver, h=h)
+    check_options(solver, h=h)
     clock, report = Clock(), progress or silent
     build = meshed(scene.body, h, clock, report)
     operators = assembled(build, clock, report)

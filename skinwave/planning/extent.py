@@ -13,7 +13,7 @@ LOWEST = 20.0  # Hz at which air is estimated where no line is higher
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class PlanRow:
     """One decision of a plan, and its reason."""
 
     what: str
@@ -32,7 +32,7 @@ def symmetry(scene: Scene) -> str:
     return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
 
 
-def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[Row]]:
+def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[PlanRow]]:
     """The body out to where reflections are negligible, and the reason if that is not all of it.
 
     Only absorbing sides are moved inwards: reflections from others belong to the response.
@@ -53,7 +53,7 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[R
     if (cut == half).all():
         return body, []
     width, height = map(float, 2 * cut)
-    row = Row(
+    row = PlanRow(
         what="extent",
         value=f"{1e3 * width:.0f} x {1e3 * height:.0f} mm",
         reason=f"reflections from further away are below {10 * tolerance:.2g} %; absorbing "
@@ -62,7 +62,7 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[R
     return replace(body, width=width, height=height), [row]
 
 
-def left_out(scene: Scene, highest: float) -> list[Row]:
+def left_out(scene: Scene, highest: float) -> list[PlanRow]:
     """Neglected physics of a sheet with an estimate of each: air, if it is in vacuum, and
     stretching; with air, its added mass.
     """
@@ -75,7 +75,7 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
     shift = 100 * (1 - 1 / np.sqrt(1 + air))
     lowered = f"resonances lower by {shift:.1f} %, by 2 rho_air/k at {middle:.0f} Hz"
     return [
-        Row(
+        PlanRow(
             what="air" if body.air else "left out: air",
             value=f"+{100 * air:.0f} % mass",
             reason=f"{lowered}; each wavenumber has its own, as air = true asks"
@@ -83,7 +83,7 @@ def left_out(scene: Scene, highest: float) -> list[Row]:
             else f"{lowered}: take the response as that of a sheet in vacuum, or set air = true in "
             "[body]",
         ),
-        Row(
+        PlanRow(
             what="left out: stretching",
             value=f"sag {sag:.1f} thicknesses",
             reason="a linear sheet; a real one stiffens beyond about half a thickness"

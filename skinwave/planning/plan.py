@@ -19,7 +19,7 @@ from skinwave.planning.estimates import (
     reflection_and_transient,
     response_spectrum,
 )
-from skinwave.planning.extent import Row, extent, left_out, symmetry
+from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
 from skinwave.planning.refinement import Convergence, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import of_elements, over_tolerance
@@ -47,7 +47,7 @@ class Plan:
     error: float = 0.0
     seconds: float = 0.1
     memory: float = 1e8
-    rows: tuple[Row, ...] = ()
+    rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
 
@@ -85,7 +85,7 @@ def plan(
         if asked and asked.needs_body:
             raise ValueError(f"a scene without a body has no {model} response; use --model auto")
         kernel = model or "point-kernel"
-        row = Row(what="model", value=kernel, reason="there is no body to move")
+        row = PlanRow(what="model", value=kernel, reason="there is no body to move")
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if asked:
         asked.refuse(scene.body)
@@ -98,7 +98,7 @@ def plan(
     spectrum = response_spectrum(scene, tolerance)
     highest = cutoff_frequency(*spectrum, tolerance)
     rows = [
-        Row(
+        PlanRow(
             what="highest line",
             value=f"{highest:.0f} Hz",
             reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
@@ -111,10 +111,13 @@ def plan(
     if asked.is_infinite if asked else returned <= WAVES_SHARE * tolerance:
         return _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
     body: Body = scene.body
-    cut: list[Row] = []
+    cut: list[PlanRow] = []
     if model is None or h is None:  # else all of it is meshed, as asked
         body, cut = extent(scene, tolerance, highest)
-    rows += [Row(what="model", value=model or "fem", reason=_why_elements(scene, returned)), *cut]
+    rows += [
+        PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
+        *cut,
+    ]
     axes = symmetry(scene) if asked is None or asked.is_reduced else ""
     found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
@@ -143,14 +146,16 @@ def _own_law(scene: Scene, asked: Model | None, h: float | None) -> Plan:
     """
     model = asked or (HARMONIC if has_wavenumber_solution(scene) else named("fem-harmonic"))
     frequency_only(scene.body, model)
-    row = Row(what="model", value=model.name, reason="the material has a modulus law of its own")
+    row = PlanRow(
+        what="model", value=model.name, reason="the material has a modulus law of its own"
+    )
     said = "the error of this response is not estimated for a modulus law of its own; compare "
     if model.is_infinite:
         said += "with fem-harmonic, which has the body's sides"
         return Plan(model=model.name, body=scene.body, error=np.nan, rows=(row,), warnings=(said,))
     h = h or default_size(scene.body)
     check_mesh(scene.body, h)
-    size = Row(what="element size", value=f"{1e3 * h:.2f} mm", reason="as asked or by default")
+    size = PlanRow(what="element size", value=f"{1e3 * h:.2f} mm", reason="as asked or by default")
     return Plan(
         model=model.name, body=scene.body, h=h, error=np.nan, rows=(row, size),
         warnings=(f"{said}elements of {1e3 * h:.3g} mm with smaller ones",),
@@ -161,14 +166,14 @@ def _unplanned(scene: Scene, tolerance: float, model: Model, h: float | None) ->
     """Plan of a model that states its own error. That of a sheet at large deflection does not come
     from the linear response: stiffened by stretching it has longer waves and fewer resonances.
     """
-    rows = [Row(what="model", value=model.name, reason=f"as asked: {model.method}")]
+    rows = [PlanRow(what="model", value=model.name, reason=f"as asked: {model.method}")]
     what, size = f"the {model.method}", None
     cure = "a model with waves is"
     if model.default_size:
         size = h or model.default_size(scene.body)
         check_mesh(scene.body, size)
         reason = "as asked" if h else f"the default of {model.name}"
-        rows.append(Row(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
+        rows.append(PlanRow(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
         others = left_out(scene, 0.0)
         rows += [r for r in others if not (model.is_nonlinear and r.what.endswith("stretching"))]
         what, cure = f"elements of {1e3 * size:.3g} mm", "smaller ones are"
@@ -187,7 +192,7 @@ def _without_mesh(
     highest: float,
     returned: float,
     start: float,
-    rows: list[Row],
+    rows: list[PlanRow],
 ) -> Plan:
     if asked is None:
         # One is of the load's lines, the other of the body's own: their powers add.
@@ -209,7 +214,7 @@ def _without_mesh(
     )
     rows = [
         *rows,
-        Row(what="model", value=model, reason="as asked" if warnings else reason),
+        PlanRow(what="model", value=model, reason="as asked" if warnings else reason),
         *left_out(scene, highest),
     ]
     return Plan(
@@ -220,18 +225,18 @@ def _without_mesh(
 
 def _element_rows(
     scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
-) -> list[Row]:
+) -> list[PlanRow]:
     effort = found.prepared.effort
     kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
     return [
-        Row(
+        PlanRow(
             what="symmetry",
             value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[axes],
             reason=f"the load is its own mirror image across {' and '.join(axes)} = 0"
             if axes
             else "all of the body is modelled",
         ),
-        Row(
+        PlanRow(
             what="element size",
             value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} dofs",
             reason=f"{_why_size(found, tolerance, h)}: those of "
@@ -240,13 +245,13 @@ def _element_rows(
             if found.convergence is not Convergence.SINGLE_MESH
             else "the file's own, without another to compare it with",
         ),
-        Row(
+        PlanRow(
             what="reduction",
             value=f"{effort.reduced_dofs} dofs, {effort.estimate:.0e} up to {BAND:.0f} Hz",
             reason=f"asked for {reduction_tolerance(tolerance):.1g}: it costs little",
         ),
         *left_out(scene, highest),
-        Row(
+        PlanRow(
             what="cost",
             value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
             reason=f"the last mesh{kept}; 0.05 s for each further Tacton on the same body",

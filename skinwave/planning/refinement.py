@@ -124,7 +124,7 @@ def refined(
         return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
-    sizes = ladder(body)
+    sizes = element_sizes(body)
     before = compared_with(body, h) if h else sizes[0]
     size = h or _finer(sizes, before)[0]
     coarse, other = answered(before)
@@ -141,7 +141,7 @@ def refined(
         size = CONTROLLER.nearest(_finer(sizes, size), size, error, tolerance)
 
 
-def ladder(body: Body) -> Floats:
+def element_sizes(body: Body) -> Floats:
     """Sequence of element sizes (k,) in metre that a body may be meshed with, descending."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
     if not body.of_kind.conforming:  # whose coarser meshes cut the rim off, and layers

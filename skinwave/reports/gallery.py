@@ -126,7 +126,7 @@ def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]
         parts.append(gallery.figure(f"waveforms-{len(parts)}", figure, _waveforms(runs)))
         if any(run.response.unit == "m" for run in runs):
             figure = levels_figure(runs, strongest_probe(runs), gallery.style)
-            parts.append(gallery.figure(f"felt-{len(parts)}", figure, f"{name}. {FELT}"))
+            parts.append(gallery.figure(f"sensation-{len(parts)}", figure, f"{name}. {SENSATION}"))
     return parts
 
 
@@ -234,7 +234,7 @@ LOADS = (
     "others have the scene's: the two kernels differ by drive law and focal spot."
 )
 PROPAGATED = "A body differs from the kernel under the same load by propagation alone."
-FELT = (
+SENSATION = (
     "Lines of the motion at the probe that moves most, and the detection threshold (for a focal "
     "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."
 )

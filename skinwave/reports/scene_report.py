@@ -12,7 +12,7 @@ from skinwave.exports import write_field, write_probes, write_sound
 from skinwave.files import distinct_names, folder_name
 from skinwave.numbers import FAINTEST, decibel, significant
 from skinwave.pictures.figures import answered, label
-from skinwave.pictures.levels import felt_lines, strongest_probe
+from skinwave.pictures.levels import sensation_levels, strongest_probe
 from skinwave.pictures.maps import Raster, sampler
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
@@ -32,13 +32,13 @@ from skinwave.studies.description import (
     path_of,
     spot_of,
     tones_of,
-    untold,
+    unresolved,
 )
 from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
 TABLED = 12  # lines in the table of lines
 ROUND_OFF = 1e-9  # of the strongest line
-JUDGED = 0.5  # s that a Tacton must last for claims about its lines to be assessed
+ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be assessed
 
 
 def write_report(
@@ -177,16 +177,16 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    said = document.Markup().join(map(document.paragraph, untold(runs)))
+    said = document.Markup().join(map(document.paragraph, unresolved(runs)))
     known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
     if not known and not any(run.unnamed for run in runs):
         return said or document.paragraph("A constant pressure on a focus at rest has no line.")
     share = {name: max(_share(run, name, probe) for run in runs) for name in known}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
-    felt = [felt_lines(run, probe) for run in runs]
+    sensation = [sensation_levels(run, probe) for run in runs]
     rows = [
         [name, f"{runs[0].listed[name]:.2f}"]
-        + [cell for run, levels in zip(runs, felt, strict=True)
+        + [cell for run, levels in zip(runs, sensation, strict=True)
            for cell in _amplitude(run, name, probe, levels)]
         for name in names
     ]  # fmt: skip
@@ -243,11 +243,11 @@ def _comparison(album: Album) -> list[str]:
     parts: list[str] = []
     if any(len(runs) > 1 for runs in groups.values()):
         parts.append(tables.agreement_table(groups))
-    long = [run for run in album.runs if run.scene.tacton.duration >= JUDGED]
-    verdicts = evaluate(long)
-    if verdicts:
+    long = [run for run in album.runs if run.scene.tacton.duration >= ASSESSED]
+    assessed_claims = evaluate(long)
+    if assessed_claims:
         parts.append(document.paragraph("Claims of Lim, Seifi and Park, evaluated on these runs:"))
-        parts.append(tables.claims_table(verdicts))
+        parts.append(tables.claims_table(assessed_claims))
     return parts or [document.paragraph("There is one model only.")]
 
 

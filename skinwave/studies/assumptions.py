@@ -24,7 +24,8 @@ ASSUMPTIONS = {
     "little loss": "the material has its full damping",
     "viscous loss": "the damping is that of a standard linear solid, equal to the viscous one only "
     "at the strongest line",
-    "endless": "the body has its own size and side conditions, and is meshed with finite elements",
+    "laterally-infinite": "the body has its own size and side conditions, and is meshed with "
+    "finite elements",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
@@ -32,7 +33,7 @@ ASSUMPTIONS = {
     "flat": "the palm is curved, and its layers are merged into one of their mean stiffness",
     "small deflection": "the sheet stretches as it bends",
 }
-ELEMENTS = {"endless", "continuous path", "one material", "flat", "small deflection"}
+ELEMENTS = {"laterally-infinite", "continuous path", "one material", "flat", "small deflection"}
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LOSS_LEFT = 0.1  # of the material's own: an undamped resonance is unbounded
 RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
@@ -44,7 +45,7 @@ LAYERS = (
 )
 
 
-def ladder(scene: Scene) -> tuple[str, ...]:
+def droppable(scene: Scene) -> tuple[str, ...]:
     """Assumptions that can be dropped for a scene, in the order of the model hierarchy.
 
     Raises
@@ -71,14 +72,14 @@ def ladder(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
 
 
-def beside(scene: Scene) -> tuple[str, ...]:
+def side_step(scene: Scene) -> tuple[str, ...]:
     """Assumptions dropped in a side step of the hierarchy, with a second damping law; () without
     viscosity.
 
     Fast waves lose little in a standard linear solid, and finite elements take many times as long;
     where the scene does not have it, it is tried on the wavenumber integral only.
     """
-    names = ladder(scene)
+    names = droppable(scene)
     if "viscous loss" in names or not scene.body.of_kind.is_layer or not scene.body.solid.viscosity:
         return ()
     return (*names[: names.index("little loss") + 1], "viscous loss")
@@ -91,9 +92,9 @@ def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
     """
     if name == "sinc^2 profile":
         return "main lobe only" not in names
-    body, endless = scene.body, replace(scene.body, sides="absorbing")
+    body, infinite = scene.body, replace(scene.body, sides="absorbing")
     flat = body.of_kind.is_layer and "flat" not in names
-    return name != "endless" or (flat and endless != body and endless.is_held)
+    return name != "laterally-infinite" or (flat and infinite != body and infinite.is_held)
 
 
 def relaxed(
@@ -128,7 +129,7 @@ def relaxed(
     # Wavenumber integrals are those of a Gaussian in a homogeneous, flat and infinite body.
     elements = pressure.focus != "gaussian" or not ELEMENTS.isdisjoint(dropped)
     model = "fem" if elements else "flat-body"
-    if elements and body.of_kind.is_layer and "endless" not in dropped:
+    if elements and body.of_kind.is_layer and "laterally-infinite" not in dropped:
         body = replace(body, sides="absorbing")
     if "small deflection" in dropped:
         model = "fem-nonlinear"

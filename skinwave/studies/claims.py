@@ -23,7 +23,7 @@ ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
+class AssessedClaim:
     """Whether a claim holds for a body and a model, by which number against which threshold."""
 
     claim: str
@@ -40,34 +40,34 @@ class Verdict:
         return self.model if self.body == "none" else self.body
 
 
-def evaluate(runs: Iterable[Run]) -> list[Verdict]:
+def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
     """Every claim on every body and model for which there are runs to assess it by, long enough to
     resolve the lines that it is about.
     """
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in filter(_is_single, runs):
         groups.setdefault((run.body, run.model), []).append(run)
-    verdicts = []
+    assessed_claims = []
     for (body, model), group in groups.items():
-        for claim, (applies, judge) in STATEMENTS.items():
+        for claim, (applies, assess) in CLAIMS.items():
             if chosen := [run for run in group if applies(run) and _is_told(run, claim)]:
-                holds, value, bar, sentence = judge(chosen)
-                verdicts.append(
-                    Verdict(
+                holds, value, bar, sentence = assess(chosen)
+                assessed_claims.append(
+                    AssessedClaim(
                         claim=claim, body=body, model=model, holds=bool(holds),
                         value=float(value), bar=bar, sentence=sentence,
                     )
                 )  # fmt: skip
-    return verdicts
+    return assessed_claims
 
 
-def write_claims(path: Path, verdicts: Iterable[Verdict]) -> None:
+def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
     """Every assessed claim per body and model."""
-    rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in verdicts)
-    path.write_bytes(csv_table([field.name for field in fields(Verdict)], rows))
+    rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in assessed_claims)
+    path.write_bytes(csv_table([field.name for field in fields(AssessedClaim)], rows))
 
 
-Judgement = tuple[bool, float, float, str]
+Assessment = tuple[bool, float, float, str]
 
 
 def _is_single(run: Run) -> bool:
@@ -86,10 +86,10 @@ def _is_told(run: Run, claim: str) -> bool:
     """Whether the lines that a claim is about are resolved; some are about all lines."""
     if claim in NEEDED:
         return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
-    return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.untold
+    return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.unresolved
 
 
-def _single_line(runs: list[Run]) -> Judgement:
+def _single_line(runs: list[Run]) -> Assessment:
     worst = max(_others(run).max() for run in runs)
     return (
         worst < ABSENT,
@@ -99,7 +99,7 @@ def _single_line(runs: list[Run]) -> Judgement:
     )
 
 
-def _am_harmonics(runs: list[Run]) -> Judgement:
+def _am_harmonics(runs: list[Run]) -> Assessment:
     second = min(_strongest(run, ["2f_AM"]) for run in runs)
     third = min(_strongest(run, ["3f_AM"]) for run in runs)
     weakest = min(second, third)
@@ -111,7 +111,7 @@ def _am_harmonics(runs: list[Run]) -> Judgement:
     )
 
 
-def _drawn_lines(runs: list[Run]) -> Judgement:
+def _drawn_lines(runs: list[Run]) -> Assessment:
     offset = max(
         abs(_peak(run, f"{n}f_d".lstrip("1")) - n * _drawing(run))
         for run in runs
@@ -125,7 +125,7 @@ def _drawn_lines(runs: list[Run]) -> Judgement:
     )
 
 
-def _same_places(runs: list[Run]) -> Judgement:
+def _same_places(runs: list[Run]) -> Assessment:
     names = ("f_d", "2f_d", "3f_d")
     places = np.array([[_peak(run, name) for name in names] for run in runs])
     drift = float(np.ptp(places, axis=0).max())
@@ -139,7 +139,7 @@ def _same_places(runs: list[Run]) -> Judgement:
     )
 
 
-def _pairs_only(runs: list[Run]) -> Judgement:
+def _pairs_only(runs: list[Run]) -> Assessment:
     drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
     weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
     return (
@@ -151,7 +151,7 @@ def _pairs_only(runs: list[Run]) -> Judgement:
     )
 
 
-def _both_multiples(runs: list[Run]) -> Judgement:
+def _both_multiples(runs: list[Run]) -> Assessment:
     drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
     double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
     return (
@@ -163,7 +163,7 @@ def _both_multiples(runs: list[Run]) -> Judgement:
     )
 
 
-def _am_highest(runs: list[Run]) -> Judgement:
+def _am_highest(runs: list[Run]) -> Assessment:
     worst = max(runs, key=lambda run: _others(run).max())
     value = _others(worst).max()
     name, probe = _rival(worst)
@@ -174,7 +174,7 @@ def _am_highest(runs: list[Run]) -> Judgement:
     return value < 0, value, 0.0, sentence
 
 
-def _am_highest_measured(runs: list[Run]) -> Judgement:
+def _am_highest_measured(runs: list[Run]) -> Assessment:
     holds, value, bar, sentence = _am_highest(runs)
     beaten = [run.tacton for run in runs if _others(run).max() >= 0]
     if beaten:
@@ -186,7 +186,7 @@ def _am_highest_measured(runs: list[Run]) -> Judgement:
     return holds and value < 0, value, bar, sentence
 
 
-def _much_lower(runs: list[Run]) -> Judgement:
+def _much_lower(runs: list[Run]) -> Assessment:
     value = max(_others(run).max() for run in runs)
     lower = sum(bool(_others(run).max() < MUCH_LOWER) for run in runs)
     return (
@@ -198,7 +198,7 @@ def _much_lower(runs: list[Run]) -> Judgement:
     )
 
 
-def _exact_frequencies(runs: list[Run]) -> Judgement:
+def _exact_frequencies(runs: list[Run]) -> Assessment:
     offsets = [
         abs(_peak(run, name) - run.frequencies[name])
         for run in runs
@@ -225,7 +225,7 @@ def _both(run: Run) -> bool:
     return run.is_am and run.is_stm
 
 
-STATEMENTS: dict[str, tuple[Callable[[Run], bool], Callable[[list[Run]], Judgement]]] = {
+CLAIMS: dict[str, tuple[Callable[[Run], bool], Callable[[list[Run]], Assessment]]] = {
     "S1": (_pure_am, _single_line),
     "S2": (_pure_stm, _drawn_lines),
     "S3": (_both, _pairs_only),

@@ -39,9 +39,9 @@ def modelled(runs: Iterable[Run]) -> list[str]:
     return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
 
 
-def untold(runs: Iterable[Run]) -> list[str]:
+def unresolved(runs: Iterable[Run]) -> list[str]:
     """Unresolved lines of Tactons that are too short, a sentence for each duration."""
-    missing = {run.scene.tacton.duration: run.untold for run in runs if run.untold}
+    missing = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
     return [
         f"{len(names)} line{'s' * (len(names) > 1)}, {', '.join(names[:NAMED])}"
         f"{', ...' * (len(names) > NAMED)}, cannot be resolved in {seconds:g} s and "

@@ -21,7 +21,7 @@ from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.plain_text import csv_table
-from skinwave.run import JUDGED
+from skinwave.run import ASSESSED
 from skinwave.scene import BODIES, PROBES, Body, Scene
 from skinwave.simulation import compute
 from skinwave.studies.paper15 import MEASURED_ON, tactons
@@ -43,7 +43,7 @@ SIGNATURES: Mapping[str, Callable[[Floats], Floats]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class MechanismLine:
     """Amplitude in metre of a line at the probe where it is strongest, by one mechanism."""
 
     tacton: str
@@ -68,7 +68,7 @@ class Ratio:
 class Findings:
     """Lines of every Tacton, ratios of one at several amplitudes, and which runs failed."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[MechanismLine, ...]
     ratios: tuple[Ratio, ...]
     failed: tuple[str, ...] = ()
 
@@ -89,7 +89,7 @@ def paper_vs_skin(
     on = dict(bodies or {name: BODIES[name] for name in MEASURED_ON})
     patterns = [(n, replace(t, duration=DURATION)) for n, t in (chosen or tactons())]
     still = Tacton(am_frequency=AM, duration=DURATION, trajectory=Trajectory())
-    found: list[Line] = []
+    found: list[MechanismLine] = []
     ratios: list[Ratio] = []
     failed: list[str] = []
     for body_name, body in on.items():
@@ -148,13 +148,13 @@ def steady(response: Response) -> Response:
 
 def _lines(
     tacton: str, body: str, mechanism: str, pressure: MovingPressure, response: Response
-) -> list[Line]:
+) -> list[MechanismLine]:
     # A stretching sheet has lines that no load has: those that claims are about are looked for.
     later = steady(response)
-    names, _ = resolved_lines(pressure, later, candidates=JUDGED, highest=700.0)
+    names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=700.0)
     amplitudes = lines(later, list(names.values())).max(axis=1)
     return [
-        Line(tacton=tacton, body=body, mechanism=mechanism, line=name, frequency=f,
+        MechanismLine(tacton=tacton, body=body, mechanism=mechanism, line=name, frequency=f,
              amplitude=float(a))
         for (name, f), a in zip(names.items(), amplitudes, strict=True)
     ]  # fmt: skip

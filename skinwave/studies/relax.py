@@ -23,17 +23,17 @@ from skinwave.effort import Progress, peak_memory
 from skinwave.models import named
 from skinwave.planning.assessment import sentences
 from skinwave.processes import apart
-from skinwave.run import JUDGED
+from skinwave.run import ASSESSED
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
-    beside,
     can_be_alone,
     check_rate,
+    droppable,
     held,
-    ladder,
     relaxed,
+    side_step,
 )
 
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
@@ -41,7 +41,7 @@ FIRST = "as published"  # by the model point-kernel-published
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rung:
+class HierarchyStep:
     """Step of the model hierarchy: dropped assumptions, and the response or the `error` instead."""
 
     name: str
@@ -71,55 +71,55 @@ class Effect:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ladder:
+class Hierarchy:
     """Model hierarchy: steps in order, the first as published and the last the richest; side
     steps, which drop one more assumption than the step they branch off; and leave-one-out models.
     """
 
     scene: Scene
-    rungs: tuple[Rung, ...]
-    beside: tuple[Rung, ...]
-    but_one: tuple[Rung, ...]
+    steps: tuple[HierarchyStep, ...]
+    side_steps: tuple[HierarchyStep, ...]
+    leave_one_out: tuple[HierarchyStep, ...]
 
     @property
-    def every(self) -> tuple[Rung, ...]:
+    def every(self) -> tuple[HierarchyStep, ...]:
         """All steps, in the order of the tables."""
-        return (*self.rungs, *self.beside, *self.but_one)
+        return (*self.steps, *self.side_steps, *self.leave_one_out)
 
-    def pairs(self) -> list[tuple[Rung, Rung]]:
+    def pairs(self) -> list[tuple[HierarchyStep, HierarchyStep]]:
         """Each computed step, side steps included, after the one that it is compared with; a step
         after one that failed is left out, because it differs by two assumptions.
         """
-        answered = [rung for rung in self.rungs if rung.response]
-        found = [(a, b) for a, b in pairwise(self.rungs) if a.response and b.response]
-        for rung in self.beside:
-            kept = set(rung.dropped) - {rung.name}
+        answered = [step for step in self.steps if step.response]
+        found = [(a, b) for a, b in pairwise(self.steps) if a.response and b.response]
+        for step in self.side_steps:
+            kept = set(step.dropped) - {step.name}
             before = next((r for r in answered if set(r.dropped) == kept), None)
-            if rung.response and before:
-                found.append((before, rung))
+            if step.response and before:
+                found.append((before, step))
         return found
 
     def effects(self) -> list[Effect]:
         """Effect of each assumption, the largest first; failed steps are left out."""
-        answered = [rung for rung in self.rungs if rung.response]
-        all_of_them = set(self.rungs[-1].dropped)
-        left = [(all_of_them.difference(r.dropped), r) for r in (*self.rungs, *self.but_one)]
-        kept = {names.pop(): rung for names, rung in left if len(names) == 1}
+        answered = [step for step in self.steps if step.response]
+        all_of_them = set(self.steps[-1].dropped)
+        left = [(all_of_them.difference(r.dropped), r) for r in (*self.steps, *self.leave_one_out)]
+        kept = {names.pop(): step for names, step in left if len(names) == 1}
         found = [
-            effect(self.scene, before, rung, answered[-1], kept.get(rung.name))
-            for before, rung in self.pairs()
+            effect(self.scene, before, step, answered[-1], kept.get(step.name))
+            for before, step in self.pairs()
         ]
         return sorted(found, key=lambda e: -e.waveform)
 
 
-def climb(
+def hierarchy_of(
     scene: Scene,
     progress: Progress,
     *,
     h: float | None = None,
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
-) -> Ladder:
+) -> Hierarchy:
     """Compute a scene at every step of the model hierarchy.
 
     Parameters
@@ -132,43 +132,43 @@ def climb(
     ValueError
         If the scene has no body, or the device cannot be.
     """
-    names = ladder(scene)
+    names = droppable(scene)
     check_rate(update_rate)
     if "continuous path" in names:
         held(scene.tacton.trajectory, update_rate, points)  # refuses before anything is computed
     drawn = partial(relaxed, update_rate=update_rate, points=points)
     up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     asked = {tuple(dropped) for _, dropped in up}
-    aside = [(dropped[-1], dropped)] if (dropped := beside(scene)) else []
-    but_one = [
+    aside = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
+    leave_one_out = [
         (f"all but: {name}", tuple(n for n in names if n != name))
         for name in names
         if tuple(n for n in names if n != name) not in asked and can_be_alone(name, names, scene)
     ]
-    todo, found = [*up, *aside, *but_one], []
+    todo, found = [*up, *aside, *leave_one_out], []
     for k, (name, dropped) in enumerate(todo):
         progress(name, k / len(todo))
         found.append(_answered(drawn, scene, name, dropped, h))
     first, second = len(up), len(up) + len(aside)
-    return Ladder(
-        scene=scene, rungs=tuple(found[:first]), beside=tuple(found[first:second]),
-        but_one=tuple(found[second:]),
+    return Hierarchy(
+        scene=scene, steps=tuple(found[:first]), side_steps=tuple(found[first:second]),
+        leave_one_out=tuple(found[second:]),
     )  # fmt: skip
 
 
 def _answered(
     drawn: Callable[[Scene, tuple[str, ...]], tuple[Scene, str]], scene: Scene, name: str,
     dropped: tuple[str, ...], h: float | None,
-) -> Rung:  # fmt: skip
-    rung = {"name": name, "dropped": dropped, "model": "none"}
+) -> HierarchyStep:  # fmt: skip
+    step = {"name": name, "dropped": dropped, "model": "none"}
     try:
         changed, model = drawn(scene, dropped)
-        rung["model"] = model
+        step["model"] = model
         size = h or default_size(scene.body) if named(model).is_reduced else h
         response, seconds, memory = apart(_timed, changed, model, size)
     except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
-        return Rung(**rung, error=str(error))  # type: ignore[arg-type]
-    return Rung(**rung, response=response, seconds=seconds, memory=memory)  # type: ignore[arg-type]
+        return HierarchyStep(**step, error=str(error))  # type: ignore[arg-type]
+    return HierarchyStep(**step, response=response, seconds=seconds, memory=memory)  # type: ignore[arg-type]
 
 
 def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, int]:
@@ -183,7 +183,11 @@ def _timed(scene: Scene, model: str, h: float | None) -> tuple[Response, float, 
 
 
 def effect(
-    scene: Scene, before: Rung, after: Rung, richest: Rung, kept_alone: Rung | None
+    scene: Scene,
+    before: HierarchyStep,
+    after: HierarchyStep,
+    richest: HierarchyStep,
+    kept_alone: HierarchyStep | None,
 ) -> Effect:
     """Effect of the assumption that a step is named by."""
     assert before.response
@@ -209,7 +213,7 @@ def followed_lines(scene: Scene, response: Response) -> dict[str, float]:
     """
     drive = beyond_published(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(scene.pressure, drive=drive)
-    return resolved_lines(pressure, response, candidates=JUDGED, highest=HIGHEST)[0]
+    return resolved_lines(pressure, response, candidates=ASSESSED, highest=HIGHEST)[0]
 
 
 def line_changes(

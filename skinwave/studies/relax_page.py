@@ -15,10 +15,10 @@ from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import png
 from skinwave.plain_text import csv_table
 from skinwave.studies.assumptions import ASSUMPTIONS
-from skinwave.studies.relax import Effect, Ladder, Rung, followed_lines
+from skinwave.studies.relax import Effect, Hierarchy, HierarchyStep, followed_lines
 
 LINE_COLUMNS = (
-    "rung", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_rung_before_db",
+    "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",
     "from_richest_db",
 )  # fmt: skip
 
@@ -37,12 +37,12 @@ def sentence(e: Effect) -> str:
     return f"{text}, and {cost}."
 
 
-def write(folder: Path, found: Ladder) -> None:
+def write(folder: Path, found: Hierarchy) -> None:
     """index.html, relax.png, relax.csv, relax.json and the waveforms, responses.npz."""
     effects = found.effects()
     record = {
         "effects": [asdict(e) for e in effects],
-        "rungs": [_record(rung) for rung in found.every],
+        "steps": [_record(step) for step in found.every],
     }
     (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
     (folder / "relax.csv").write_bytes(csv_table(LINE_COLUMNS, _line_rows(found)))
@@ -65,15 +65,15 @@ def write(folder: Path, found: Ladder) -> None:
         ),
         document.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
         document.table(*effect_table(effects)),
-        document.section("Steps", document.table(*rung_table(found))),
+        document.section("Steps", document.table(*step_table(found))),
     ]
     title = f"{found.scene.name}: assumptions, one by one"
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
 
 
-def efforts(found: Ladder) -> list[tuple[str, Effort]]:
+def efforts(found: Hierarchy) -> list[tuple[str, Effort]]:
     """Effort of each response, by the name of its step."""
-    return [(rung.name, rung.response.effort) for rung in found.every if rung.response]
+    return [(step.name, step.response.effort) for step in found.every if step.response]
 
 
 def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]:
@@ -91,13 +91,13 @@ def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]
     return header, rows
 
 
-def rung_table(found: Ladder) -> tuple[list[str], list[list[str]]]:
+def step_table(found: Hierarchy) -> tuple[list[str], list[list[str]]]:
     """Header and rows of all steps, in the order of the model hierarchy."""
     rows = []
-    for rung in found.every:
-        dofs = f"{rung.response.effort.dofs:,}" if rung.response else ""
-        memory = f"{rung.memory / 2**30:.2f}" if rung.response else ""
-        rows.append([rung.name, rung.model, dofs, f"{rung.seconds:.1f}", memory, rung.error])
+    for step in found.every:
+        dofs = f"{step.response.effort.dofs:,}" if step.response else ""
+        memory = f"{step.memory / 2**30:.2f}" if step.response else ""
+        rows.append([step.name, step.model, dofs, f"{step.seconds:.1f}", memory, step.error])
     return ["step", "model", "dofs", "seconds, all from the start", "GiB", "why not"], rows
 
 
@@ -119,29 +119,29 @@ def figure(effects: list[Effect]) -> Figure:
     return drawn
 
 
-def _record(rung: Rung) -> dict[str, object]:
-    effort = asdict(rung.response.effort) if rung.response else {}
+def _record(step: HierarchyStep) -> dict[str, object]:
+    effort = asdict(step.response.effort) if step.response else {}
     kept = ("name", "dropped", "model", "seconds", "memory", "error")
-    return {name: getattr(rung, name) for name in kept} | {"effort": effort}
+    return {name: getattr(step, name) for name in kept} | {"effort": effort}
 
 
-def _line_rows(found: Ladder) -> Iterator[list[object]]:
+def _line_rows(found: Hierarchy) -> Iterator[list[object]]:
     """Every line's change at each probe, from the step before and from the richest."""
-    richest = [r for r in found.rungs if r.response][-1]
-    for before, rung in found.pairs():
-        assert rung.response
-        names = followed_lines(found.scene, rung.response)
-        ratios = [_ratios(rung, other, names) for other in (before, richest)]
+    richest = [r for r in found.steps if r.response][-1]
+    for before, step in found.pairs():
+        assert step.response
+        names = followed_lines(found.scene, step.response)
+        ratios = [_ratios(step, other, names) for other in (before, richest)]
         for k, (name, f) in enumerate(names.items()):
             for p, (x, y) in enumerate(found.scene.probes):
                 changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
-                yield [rung.name, rung.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
+                yield [step.name, step.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
 
 
-def _ratios(rung: Rung, other: Rung, names: dict[str, float]) -> np.ndarray:
-    assert rung.response
+def _ratios(step: HierarchyStep, other: HierarchyStep, names: dict[str, float]) -> np.ndarray:
+    assert step.response
     assert other.response
-    found = compare(other.response, rung.response, tuple(names.values()))
+    found = compare(other.response, step.response, tuple(names.values()))
     with np.errstate(divide="ignore", invalid="ignore"):
         decibel = 20 * np.log10(found.line_ratios)
     return np.asarray(decibel)

@@ -17,7 +17,7 @@ from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, with_body
-from skinwave.simulation import check_knobs, compute
+from skinwave.simulation import check_options, compute
 from skinwave.studies import paper15
 from skinwave.studies.changes import (
     Drawn,
@@ -29,7 +29,7 @@ from skinwave.studies.changes import (
 )
 from skinwave.studies.claims import evaluate, write_claims
 from skinwave.studies.study_page import (
-    Outcome,
+    StudyOutcome,
     again,
     effort_section,
     efforts,
@@ -65,12 +65,12 @@ def run_study(
     command: str,
     h: float | None = None,
     solver: str = "auto",
-) -> Outcome:
+) -> StudyOutcome:
     """Run every scene, writing each run as it is finished, then the tables and the page.
 
     An interrupt ends the runs early; those that are finished are still compared and written.
     """
-    check_knobs(solver, h=h)
+    check_options(solver, h=h)
     for solid in {s.body for group in scenes.values() for s in group.values()}:
         if solid.of_kind.discretise:
             check_mesh(solid, h or default_size(solid))  # before any run
@@ -81,8 +81,8 @@ def run_study(
         groups, prepared, figures = _answered(scenes, folder, aside, bodies, progress, h, solver)
         figures["overview"] = aside.submit(overview_png, groups)
         runs = [run for group in groups.values() for run in group]
-        outcome = Outcome(
-            verdicts=evaluate(runs),
+        outcome = StudyOutcome(
+            assessed_claims=evaluate(runs),
             warnings=document.worst_warnings(efforts(runs)),
             runs=len(runs),
             planned=sum(map(len, scenes.values())),
@@ -90,7 +90,7 @@ def run_study(
             peak_memory=0,
         )
         progress("write tables", 0.0)
-        write_claims(folder / "claims.csv", outcome.verdicts)
+        write_claims(folder / "claims.csv", outcome.assessed_claims)
         write_lines(folder / "lines.csv", runs)
         by_name = {f"{r.tacton}/{r.body}/{r.model}": r for r in runs}
         write_responses(folder / "responses.npz", by_name)

@@ -20,17 +20,17 @@ from skinwave.run import Run
 from skinwave.scene_file import dumps
 from skinwave.studies import summary, tables
 from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
-from skinwave.studies.claims import Verdict
-from skinwave.studies.description import levels_of, modelled, path_of, tones_of, untold
+from skinwave.studies.claims import AssessedClaim
+from skinwave.studies.description import levels_of, modelled, path_of, tones_of, unresolved
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class StudyOutcome:
     """Outcome of a comparison: assessed claims, warnings, cost, and how much of it was done."""
 
-    verdicts: list[Verdict]
+    assessed_claims: list[AssessedClaim]
     warnings: list[str]
     runs: int
     planned: int
@@ -48,7 +48,7 @@ def write_single(folder: Path, run: Run) -> None:
         *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),
         document.warnings_banner([("", run.response.effort)]),
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
-        *map(document.paragraph, untold([run])),
+        *map(document.paragraph, unresolved([run])),
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
         document.section("The scene", document.preformatted(dumps(run.scene))),
     ]
@@ -60,7 +60,7 @@ def page_parts(
     folder: Path,
     groups: Mapping[str, list[Run]],
     first: Shown | None,
-    outcome: Outcome,
+    outcome: StudyOutcome,
     progress: Progress,
     figures: Mapping[str, Future[bytes]],
 ) -> list[str]:
@@ -74,14 +74,14 @@ def page_parts(
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
         *_introduction(outcome, groups),
-        *map(document.paragraph, untold(runs)),
+        *map(document.paragraph, unresolved(runs)),
         _kept(folder, "overview", overview, OVERVIEW_CAPTION),
         document.section("What propagation changes", summary.per_tacton(changes(groups))),
         document.section(
             "Which of the paper's claims hold where",
             document.paragraph(LEVELS),
-            tables.claims_table(outcome.verdicts),
-            *map(document.paragraph, _disagreements(outcome.verdicts)),
+            tables.claims_table(outcome.assessed_claims),
+            *map(document.paragraph, _disagreements(outcome.assessed_claims)),
         ),
         document.section("What was modelled, and what was left out",
                          *map(document.paragraph, modelled(runs))),
@@ -110,7 +110,7 @@ def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
 
 
 def effort_section(
-    groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: Outcome
+    groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: StudyOutcome
 ) -> str:
     """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]
@@ -156,7 +156,7 @@ def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:
     return document.picture(image, caption, name)
 
 
-def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str]:
+def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> list[str]:
     if outcome.runs == outcome.planned:
         state = f"{len(groups)} Tacton{'s' * (len(groups) != 1)}, {outcome.runs} runs."
     else:
@@ -171,23 +171,23 @@ def _introduction(outcome: Outcome, groups: Mapping[str, list[Run]]) -> list[str
     ]
 
 
-def _disagreements(verdicts: list[Verdict]) -> list[str]:
+def _disagreements(assessed_claims: list[AssessedClaim]) -> list[str]:
     """Claims measured on paper that a body contradicts, and whether propagation is the cause."""
-    of_kernel = {v.claim: v for v in verdicts if v.model == SAME_LOAD.name}
+    of_kernel = {v.claim: v for v in assessed_claims if v.model == SAME_LOAD.name}
     texts = []
-    for verdict in verdicts:
-        kernel = of_kernel.get(verdict.claim)
-        if verdict.body == "none" or not verdict.claim.startswith("M") or verdict.holds:
+    for assessed in assessed_claims:
+        kernel = of_kernel.get(assessed.claim)
+        if assessed.body == "none" or not assessed.claim.startswith("M") or assessed.holds:
             continue
         text = (
-            f"The {label(verdict.body)} contradicts {verdict.claim}, which was measured on paper: "
-            f"{verdict.sentence}."
+            f"The {label(assessed.body)} contradicts {assessed.claim}, which was measured on "
+            f"paper: {assessed.sentence}."
         )
-        if kernel is not None and verdict.claim != "M2":  # which is about places, in Hz
+        if kernel is not None and assessed.claim != "M2":  # which is about places, in Hz
             same = "holds" if kernel.holds else "fails, too"
             text += (
                 f" In the point kernel under the same load it {same}: what decides is "
-                f"{decibel(kernel.value)} dB there and {decibel(verdict.value)} dB here, and that "
+                f"{decibel(kernel.value)} dB there and {decibel(assessed.value)} dB here, and that "
                 "difference is propagation's."
             )
         texts.append(text)

@@ -50,7 +50,7 @@ def sentences(shown: Shown) -> list[str]:
     return [
         _propagated(found),
         _driven(shown.kernel, shown.published),
-        " ".join([_felt(found), _sure(shown)]),
+        " ".join([_above_threshold(found), _sure(shown)]),
     ]
 
 
@@ -69,7 +69,7 @@ def small_table(columns: Sequence[Propagation], name: str) -> str:
         ["strongest component"]
         + [_component(first.kernel_strongest, "Pa"), *(_component(c.strongest) for c in columns)],
         ["component of highest sensation level"]
-        + ["-", *(_felt_most(c.felt_most) for c in columns)],
+        + ["-", *(_highest_sensation(c.highest_sensation) for c in columns)],
     ]
     return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
 
@@ -140,20 +140,20 @@ def _driven(kernel: Run, published: Run) -> str:
     )
 
 
-def _felt(found: Propagation) -> str:
+def _above_threshold(found: Propagation) -> str:
     if found.strongest is None:
         return ""
-    if (peak := found.felt_most) is None or peak.level is None:
+    if (peak := found.highest_sensation) is None or peak.level is None:
         peak = found.strongest
         return (
             f"The strongest component is {peak.name} at {peak.frequency:.0f} Hz; detection "
             "thresholds are of skin and say nothing of paper."
         )
     most = f"most at {peak.name} ({peak.frequency:.0f} Hz, {peak.level:+.0f} dB SL)"
-    if not found.felt:
+    if not found.above_threshold:
         least = f"Below threshold, by least at {most[8:]}."
         return f"Above threshold, {most}." if peak.level >= 0 else least
-    half, now, twice = found.felt
+    half, now, twice = found.above_threshold
     if now is None:
         return f"Below the threshold of detection everywhere, {most}."
     less = "not at all" if half is None else f"{_reach(half)} mm"
@@ -190,7 +190,7 @@ def _component(found: Component | None, unit: str = "m") -> str:
     return f"{found.name}, {found.frequency:.0f} Hz, {said}"
 
 
-def _felt_most(found: Component | None) -> str:
+def _highest_sensation(found: Component | None) -> str:
     if found is None or found.level is None:
         return "-"
     return f"{found.name}, {found.frequency:.0f} Hz, {found.level:+.0f} dB SL"
@@ -211,7 +211,8 @@ def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Markup:
     rows = [
         [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
          "-" if c.delay is None else significant(1e3 * c.delay, 2),
-         _component(c.kernel_strongest, "Pa"), _component(c.strongest), _felt_most(c.felt_most)]
+         _component(c.kernel_strongest, "Pa"), _component(c.strongest),
+         _highest_sensation(c.highest_sensation)]
         for name, columns in found.items()
         for c in columns.values()
     ]  # fmt: skip

@@ -13,20 +13,20 @@ from skinwave.numbers import significant
 from skinwave.pictures.figures import label
 from skinwave.propagation import strongest_component
 from skinwave.run import Run
-from skinwave.studies.claims import TEXTS, Verdict
+from skinwave.studies.claims import TEXTS, AssessedClaim
 
 SILENT = 0.01  # of the strongest probe: where the reference moves less, no misfit is given
 ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
 
 
-def claims_table(verdicts: list[Verdict]) -> Markup:
+def claims_table(assessed_claims: list[AssessedClaim]) -> Markup:
     """Claims down, kernels and bodies across: holds or fails, and the number that decides."""
-    columns = list(dict.fromkeys(v.column for v in verdicts))
-    found = {(v.claim, v.column): v for v in verdicts}
+    columns = list(dict.fromkeys(v.column for v in assessed_claims))
+    found = {(v.claim, v.column): v for v in assessed_claims}
     rows = [
-        [f"{claim}: {TEXTS[claim]}", *(_verdict(found.get((claim, c))) for c in columns)]
+        [f"{claim}: {TEXTS[claim]}", *(_assessed(found.get((claim, c))) for c in columns)]
         for claim in TEXTS
-        if any(claim == verdict.claim for verdict in verdicts)
+        if any(claim == assessed.claim for assessed in assessed_claims)
     ]
     return table(["claim", *map(label, columns)], rows)
 
@@ -107,9 +107,9 @@ def _spread(spread: dict[int, float]) -> str:
     return f"{1e3 * spread[-6]:g} / {1e3 * spread[-20]:g}"
 
 
-def _verdict(verdict: Verdict | None) -> str:
-    if verdict is None:
+def _assessed(assessed: AssessedClaim | None) -> str:
+    if assessed is None:
         return "not assessed"
-    kind, word = ("yes", "holds") if verdict.holds else ("no", "fails")
+    kind, word = ("yes", "holds") if assessed.holds else ("no", "fails")
     template = Markup('<span class="{}">{}</span><br><small>{}</small>')
-    return template.format(kind, word, verdict.sentence)
+    return template.format(kind, word, assessed.sentence)

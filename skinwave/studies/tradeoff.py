@@ -38,7 +38,7 @@ class Candidate:
     """
 
     model: str
-    endless: bool = False
+    half_space: bool = False
     h: float | None = None
     tolerance: float | None = None
     dt: float | None = None
@@ -46,11 +46,11 @@ class Candidate:
     @property
     def name(self) -> str:
         """Name in tables."""
-        knobs = ["half-space"] if self.endless else []
-        knobs += [f"h = {1e3 * self.h:.2f} mm"] if self.h else []
-        knobs += [f"reduced to {self.tolerance:g}"] if self.tolerance else []
-        knobs += [f"dt = {1e3 * self.dt:g} ms"] if self.dt else []
-        return ", ".join([self.model, *knobs])
+        discretisation = ["half-space"] if self.half_space else []
+        discretisation += [f"h = {1e3 * self.h:.2f} mm"] if self.h else []
+        discretisation += [f"reduced to {self.tolerance:g}"] if self.tolerance else []
+        discretisation += [f"dt = {1e3 * self.dt:g} ms"] if self.dt else []
+        return ", ".join([self.model, *discretisation])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ def candidates(scene: Scene) -> list[Candidate]:
     if has_wavenumber_solution(scene):
         found += [Candidate(model=f"flat-body{how}") for how in ("-harmonic", "")]
         if isfinite(scene.body.depth):
-            found.append(Candidate(model="flat-body", endless=True))
+            found.append(Candidate(model="flat-body", half_space=True))
     found += [Candidate(model="fem", h=size) for size in sizes]
     found += [Candidate(model="fem", h=sizes[2], tolerance=t) for t in (0.3, 0.03)]
     if scene.body.air:
@@ -248,14 +248,14 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     os.environ["SKINWAVE_CACHE"] = ""  # a cold run
     started = time.perf_counter()
     if named(candidate.model).is_reduced:
-        knobs = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
-        prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **knobs)  # type: ignore[arg-type]
+        discretisation = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
+        prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **discretisation)  # type: ignore[arg-type]
         response = answer(prepared, scene)
         cold = time.perf_counter() - started
         again = time.perf_counter()
         answer(prepared, scene)
         return response, cold, time.perf_counter() - again, peak_memory()
-    if candidate.endless:
+    if candidate.half_space:
         scene = replace(scene, body=replace(scene.body, depth=inf))
     response = compute(scene, candidate.model, h=candidate.h, dt=candidate.dt)
     cold = time.perf_counter() - started

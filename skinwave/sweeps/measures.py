@@ -9,15 +9,15 @@ import numpy as np
 from simple_model import Response, named_lines, point_kernel, sensation_level
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import JUDGED, Run
+from skinwave.run import ASSESSED, Run
 from skinwave.scene import Scene
-from skinwave.sweeps.variation import Case
+from skinwave.sweeps.variation import DesignPoint
 
 WEAKEST, MOST = 1e-2, 40  # of the strongest line of a load, and lines, that have columns
 SETTLE = 0.25  # of a response, before which it is not looked at
 TEXTS = (
     "key", "status", "error", "model", "asked_model", "version", "name", "scene",
-    "felt_line", "solver", "warnings",
+    "sensation_line", "solver", "warnings",
 )  # fmt: skip
 NUMBERS = (
     "tolerance", "asked_h_mm", "h_mm", "expected_error", "drawing_frequency_hz",
@@ -31,7 +31,7 @@ AT_PROBES = (
 )  # fmt: skip
 
 
-def columns(cases: Iterable[Case]) -> dict[str, str]:
+def columns(cases: Iterable[DesignPoint]) -> dict[str, str]:
     """The columns of a sweep and whether each is "text", "whole", "number" or, at each probe,
     "numbers".
     """
@@ -53,10 +53,10 @@ def columns(cases: Iterable[Case]) -> dict[str, str]:
 
 def _columned(scene: Scene) -> Iterable[str]:
     """Lines that have columns: the strongest of the load, and those that claims are about."""
-    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=JUDGED)
+    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
 
 
-def commanded(case: Case) -> dict[str, Any]:
+def commanded(case: DesignPoint) -> dict[str, Any]:
     """The part of a row that is known before the run."""
     row: dict[str, Any] = {"status": "failed", "error": case.error, "scene": case.text, **case.keys}
     if case.scene:
@@ -91,7 +91,7 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     row |= _kernel(kernel, agreement) | _effort(response)
     if response.unit == "m":
         row |= _motion(response, agreement) | {f"{n}_um": 1e6 * a for n, a in found.items()}
-        row |= _felt(run) if scene.body.is_skin else {}
+        row |= _above_threshold(run) if scene.body.is_skin else {}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 
@@ -117,13 +117,13 @@ def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _felt(run: Run) -> dict[str, Any]:
+def _above_threshold(run: Run) -> dict[str, Any]:
     """Sensation levels of lines and, if all are resolved, the line with the highest."""
     levels = {n: sensation_level(a, run.frequencies[n]) for n, a in run.lines.items()}
     row: dict[str, Any] = {f"{name}_db": level for name, level in levels.items()}
-    if levels and not run.untold:
+    if levels and not run.unresolved:
         row["level_db"] = np.max(list(levels.values()), axis=0)
-        row["felt_line"] = max(levels, key=lambda name: levels[name].max())
+        row["sensation_line"] = max(levels, key=lambda name: levels[name].max())
     return row
 
 

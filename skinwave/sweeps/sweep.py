@@ -20,17 +20,17 @@ from skinwave.planning.assessment import assessed
 from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Scene
-from skinwave.simulation import answered, check_knobs
+from skinwave.simulation import answered, check_options
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import columns, commanded, measured
-from skinwave.sweeps.variation import Case
+from skinwave.sweeps.variation import DesignPoint
 
 BATCH = 8  # runs of one body that are handed out together, at most
 KEPT = 4  # bodies that a worker caches in memory, on two meshes each
 
 
 @dataclass(frozen=True, kw_only=True)
-class Knobs:
+class ModelOptions:
     """Model, tolerance, element size h in metre and solver of every run."""
 
     model: str = "auto"
@@ -51,7 +51,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class SweepOutcome:
     """Result of a sweep: rows `planned`, `found` there before, `done` and `failed` now."""
 
     planned: int
@@ -68,15 +68,15 @@ class Outcome:
 
 
 def sweep(
-    wanted: Sequence[Case],
+    wanted: Sequence[DesignPoint],
     folder: Path,
-    knobs: Knobs,
+    model_options: ModelOptions,
     progress: Progress | None = None,
     *,
     scheduler: str = "processes",
     workers: int | None = None,
     command: Mapping[str, Any] | None = None,
-) -> Outcome:
+) -> SweepOutcome:
     """Run every case that the folder has no row of, and append a row for each.
 
     Parameters
@@ -97,19 +97,20 @@ def sweep(
     """
     started = time.perf_counter()
     report = progress or silent
-    _check(knobs)
+    _check(model_options)
     engine.check(scheduler)
     count = engine.workers(scheduler, workers)
     there = dataset.names(dataset.open_folder(folder, command))
     release = version("skinwave")
-    named = {case.name(release, knobs): case for case in wanted}
+    named = {case.name(release, model_options): case for case in wanted}
     left = {name: case for name, case in named.items() if name not in there}
     index = dataset.numbered(list(named), there)
     types = columns(wanted)
     tally = {"done": 0, "failed": 0}
     constant = {
-        "version": release, "asked_model": knobs.model, "tolerance": knobs.tolerance,
-        "asked_h_mm": 1e3 * knobs.h if knobs.h else None,
+        "version": release, "asked_model": model_options.model,
+        "tolerance": model_options.tolerance,
+        "asked_h_mm": 1e3 * model_options.h if model_options.h else None,
     }  # fmt: skip
 
     def written(rows: Sequence[dict[str, Any]]) -> None:
@@ -124,14 +125,14 @@ def sweep(
     try:
         written([{"key": k} | commanded(case) for k, case in left.items() if not case.scene])
         runs = {name: case for name, case in left.items() if case.scene}
-        meshes = _shared_meshes(runs, knobs, scheduler, count, report)
-        batches = _batches(runs, knobs, meshes, count)
+        meshes = _shared_meshes(runs, model_options, scheduler, count, report)
+        batches = _batches(runs, model_options, meshes, count)
         engine.run_all(
-            partial(_rows, knobs), batches, scheduler, count, lambda k, rows: written(rows)
+            partial(_rows, model_options), batches, scheduler, count, lambda k, rows: written(rows)
         )
     except KeyboardInterrupt:
         interrupted = True
-    return Outcome(
+    return SweepOutcome(
         planned=len(named),
         found=len(named) - len(left),
         **tally,
@@ -154,22 +155,22 @@ def model_of(scene: Scene, asked: str) -> str:
     return "flat-body" if is_exact else "fem"
 
 
-def _check(knobs: Knobs) -> None:
-    check_knobs(knobs.solver, h=knobs.h)
-    choose("model", knobs.model, ("auto", *names()))
-    if not 0 < knobs.tolerance < 1:
-        raise ValueError(f"tolerance = {knobs.tolerance} is outside 0 < tolerance < 1")
+def _check(model_options: ModelOptions) -> None:
+    check_options(model_options.solver, h=model_options.h)
+    choose("model", model_options.model, ("auto", *names()))
+    if not 0 < model_options.tolerance < 1:
+        raise ValueError(f"tolerance = {model_options.tolerance} is outside 0 < tolerance < 1")
 
 
 Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
 
 
-def _solid(case: Case, knobs: Knobs) -> Solid | None:
+def _solid(case: DesignPoint, model_options: ModelOptions) -> Solid | None:
     """Body and probes by which a run shares a reduced body with others, if it does."""
     scene = case.scene
     if (
         scene is None
-        or not named(model_of(scene, knobs.model)).is_reduced
+        or not named(model_of(scene, model_options.model)).is_reduced
         or not scene.body.of_kind.discretise
     ):
         return None
@@ -177,12 +178,16 @@ def _solid(case: Case, knobs: Knobs) -> Solid | None:
 
 
 def _shared_meshes(
-    runs: dict[str, Case], knobs: Knobs, scheduler: str, count: int, report: Progress
+    runs: dict[str, DesignPoint],
+    model_options: ModelOptions,
+    scheduler: str,
+    count: int,
+    report: Progress,
 ) -> dict[Solid, Mesh]:
     """Find a mesh for each body that several runs share, and reduce it, each body once."""
     hardest: dict[Solid, Scene] = {}
     for case in runs.values():
-        if (solid := _solid(case, knobs)) and case.scene:
+        if (solid := _solid(case, model_options)) and case.scene:
             before = hardest.get(solid, case.scene)
             hardest[solid] = max(before, case.scene, key=_highest)
     found: dict[Solid, Mesh] = {}
@@ -193,7 +198,7 @@ def _shared_meshes(
         report("reduce bodies", len(found) / len(solids))
 
     report("reduce bodies", 0.0)
-    engine.run_all(partial(_mesh, knobs), list(hardest.values()), scheduler, count, done)
+    engine.run_all(partial(_mesh, model_options), list(hardest.values()), scheduler, count, done)
     lost = Mesh(error="its worker was killed each time; give it more memory or larger elements")
     return {solid: found.get(solid, lost) for solid in solids}
 
@@ -203,15 +208,15 @@ def _highest(scene: Scene) -> float:
     return max(named_lines(scene.pressure, 1e-2).values(), default=0.0)
 
 
-def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
+def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
     """The mesh that the hardest scene of a body requires; cached on disk for all workers."""
     try:
-        if knobs.h:
-            _prepared(scene.body, scene.probes, knobs.h, knobs)
-            coarser = compared_with(scene.body, knobs.h)
-            _prepared(scene.body, scene.probes, coarser, knobs)
-            return Mesh(h=knobs.h, coarser=coarser)
-        found = refined(scene, scene.body, knobs.tolerance, solver=knobs.solver)
+        if model_options.h:
+            _prepared(scene.body, scene.probes, model_options.h, model_options)
+            coarser = compared_with(scene.body, model_options.h)
+            _prepared(scene.body, scene.probes, coarser, model_options)
+            return Mesh(h=model_options.h, coarser=coarser)
+        found = refined(scene, scene.body, model_options.tolerance, solver=model_options.solver)
         return Mesh(h=found.h, coarser=found.compared)
     except Exception as error:  # any: it is that of every run on this body
         return Mesh(error=_said(error))
@@ -219,27 +224,27 @@ def _mesh(knobs: Knobs, scene: Scene) -> Mesh:
 
 @lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
 def _prepared(
-    body: Body, probes: tuple[tuple[float, float], ...], h: float, knobs: Knobs
+    body: Body, probes: tuple[tuple[float, float], ...], h: float, model_options: ModelOptions
 ) -> Prepared:
-    tolerance = reduction_tolerance(knobs.tolerance)
-    return prepare(body, np.array(probes), h=h, solver=knobs.solver, tolerance=tolerance)
+    tolerance = reduction_tolerance(model_options.tolerance)
+    return prepare(body, np.array(probes), h=h, solver=model_options.solver, tolerance=tolerance)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
     """Runs by name that are handed out together, and the mesh that they share."""
 
-    runs: dict[str, Case]
+    runs: dict[str, DesignPoint]
     mesh: Mesh | None
 
 
 def _batches(
-    runs: dict[str, Case], knobs: Knobs, meshes: dict[Solid, Mesh], count: int
+    runs: dict[str, DesignPoint], model_options: ModelOptions, meshes: dict[Solid, Mesh], count: int
 ) -> list[Batch]:
     """Runs on one body follow each other; others are alone."""
     groups: dict[Solid | None, list[str]] = {}
     for name, case in runs.items():
-        groups.setdefault(_solid(case, knobs), []).append(name)
+        groups.setdefault(_solid(case, model_options), []).append(name)
     # Several batches for each worker, so that none waits long for the last.
     size = max(1, min(BATCH, len(runs) // (4 * count)))
     return [
@@ -250,20 +255,28 @@ def _batches(
     ]
 
 
-def _rows(knobs: Knobs, batch: Batch) -> list[dict[str, Any]]:
+def _rows(model_options: ModelOptions, batch: Batch) -> list[dict[str, Any]]:
     """Run a batch, on a worker."""
-    return [{"key": name} | _row(case, knobs, batch.mesh) for name, case in batch.runs.items()]
+    return [
+        {"key": name} | _row(case, model_options, batch.mesh) for name, case in batch.runs.items()
+    ]
 
 
-def _row(case: Case, knobs: Knobs, mesh: Mesh | None) -> dict[str, Any]:
+def _row(case: DesignPoint, model_options: ModelOptions, mesh: Mesh | None) -> dict[str, Any]:
     row, started = commanded(case), time.perf_counter()
     assert case.scene
     try:
         if mesh is None:
-            model = model_of(case.scene, knobs.model)
-            response = answered(case.scene, model, knobs.tolerance, h=knobs.h, solver=knobs.solver)
+            model = model_of(case.scene, model_options.model)
+            response = answered(
+                case.scene,
+                model,
+                model_options.tolerance,
+                h=model_options.h,
+                solver=model_options.solver,
+            )
         else:
-            response = _on_mesh(case.scene, knobs, mesh)
+            response = _on_mesh(case.scene, model_options, mesh)
             row["h_mm"] = 1e3 * (mesh.h or 0.0)
         if isfinite(response.expected_error):
             row["expected_error"] = response.expected_error
@@ -273,16 +286,16 @@ def _row(case: Case, knobs: Knobs, mesh: Mesh | None) -> dict[str, Any]:
     return row | {"seconds": time.perf_counter() - started}
 
 
-def _on_mesh(scene: Scene, knobs: Knobs, mesh: Mesh) -> Response:
+def _on_mesh(scene: Scene, model_options: ModelOptions, mesh: Mesh) -> Response:
     """Response of a reduced body, with its expected relative error."""
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
-    prepared = _prepared(scene.body, scene.probes, mesh.h, knobs)
+    prepared = _prepared(scene.body, scene.probes, mesh.h, model_options)
     assert mesh.coarser is not None
-    coarse = _prepared(scene.body, scene.probes, mesh.coarser, knobs)
+    coarse = _prepared(scene.body, scene.probes, mesh.coarser, model_options)
     return assessed(
-        scene, answer(prepared, scene), prepared, mesh.h, knobs.tolerance, knobs.solver,
-        compared=(mesh.coarser, coarse),
+        scene, answer(prepared, scene), prepared, mesh.h, model_options.tolerance,
+        model_options.solver, compared=(mesh.coarser, coarse),
     )  # fmt: skip
 
 

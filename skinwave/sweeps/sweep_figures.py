@@ -1,7 +1,7 @@
 """Pictures of a sweep: one column over one or two varied keys (matplotlib)."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from simple_model.choices import choose
 from simple_model.threshold import BAND
 from skinwave.pictures.styles import Style
+from skinwave.sweeps.dataset import Row
 
-Row = Mapping[str, Any]
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
 MOST_NAMED = len(MARKERS)  # curves that a legend names; of more numbers a colour bar does

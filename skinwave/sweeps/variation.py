@@ -34,7 +34,7 @@ class Variation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Case:
+class DesignPoint:
     """One run that is wanted: its `varied` keys, the scene that they make or the `error` why they
     make none, the `keys` of that scene's file, and its `text`.
     """
@@ -45,9 +45,9 @@ class Case:
     scene: Scene | None = None
     error: str = ""
 
-    def name(self, *knobs: object) -> str:
+    def name(self, *model_options: object) -> str:
         """A hash of the complete scene, of the file of its body, and of the solver options."""
-        digest = hashlib.sha256(repr((self.text, *knobs)).encode())
+        digest = hashlib.sha256(repr((self.text, *model_options)).encode())
         if self.scene and self.scene.body.file:
             digest.update(_content(self.scene.body.file))
         return digest.hexdigest()[:24]
@@ -124,7 +124,7 @@ def combinations(
     return [dict(zip(keys, each, strict=True)) for each in met]
 
 
-def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[Case]:
+def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
     """The scenes that a scene file and each combination of values make, each once.
 
     A combination that makes no scene is a case with its error.
@@ -208,7 +208,7 @@ def _split(text: str) -> list[str]:
     return parts
 
 
-def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> Case:
+def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     scene, error, changed = None, "", table
     for key in sorted(varied, key=lambda key: key != BODY):  # the body first, then what is in it
         if key == BODY:
@@ -222,7 +222,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> Case:
     except ValueError as refused:
         error = str(refused)
     keys = _flat(tomllib.loads(text)) | {key: _plain(value) for key, value in varied.items()}
-    return Case(varied=varied, keys=keys, text=text, scene=scene, error=error)
+    return DesignPoint(varied=varied, keys=keys, text=text, scene=scene, error=error)
 
 
 def _body(name: Any) -> Any:
@@ -279,7 +279,7 @@ def _plain(value: Any) -> float | str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _refuse_words(found: Sequence[Case]) -> None:
+def _refuse_words(found: Sequence[DesignPoint]) -> None:
     """Numbers may be out of range in some runs; a word that no run can use is a slip."""
     if all(case.error for case in found):
         raise ValueError(f"no combination makes a scene: {found[0].error}")

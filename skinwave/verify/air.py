@@ -94,7 +94,7 @@ def focus_on_a_sheet_in_air() -> Case:
     )  # fmt: skip
     model = replace(model, outputs=read @ model.basis)
     found = 1e6 * fem.transfer(model, model.basis.T @ force, hz)[..., 0]
-    air, vacuum = (1e6 * _endless(radii, hz, density) for density in (AIR_DENSITY, 0.0))
+    air, vacuum = (1e6 * _infinite(radii, hz, density) for density in (AIR_DENSITY, 0.0))
     checks = [
         misfit(f"{f:g} Hz, 0 to 30 mm, complex, relative L2", ours, theirs, 0.03, "um")
         for f, ours, theirs in zip(hz, found, air, strict=True)
@@ -116,7 +116,7 @@ def focus_on_a_sheet_in_air() -> Case:
     )  # fmt: skip
 
 
-def _endless(radii: Floats, hz: Floats, density: float) -> Complex:
+def _infinite(radii: Floats, hz: Floats, density: float) -> Complex:
     paper = replace(fem.PRESETS["paper"], loss_factor=0.0)
     sheet = thin_sheet(
         replace(paper, viscosity=LAG * paper.shear_modulus), THICKNESS, air_density=density

@@ -13,7 +13,7 @@ from meshes.tetmesh import EDGES
 from skinwave.verify.case import Case, Check, below, described
 from skinwave.verify.references import Floats
 
-Field = Callable[[Floats], Floats]
+DisplacementField = Callable[[Floats], Floats]
 FLATTEST_ANGLE = 0.5  # degrees
 ZIENKIEWICZ = "Zienkiewicz and Taylor, The Finite Element Method, volume 1 (2000)"
 PATCH = f"Irons and Razzaque (1972); {ZIENKIEWICZ}, chapter 10"

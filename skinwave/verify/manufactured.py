@@ -9,7 +9,7 @@ import fem
 import meshes
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from skinwave.verify.case import Case, Plot, below, order, slope
-from skinwave.verify.elements import Field, held_outside, unit
+from skinwave.verify.elements import DisplacementField, held_outside, unit
 from skinwave.verify.references import Floats
 
 DIRECTION = np.array([1.0, 2.0, 3.0])
@@ -21,9 +21,9 @@ MANUFACTURED = "Roache, Verification and Validation in Computational Science and
 class Manufactured:
     """A field (..., 3), its gradient (..., i, j) and the body force (..., 3) that it needs."""
 
-    u: Field
-    gradient: Field
-    force: Field
+    u: DisplacementField
+    gradient: DisplacementField
+    force: DisplacementField
 
 
 def divergence_free(mu: float, lam: float) -> Manufactured:
@@ -59,13 +59,13 @@ def balanced(mu: float, lam: float) -> Manufactured:
 
 def no_locking() -> Case:
     """Errors on one mesh do not grow towards incompressibility."""
-    ladder = (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999)
+    ratios = (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999)
     errors = []
-    for poisson in ladder:
+    for poisson in ratios:
         material = unit(poisson)
         errors.append(_errors(10, material, balanced(1.0, material.first_lame)))
     values, slopes = np.array(errors).T
-    at = [1 / (1 - 2 * poisson) for poisson in ladder]
+    at = [1 / (1 - 2 * poisson) for poisson in ratios]
     return Case(
         title="No locking: pressure and shear of like size, nu = 0.3 to 0.49999",
         source=f"{MANUFACTURED}; Brenner and Sung, Math Comp 59:321 (1992): uniform in lambda "

@@ -72,7 +72,7 @@ def _summary(results: list[Result]) -> str:
                 r.entry.name, r.case.title, _quantity(r.case.worst)
             ),
             *_numbers(r.case.worst),
-            _verdict(r.case.passed),
+            _passed(r.case.passed),
             f"{r.seconds:.1f}",
         ]
         for r in results
@@ -83,10 +83,10 @@ def _summary(results: list[Result]) -> str:
 def _shown(result: Result) -> str:
     """One case on the page."""
     case = result.case
-    rows = [[_quantity(c), *_numbers(c), _verdict(c.passed)] for c in case.checks]
+    rows = [[_quantity(c), *_numbers(c), _passed(c.passed)] for c in case.checks]
     parts = [
         Markup('<h3 id="{}">{} {}</h3>').format(
-            result.entry.name, case.title, _verdict(case.passed)
+            result.entry.name, case.title, _passed(case.passed)
         ),
         Markup("<p><small>Source: {}.<br>Mesh: {}.</small></p>").format(case.source, case.mesh),
         document.table(["quantity", *HEADER, ""], rows),
@@ -149,5 +149,5 @@ def _word(passed: bool) -> str:
     return "passed" if passed else "FAILED"
 
 
-def _verdict(passed: bool) -> str:
+def _passed(passed: bool) -> str:
     return Markup('<span class="{}">{}</span>').format("yes" if passed else "no", _word(passed))

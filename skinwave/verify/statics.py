@@ -19,7 +19,7 @@ from skinwave.verify.references import Floats
 WIDTH = 4.35e-3  # m, standard deviation of the Gaussian focus
 RADII = np.array([0, 5, 10, 15, 20]) * 1e-3
 QUARTER = {"bottom": "xyz", "right": "xyz", "back": "xyz", "left": "x", "front": "y"}
-LADDER = (0.0, 0.45, 0.49, 0.499, 0.4999, 0.49999)
+RATIOS = (0.0, 0.45, 0.49, 0.499, 0.4999, 0.49999)
 
 
 def quarter_space(length: float, growth: float, radius: float, h: float = 0.0025) -> TetMesh:
@@ -110,7 +110,7 @@ def focus_at_rest_on_a_layer() -> Case:
     axis = meshes.graded_axis(0.10, 0.003, meshes.Grading(radius=0.024, growth=1.3))
     mesh = meshes.extrude(axis, axis, np.linspace(-depth, 0, 6))
     answers, closed = [], []
-    for poisson in LADDER:
+    for poisson in RATIOS:
         material = fem.Material(density=1000, shear_modulus=25e3, poisson=poisson)
         u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), focus_force(mesh))
         answers.append(on_axis(mesh, radii) @ u)
@@ -119,10 +119,10 @@ def focus_at_rest_on_a_layer() -> Case:
     found, expected = 1e6 * np.array(answers), 1e6 * np.array(closed)
     checks = []
     for k, (place, bar) in enumerate((("the focus", 0.02), ("10 mm", 0.03))):
-        for nu, f, e in zip(LADDER, found[:, k], expected[:, k], strict=True):
+        for nu, f, e in zip(RATIOS, found[:, k], expected[:, k], strict=True):
             checks.append(relative(f"deflection at {place}, nu = {nu:g}", f, e, bar, "um"))
     errors = 100 * np.abs(found / expected - 1)
-    far = [1 / (1 - 2 * nu) for nu in LADDER]
+    far = [1 / (1 - 2 * nu) for nu in RATIOS]
     return Case(
         title="Gaussian focus on a bonded layer of 15 mm, Poisson's ratio 0 to 0.49999",
         source="Vorovich, Aleksandrov and Babeshko (1974): kernel of a bonded layer",

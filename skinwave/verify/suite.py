@@ -66,7 +66,7 @@ def _statics() -> Iterable[Entry]:
     for nu in (0.49, 0.4999):
         case = partial(statics.focus_at_rest_on_half_space, nu)
         yield Entry(name=f"focus-at-rest-{nu:g}", topic=topic, run=case, slow=True)
-    yield Entry(name="poisson-ladder", topic=topic, run=statics.focus_at_rest_on_a_layer)
+    yield Entry(name="poisson-ratios", topic=topic, run=statics.focus_at_rest_on_a_layer)
     yield Entry(name="stiffness-contrast", topic=topic, run=statics.column_of_two_layers)
 
 

@@ -91,8 +91,8 @@ def rayleigh_speed() -> Case:
     """The speed of surface waves, by formula and from the vibration of half a wavelength."""
     down = meshes.graded_axis(2.5, 0.05, meshes.Grading(radius=0.3, growth=1.15))
     mesh = meshes.extrude(np.linspace(0, 0.5, 11), [0, 0.05], -down[::-1])
-    ladder, checks, measured = (0.0, 0.25, 0.45, 0.4999), [], []
-    for nu in ladder:
+    ratios, checks, measured = (0.0, 0.25, 0.45, 0.4999), [], []
+    for nu in ratios:
         material = fem.Material(density=1, shear_modulus=1, poisson=nu)
         ratio = references.rayleigh_ratio(nu)
         measured.append(_surface_wave(mesh, material))
@@ -111,7 +111,7 @@ def rayleigh_speed() -> Case:
         checks=tuple(checks),
         plot=Plot(
             x="Poisson's ratio", y="c_R / c_s", drawn=("root",),
-            lines={"finite elements": (ladder, measured),
+            lines={"finite elements": (ratios, measured),
                    "root": (fine, [references.rayleigh_ratio(nu) for nu in fine])},
         ),
     )  # fmt: skip

@@ -140,7 +140,7 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
             row[0].plot(*(1e3 * line.T), color="#56B4E9")
         for line in influenced(scene.tacton, scene.pressure.height):
             row[0].plot(*(1e3 * line.T), color="white", ls="dotted")
-        for line in answer.map.felt:
+        for line in answer.map.threshold:
             row[0].plot(*(1e3 * line.T), color="#ff2fd0", lw=1)
         row[0].plot(*(1e3 * answer.response.probes.T), "x", color="white")
         row[0].set(xlabel="x, mm", ylabel="y, mm", title=label(_column(scene, answer)))

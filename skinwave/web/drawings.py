@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from meshes.tetmesh import Floats
 from simple_model import Tacton
 from simple_model.joined import parted
-from skinwave.web.model import Answer, Map
+from skinwave.web.model import Answer, AreaMap
 
 # Of 255; red into the body and blue out of it, as in the pictures of a report. Also in body.js.
 INTO, OUT, STILL = (
@@ -19,7 +19,7 @@ INTO, OUT, STILL = (
 )
 
 
-def picture(found: Map) -> str:
+def picture(found: AreaMap) -> str:
     """RMS of a map as the address of a PNG, from dark (none) to light (its largest)."""
     from PIL import Image
 

@@ -25,7 +25,7 @@ from simple_model.focus import lobe_width
 from simple_model.joined import parted
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.tacton import CARRIER, level, tones
-from skinwave.run import JUDGED
+from skinwave.run import ASSESSED
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.web.moving import Moving
@@ -46,17 +46,17 @@ SMOOTH = 16  # and of the fastest modulation, whose peaks are then within 2 %
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Map:
+class AreaMap:
     """A quantity over the area: `rms` (y, x) of it about its mean, in its unit, NaN outside the
     body, and its detection contour, closed lines (k, 2) in metre.
     """
 
     rms: Floats
-    felt: tuple[Floats, ...]
+    threshold: tuple[Floats, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Line:
+class LineAtPoint:
     """A line at a point: `amplitude` in the unit of the model, and `sensation` in dB above the
     threshold of detection, None of a pressure.
     """
@@ -77,8 +77,8 @@ class Answer:
     response: Response
     frequencies: Floats
     spectrum: Floats
-    lines: tuple[Line, ...]
-    map: Map
+    lines: tuple[LineAtPoint, ...]
+    map: AreaMap
     moving: Moving | None = None
 
 
@@ -106,7 +106,9 @@ def as_published(scene: Scene) -> Answer:
     )
 
 
-def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | None = None) -> Answer:
+def answer_of(
+    scene: Scene, response: Response, found: AreaMap, moving: Moving | None = None
+) -> Answer:
     """Spectrum, named lines and map of a response at one point, as a page shows them."""
     f, amplitude = spectrum(response)
     shown = f <= HIGHEST
@@ -116,29 +118,29 @@ def answer_of(scene: Scene, response: Response, found: Map, moving: Moving | Non
     )  # fmt: skip
 
 
-def named_lines(scene: Scene, response: Response) -> tuple[Line, ...]:
+def named_lines(scene: Scene, response: Response) -> tuple[LineAtPoint, ...]:
     """The lines of a load in a response, the strongest first; and by their kind peaks that are no
     single one of them, such as a free vibration.
     """
-    table = line_table(scene.pressure, response, candidates=JUDGED, most=MOST_LINES,
+    table = line_table(scene.pressure, response, candidates=ASSESSED, most=MOST_LINES,
                        highest=HIGHEST, settle=UNTRUSTED)  # fmt: skip
-    felt = response.unit == "m" and scene.body.is_skin
+    is_skin = response.unit == "m" and scene.body.is_skin
     peaks = table.unnamed[:MOST_PEAKS]
     amplitudes = [(n, f, float(table.amplitudes[n][0])) for n, f in table.frequencies.items()]
     amplitudes += [(f"{x.kind}, {x.frequency:.0f} Hz", x.frequency, float(x.amplitudes[0]))
                    for x in peaks]  # fmt: skip
     found = [
-        Line(name=name, frequency=f, amplitude=a,
-             sensation=float(sensation_level(a, f)) if felt else None)
+        LineAtPoint(name=name, frequency=f, amplitude=a,
+             sensation=float(sensation_level(a, f)) if is_skin else None)
         for name, f, a in amplitudes
     ]  # fmt: skip
     found.sort(key=lambda line: -line.amplitude)
     return tuple(x for x in found if x.amplitude > FAINTEST * max(found[0].amplitude, 1e-300))
 
 
-def untold_lines(scene: Scene, response: Response) -> tuple[str, ...]:
+def unresolved_lines(scene: Scene, response: Response) -> tuple[str, ...]:
     """Names of lines that the response is too short to tell from 0 Hz or from each other."""
-    return tuple(resolved_lines(scene.pressure, response, candidates=JUDGED, highest=HIGHEST,
+    return tuple(resolved_lines(scene.pressure, response, candidates=ASSESSED, highest=HIGHEST,
                                 settle=UNTRUSTED)[1])  # fmt: skip
 
 
@@ -149,7 +151,7 @@ def places(side: int = SIDE) -> Floats:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-def kernel_map(pressure: MovingPressure) -> Map:
+def kernel_map(pressure: MovingPressure) -> AreaMap:
     """RMS pressure about its mean, of a rhythm while a pulse is on; and the contour where the line
     with the highest sensation level, of a rhythm with its pauses, is at the threshold of skin.
     """
@@ -163,8 +165,8 @@ def kernel_map(pressure: MovingPressure) -> Map:
     f, amplitudes = f[f > 1e-6], np.abs(amplitudes[f > 1e-6])
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
-    felt = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
-    return Map(rms=rms, felt=borderline(np.maximum(felt, FAINTEST_LEVEL), 0.0))
+    highest = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
+    return AreaMap(rms=rms, threshold=borderline(np.maximum(highest, FAINTEST_LEVEL), 0.0))
 
 
 def mean_level(pressure: MovingPressure) -> float:

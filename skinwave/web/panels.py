@@ -95,7 +95,7 @@ def area(name: str, marked: str, said: str, shown: str = "true") -> None:
             '<path :d="influenced" fill="none" stroke="black" stroke-width="1.1"/>'
             '<path :d="influenced" fill="none" stroke="white" stroke-width="0.9" '
             'stroke-dasharray="0.1 1.8" stroke-linecap="round"/>'
-            f'<path :d="{name}.felt" fill="none" stroke="#ff6fd0" stroke-width="0.7"/>'
+            f'<path :d="{name}.threshold" fill="none" stroke="#ff6fd0" stroke-width="0.7"/>'
             '<path :d="path" fill="none" stroke="#56B4E9" stroke-width="0.9"/>'
             '<circle v-for="(at, k) in foci_at" :key="k" :cx="at[0]" :cy="at[1]" r="1.8" '
             'fill="none" stroke="#56B4E9" stroke-width="1"/>'
@@ -195,7 +195,7 @@ def line_table() -> None:
             "<td>{{ row.displacement }}</td><td>{{ row.level }}</td>",
             v_for="row in rows", key="row.name",
         )  # fmt: skip
-    html.P("{{ untold }}", v_if="untold", id="untold", style="font-size: 0.86rem")
+    html.P("{{ unresolved }}", v_if="unresolved", id="unresolved", style="font-size: 0.86rem")
 
 
 def notices() -> None:

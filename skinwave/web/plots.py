@@ -26,7 +26,7 @@ SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (
          "all": (0.0, np.inf)}  # fmt: skip
 ROOM = 1.4  # of the tallest line of a spectrum, for names above it
 KERNEL = f"{LABELS['point-kernel']}, Pa"
-Plot = dict[str, Any]
+PlotlyFigure = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,7 +59,7 @@ def span_of(name: str, duration: float) -> tuple[float, float]:
     return start, min(end, duration)
 
 
-def commanded_plot(pressure: MovingPressure, start: float, end: float) -> Plot:
+def commanded_plot(pressure: MovingPressure, start: float, end: float) -> PlotlyFigure:
     """The commanded signal between two times in s: with its carrier or, where that cannot be
     resolved, its envelope.
     """
@@ -87,7 +87,7 @@ def commanded_plot(pressure: MovingPressure, start: float, end: float) -> Plot:
     }  # fmt: skip
 
 
-def waveform_plot(curves: Curves, span: tuple[float, float]) -> Plot:
+def waveform_plot(curves: Curves, span: tuple[float, float]) -> PlotlyFigure:
     """Pressure by the point kernel and displacement of the body at the selected point, between two
     times in s.
     """
@@ -104,7 +104,7 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> Plot:
     }  # fmt: skip
 
 
-def spectrum_plot(curves: Curves, highest: float = 600.0) -> Plot:
+def spectrum_plot(curves: Curves, highest: float = 600.0) -> PlotlyFigure:
     """The spectra at the selected point, their lines named, and the detection threshold."""
     data, waves = [], curves.waves
     for answer, style in _styled(curves):
@@ -153,7 +153,7 @@ def waves_name(answer: Answer, stale: bool = False) -> str:
 def _threshold_curve(highest: float) -> dict[str, Any]:
     f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
     return {
-        "role": "felt", "name": f"threshold (±{BAND:g} dB)", "dash": "dash", "axis": "y2",
+        "role": "threshold", "name": f"threshold (±{BAND:g} dB)", "dash": "dash", "axis": "y2",
         "x": numbers(f), "y": numbers(1e6 * threshold(f)),
     }  # fmt: skip
 
@@ -161,8 +161,8 @@ def _threshold_curve(highest: float) -> dict[str, Any]:
 def _pressure_curve(highest: float) -> dict[str, Any]:
     f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
     return {
-        "role": "felt", "name": "threshold on skin, from AM at 200 Hz", "dash": "dash", "axis": "y",
-        "x": numbers(f), "y": numbers(pressure_threshold(f)),
+        "role": "threshold", "name": "threshold on skin, from AM at 200 Hz", "dash": "dash",
+        "axis": "y", "x": numbers(f), "y": numbers(pressure_threshold(f)),
     }  # fmt: skip
 
 
@@ -196,7 +196,7 @@ def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
 
 
 def _axes(
-    data: Sequence[Plot], second: str, most: float | None = None, room: float = 1.08
+    data: Sequence[PlotlyFigure], second: str, most: float | None = None, room: float = 1.08
 ) -> dict[str, Any]:
     """Both axes with one zero; `second` is what the second shows and `most` the largest that it has
     to show, `room` what there is above the largest, over it.

@@ -36,7 +36,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
-        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "untold": "",
+        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -53,7 +53,9 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         "kernel_map": _map(kernel), "wave_map": _map(waves),
         "own_speeds": drawings.speeds(tacton) if tacton.trajectory.shape == "recorded" else "",
         "rows": drawings.rows(kernel, None if stale else waves),
-        "untold": untold(len(model.untold_lines(scene, kernel.response)), tacton.duration),
+        "unresolved": unresolved(
+            len(model.unresolved_lines(scene, kernel.response)), tacton.duration
+        ),
     })  # fmt: skip
     told = [kernel] if waves is None or stale else [kernel, waves]
     state.summary = summary(scene, told)
@@ -123,7 +125,7 @@ def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
     ]
 
 
-def untold(count: int, duration: float) -> str:
+def unresolved(count: int, duration: float) -> str:
     """Unresolved lines, which the table leaves out, of a Tacton of this duration in s."""
     if not count:
         return ""
@@ -147,10 +149,10 @@ def foci(state: Any, scene: Scene) -> None:
 
 def _map(answer: Answer | None) -> dict[str, Any]:
     if answer is None:
-        return {"picture": "", "felt": "", "ends": []}
+        return {"picture": "", "threshold": "", "ends": []}
     found, unit = answer.map, answer.response.unit
     return {
         "picture": drawings.picture(found),
-        "felt": drawings.drawn(found.felt),
+        "threshold": drawings.drawn(found.threshold),
         "ends": drawings.ends(float(np.nanmax(found.rms, initial=0.0)), unit),
     }

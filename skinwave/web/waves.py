@@ -51,7 +51,7 @@ from skinwave.web.model import (
     FAINTEST_LEVEL,
     SIDE,
     Answer,
-    Map,
+    AreaMap,
     answer_of,
     at_any_speed,
     borderline,
@@ -89,7 +89,7 @@ class Reduced:
     rows: NDArray[np.float32]
 
 
-class Waves:
+class BodyResponses:
     """Responses of bodies; caches what the next one can use."""
 
     def __init__(self) -> None:
@@ -216,18 +216,18 @@ def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
     return f[strongest], w[strongest]
 
 
-def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> Map:
+def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> AreaMap:
     """The map of lines (f,) in Hz whose complex amplitudes (f, SIDE^2) in metre are known, of a
     rhythm while a pulse is on; and the contour where the line with the highest sensation level, of
     a rhythm with its pauses as in the table of lines, is at the threshold, which a sheet has not.
     """
     amplitudes = np.abs(motion)
-    felt = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
-    shown = felt if scene.body.is_skin else felt[:0]
+    levels = sensation_level(mean_level(scene.pressure) * amplitudes, frequencies[:, None])
+    shown = levels if scene.body.is_skin else levels[:0]
     level = shown.max(axis=0, initial=FAINTEST_LEVEL)
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = np.where(np.isnan(rms), np.nan, level.reshape(SIDE, SIDE))
-    return Map(rms=rms, felt=borderline(level, 0.0))
+    return AreaMap(rms=rms, threshold=borderline(level, 0.0))
 
 
 def _steady(pressure: MovingPressure) -> MovingPressure:

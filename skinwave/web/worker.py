@@ -22,12 +22,12 @@ def answer_forever(pipe: Connection) -> None:
     Sends ("progress", number, Step), then the response with its number or ("failed", number,
     sentence).
     """
-    from skinwave.web.waves import Waves
+    from skinwave.web.waves import BodyResponses
 
     end_with_parent()
     with contextlib.suppress(AttributeError, OSError):
         os.nice(5)  # the page comes first
-    waves = Waves()
+    waves = BodyResponses()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
             number, scene, moving = pipe.recv()

@@ -245,7 +245,7 @@
     const style = getComputedStyle(canvas), own = (name) => style.getPropertyValue(name).trim();
     const ink = own("--sw-ink"), faint = own("--sw-grid"), paper = own("--sw-paper");
     const colours = Object.fromEntries(
-      ["kernel", "published", "waves", "pinned", "felt"].map((role) => [role, own(`--sw-${role}`)]));
+      ["kernel", "published", "waves", "pinned", "threshold"].map((role) => [role, own(`--sw-${role}`)]));
     const g = canvas.getContext("2d"), said = entries(g, figure, canvas.clientWidth);
     plot.top = said.top;
     const at = scales(plot), { box } = at;
