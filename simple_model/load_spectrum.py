@@ -90,6 +90,26 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     )
 
 
+def pressure_lines(
+    pressure: MovingPressure, points: Floats, threshold: float = 1e-6
+) -> tuple[Floats, Complex]:
+    """Load spectrum at points of the surface.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    points : (n, 2 or 3) float, metre
+    threshold : as of `load_lines`
+
+    Returns
+    -------
+    frequencies : (f,) float, Hz, of the distinct lines
+    amplitudes : (f, n) complex, Pa
+    """
+    spots = pressure.spot(points, path_samples(pressure)) * path_weights(pressure)[:, None]
+    return load_lines(pressure, threshold).gather(path_fourier(spots.T).T)
+
+
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
     """Load spectrum in reduced coordinates.
 

@@ -14,7 +14,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
 from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
+from simple_model.load_spectrum import load_lines, pressure_lines
 from skinwave.bodies.analytic import exact_waves, has_exact_waves
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
@@ -71,10 +71,7 @@ def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceMap:
     """The pressure itself, in Pa, at places x (nx,) and y (ny,) in metre."""
 
     def answer(places: Floats) -> Lines:
-        lines = load_lines(pressure, FAINT)
-        spots = pressure.spot(places, path_samples(pressure)) * path_weights(pressure)[:, None]
-        frequencies, amplitudes = lines.gather(path_fourier(spots.T).T)
-        return np.asarray(frequencies, np.float64), amplitudes
+        return pressure_lines(pressure, places, FAINT)
 
     return _mapped(pressure, answer, x, y, "Pa")
 

@@ -22,6 +22,7 @@ from simple_model.flat_body import flat_body
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
 from simple_model.material import PRESETS
 from skinwave import Body, Scene, simulate
+from skinwave.pictures.views import kernel_view
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
 
@@ -315,3 +316,12 @@ def test_what_cannot_be_is_refused_with_the_cure(build, said):
     with pytest.raises(ValueError, match=said) as error:
         build()
     assert "\n" not in str(error.value)
+
+
+def test_the_picture_of_a_pressure_has_the_levels_of_its_recording():
+    load = MovingPressure(tacton=Tacton(trajectory=wandering(), duration=0.03))
+    scene = Scene(pressure=load, body=Body(kind="none"), probes=((0.0, 0.0),))
+    shown = kernel_view(scene, np.array([0.012, 0.012]), (0.03, 1200))
+    truth = load(shown.points, np.arange(1200) * 0.03 / 1200).std(axis=0)
+    assert np.linalg.norm(shown.rms - truth) < 0.02 * np.linalg.norm(truth)
+    assert np.abs(shown.motion[..., 2].mean(axis=0)).max() < 0.02 * truth.max()

@@ -14,13 +14,7 @@ import fem
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.load_spectrum import (
-    load_lines,
-    path_fourier,
-    path_samples,
-    path_weights,
-    synthesise,
-)
+from simple_model.load_spectrum import load_lines, path_samples, pressure_lines, synthesise
 from simple_model.sampling import resolving_step, shown
 from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
@@ -185,9 +179,7 @@ def harmonic_answer(
                 f"this load has {count:,} lines from {len(knots):,} positions, the limits are "
                 f"{MOST_LINES:,} and {MOST_KNOTS:,}; take --model fem"
             )
-        weights = path_weights(scene.pressure)[:, None]
-        spots = path_fourier((scene.pressure.spot(points, knots) * weights).T)
-        frequencies, pressures = lines.gather(spots.T)
+        frequencies, pressures = pressure_lines(scene.pressure, points, threshold)
         if not scene.body.is_held:  # under its mean an unconstrained body would drift
             frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 import fem
 from meshes import reading
 from meshes.tetmesh import Floats, Ints
-from simple_model import Effort, MovingPressure, sensation_level
-from simple_model.load_spectrum import load_lines, merge_lines, path_fourier, path_samples
+from simple_model import Effort, sensation_level
+from simple_model.load_spectrum import pressure_lines
 from simple_model.response import UNITS
 from skinwave.fitting import effort_of, fitting
 from skinwave.models.reduction import oscillating
@@ -159,7 +159,7 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = No
     """
     pressure = scene.pressure
     points, triangles = _grid(reach)
-    frequencies, patterns = _pressure_lines(pressure, points)
+    frequencies, patterns = pressure_lines(pressure, points)
     moving = frequencies > 0
     amplitudes = np.abs(patterns[moving])
     fastest = _fastest(frequencies[moving], (amplitudes**2).sum(axis=1))
@@ -170,7 +170,7 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = No
     levels = sensation_level(amplitudes, frequencies[moving][:, None], unit="Pa")
 
     def trace(places: Floats, t: Floats) -> Floats:
-        f, of_place = _pressure_lines(pressure, places)
+        f, of_place = pressure_lines(pressure, places)
         return pressure(places, t) - of_place[f == 0].real.sum(axis=0)
 
     return View(
@@ -294,13 +294,6 @@ def _grid(reach: Floats) -> tuple[Floats, Ints]:
     b = a + GRID
     triangles = np.vstack([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
     return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
-
-
-def _pressure_lines(pressure: MovingPressure, points: Floats) -> tuple[Floats, fem.Complex]:
-    """Distinct frequencies (g,) in Hz and the load's complex lines (g, n) in Pa at points."""
-    lines = load_lines(pressure)
-    of_path = path_fourier(pressure.spot(points, path_samples(pressure)).T).T
-    return merge_lines(lines.frequencies, lines.coefficients[:, None] * of_path[lines.harmonics])
 
 
 def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
