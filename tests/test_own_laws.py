@@ -2,6 +2,7 @@
 
 import importlib
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -58,6 +59,10 @@ CUBIC = DriveLaw(
     name="cubic", degree=3,
     pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 3,
 )  # fmt: skip
+
+SOFT = DriveLaw(
+    name="soft", degree=1, pressure=lambda A, M, m: np.asarray(A) ** 2 * (1 + m * M) / (1 + m)
+)
 
 
 def scene(material=TWO, **load):
@@ -116,7 +121,7 @@ def test_levels_that_are_no_factor_are_refused():
     assert MovingPressure(tacton=beaten, drive=CUBIC).weight(0.0) == 1.0
 
 
-@pytest.mark.parametrize("law", [CUBIC, *DRIVES.values()])
+@pytest.mark.parametrize("law", [CUBIC, SOFT, *DRIVES.values()])
 def test_levels_are_exported_by_the_inverse_of_the_law(law):
     path = Trajectory(
         shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
@@ -311,6 +316,9 @@ def answers(element, material):
 
 def test_an_element_is_as_stiff_as_the_closed_form_at_each_frequency(element):
     found = answers(element, TWO)
+    again = replace(TWO, prony=(*TWO.prony, TWO.prony[0]))  # two terms of one time
+    doubled = replace(TWO, prony=(PronyTerm(modulus=16e3, time=0.4e-3), TWO.prony[1]))
+    np.testing.assert_allclose(answers(element, again), answers(element, doubled), rtol=1e-12)
     modulus = found[0] / found[1:] * 20e3  # without inertia
     np.testing.assert_allclose(modulus, closed_form(2 * np.pi * HERTZ[1:]), rtol=1e-6)
 
@@ -401,13 +409,28 @@ time_s = 3e-3
     )
 
 
+def test_stepping_and_reduction_with_two_terms_are_the_harmonic_motion(element):
+    mesh, force, S = element
+    ops = fem.assemble(mesh, TWO)
+    assert [branch.time for branch in ops.branches] == [0.4e-3, 3e-3]
+    expected = (S @ fem.harmonic(ops, force, 140.0)[0])[0]
+    model = fem.reduce(ops, S, 500.0, 1e-6)
+    reduced = fem.transfer(model, (model.basis.T @ force)[:, None], 140.0)[0, 0, 0]
+    assert reduced == pytest.approx(expected, rel=1e-5)
+    dt, w = 2.5e-5, 2 * np.pi * 140.0
+    states = islice(fem.transient(ops, lambda t: force * np.sin(w * t), dt), 3001)
+    found = np.array([(S @ state.displacement)[0] for state in states])[-600:]
+    steady = (expected * np.exp(1j * w * dt * np.arange(2401, 3001))).imag
+    assert np.abs(found - steady).max() < 2e-3 * abs(expected)
+
+
 @pytest.mark.slow
 def test_elements_from_rest_are_the_wavenumber_integral_with_two_terms():
     """A slab so lossy and large that its clamped sides are not seen."""
-    wide = replace(scene(), body=replace(scene().body, width=0.08, height=0.08))
+    wide = replace(scene(), body=replace(scene().body, width=0.06, height=0.06))
     expected = compute(wide, "flat-body").displacement
     found = compute(wide, "fem", h=0.004).displacement
-    assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
+    assert np.linalg.norm(found - expected) < 0.08 * np.linalg.norm(expected)
     one = replace(wide.body, material=replace(TWO, prony=TWO.prony[:1]))
     other = compute(replace(wide, body=one), "flat-body").displacement
-    assert np.linalg.norm(other - expected) > 0.08 * np.linalg.norm(expected)
+    assert np.linalg.norm(other - expected) > 0.2 * np.linalg.norm(expected)
