@@ -1,7 +1,7 @@
 """Sparse direct solvers behind one interface: `factorise(A).solve(b)`.
 
 All of them factorise symmetric matrices, real or complex. MKL PARDISO and CHOLMOD are used if
-they are installed; SciPy's SuperLU with a nested-dissection ordering needs nothing.
+they are installed; SciPy's SuperLU needs nothing.
 """
 
 import ctypes
@@ -10,13 +10,13 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
 Array = NDArray[Any]  # float64 or complex128
@@ -84,12 +84,18 @@ def _singular(detail: object) -> ValueError:
 
 
 def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
-    """SuperLU without pivoting on a nested-dissection ordering."""
-    order = dissect(A)
+    """SuperLU without pivoting, ordered by METIS, or by minimum degree where pymetis is missing.
+
+    The factor by minimum degree has, over that by METIS, 0.93 times the entries for a sheet of
+    93,000 dofs, 1.07 for a palm of 31,000, 1.26 and 1.54 for slabs of 40,000 and 78,000.
+    """
+    metis = find_spec("pymetis") is not None
+    order = dissect(A) if metis else np.arange(A.shape[0])
     permuted = sparse.csc_array(A[order][:, order])
+    ordering = "NATURAL" if metis else "MMD_AT_PLUS_A"
     options = {"SymmetricMode": True}
     try:
-        lu = splu(permuted, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+        lu = splu(permuted, permc_spec=ordering, diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise _singular(error) from None
 
@@ -102,13 +108,12 @@ def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
 
 
 def dissect(A: sparse.csr_array) -> NDArray[np.int64]:
-    """Fill-reducing ordering (n,) of a symmetric matrix by nested dissection of its graph.
+    """Fill-reducing ordering (n,) of a symmetric matrix: METIS's nested dissection of its graph.
 
-    METIS orders it where pymetis is installed; else halves are split off along the middle
-    level of a breadth-first search from a peripheral vertex (George and Liu, SIAM J Numer Anal
-    15:1053, 1978). Degrees of freedom with the same neighbours, as the components of one node, are
-    ordered as one.
+    Degrees of freedom with the same neighbours, as the components of one node, are ordered as one.
     """
+    import pymetis
+
     n = A.shape[0]
     marks = np.random.default_rng(0).random(n)
     pattern = sparse.csr_array((np.ones(A.nnz), A.indices, A.indptr), shape=A.shape)
@@ -117,50 +122,10 @@ def dissect(A: sparse.csr_array) -> NDArray[np.int64]:
     graph = sparse.csr_array(pattern[first] @ members.T)
     graph.setdiag(0)
     graph.eliminate_zeros()
-    try:
-        import pymetis
-    except ImportError:
-        groups = _dissect_by_levels(graph)
-    else:
-        adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
-        groups = np.asarray(pymetis.nested_dissection(adjacency)[0])
+    groups = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))[0]
     rank = np.empty(len(first), np.int64)
     rank[groups] = np.arange(len(first))
     return np.argsort(rank[group], kind="stable")
-
-
-def _dissect_by_levels(graph: sparse.csr_array) -> NDArray[np.int64]:
-    todo, ordered = [np.arange(graph.shape[0])], []
-    while todo:  # last in, first out: a separator is numbered after both its halves
-        part = todo.pop()
-        if len(part) <= 60 or (split := _split(graph[part][:, part])) is None:
-            ordered.append(part)
-            continue
-        left, right, separator = split
-        ordered.append(part[separator])
-        todo += [part[left], part[right]]
-    return np.concatenate(ordered[::-1])
-
-
-def _split(
-    graph: sparse.csr_array,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]] | None:
-    """Two halves of a graph and the vertex separator between them, or None."""
-    start = 0
-    for _ in range(3):  # each search starts from the vertex that was farthest from the last
-        level: Array = csgraph.dijkstra(graph, indices=start, unweighted=True)
-        if not np.isfinite(level).all():
-            apart = ~np.isfinite(level)
-            return np.flatnonzero(~apart), np.flatnonzero(apart), np.zeros(0, np.int64)
-        start = int(np.argmax(level))
-    middle = int(np.median(level))
-    left, right = np.asarray(level < middle), np.asarray(level > middle)
-    if not (left.any() and right.any()):
-        return None
-    # Only those of the middle level that touch the far side need separate the two.
-    touching = (level == middle) & (graph @ right.astype(float) > 0)
-    left |= (level == middle) & ~touching
-    return np.flatnonzero(left), np.flatnonzero(right), np.flatnonzero(touching)
 
 
 def _cholmod():  # type: ignore[no-untyped-def]
