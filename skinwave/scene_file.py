@@ -12,7 +12,7 @@ from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.trajectory import BY_POINTS
 from skinwave.scene import KINDS, Body, Placement, Scene, kind_of
-from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked
+from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked, renamed
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
@@ -71,7 +71,7 @@ def loads(text: str) -> Scene:
     except RecursionError:
         raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
-    top = checked("scene", table, sections)
+    top = checked("scene", renamed(table), sections)
     parts = {
         section: checked(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()

@@ -295,9 +295,9 @@ SECTIONS = {
     "body": {
         "kind": _word("kind"),
         "material": SceneKey("material", _material, _write_material),
-        "width_mm": _scaled("width", 1e3),
-        "height_mm": _scaled("height", 1e3),
-        "depth_mm": _scaled("depth", 1e3),
+        "size_x_mm": _scaled("width", 1e3),
+        "size_y_mm": _scaled("height", 1e3),
+        "thickness_mm": _scaled("depth", 1e3),
         "base": _word("base"),
         "sides": _word("sides"),
         "layers": SceneKey("layers", _layers, _write_layers),
@@ -319,6 +319,29 @@ SECTIONS = {
         "points_mm": SceneKey("probes", _points, _write_points),
     },
 }
+
+
+# Keys of [body] in version 0.2, which load for one release.
+RENAMED = {"width_mm": "size_x_mm", "height_mm": "size_y_mm", "depth_mm": "thickness_mm"}
+
+
+def renamed(table: dict[str, Any]) -> dict[str, Any]:
+    """A scene's table with today's keys for those of version 0.2, and a warning for each.
+
+    Raises
+    ------
+    ValueError
+        If a length is given by both.
+    """
+    body = table.get("body")
+    if not isinstance(body, dict) or not RENAMED.keys() & body.keys():
+        return table
+    for old in sorted(body.keys() & RENAMED.keys()):
+        new = RENAMED[old]
+        if new in body:
+            raise ValueError(f"[body] has both {old} and {new}, which are one; leave out {old}")
+        warnings.warn(f"[body] {old} is now {new}; rename it", FutureWarning, stacklevel=3)
+    return table | {"body": {RENAMED.get(key, key): value for key, value in body.items()}}
 
 
 def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:

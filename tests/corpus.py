@@ -21,9 +21,9 @@ name = "small"
 am_frequency_hz = 200
 duration_s = 0.02
 [body]
-width_mm = 30
-height_mm = 30
-depth_mm = 6
+size_x_mm = 30
+size_y_mm = 30
+thickness_mm = 6
 sides = "clamped"
 [probes]
 points_mm = [[0, 0], [5, 0]]
@@ -39,8 +39,8 @@ shape = "circle"
 size_mm = 10
 speed_m_per_s = 6
 [body]
-width_mm = 60
-height_mm = 60
+size_x_mm = 60
+size_y_mm = 60
 [probes]
 points_mm = [[0, 0], [10, 0]]
 """
@@ -49,7 +49,7 @@ NUMBERS = {
     "tacton": ("amplitude_percent", "am_frequency_hz", "second_am_frequency_hz",
                "envelope_frequency_hz", "duration_s", "size_mm", "speed_m_per_s"),
     "focus": ("height_mm", "depth_of_modulation", "peak_pressure_pa"),
-    "body": ("width_mm", "height_mm", "depth_mm"),
+    "body": ("size_x_mm", "size_y_mm", "thickness_mm"),
     "body.material": ("density_kg_m3", "shear_modulus_pa", "poisson", "viscosity_pa_s",
                       "loss_factor"),
     "[body.material.prony]": ("modulus_pa", "time_s"),
@@ -115,8 +115,8 @@ WHOLE_FILES = {
     "incompressible": "[body.material]\n" + MATERIAL.replace("0.45", "0.5"),
     "beyond Poisson": "[body.material]\n" + MATERIAL.replace("0.45", "-1.0"),
     "unconstrained": "[body]\nbase = 'free'\nsides = 'free'",
-    "infinite sheet": "[body]\nkind = 'sheet'\ndepth_mm = inf",
-    "path off the body": "[tacton]\nshape = 'square'\nsize_mm = 60\n[body]\nwidth_mm = 59",
+    "infinite sheet": "[body]\nkind = 'sheet'\nthickness_mm = inf",
+    "path off the body": "[tacton]\nshape = 'square'\nsize_mm = 60\n[body]\nsize_x_mm = 59",
     "drawn too fast": "[tacton]\nshape = 'circle'\nsize_mm = 1e-300\nspeed_m_per_s = 1e300",
     "polyline without points": "[tacton]\nshape = 'polyline'",
     "points of a circle": "[tacton]\nshape = 'circle'\npoints_mm = [[0, 0], [1, 1]]",
@@ -151,12 +151,12 @@ WHOLE_FILES = {
     "above the array": "[focus]\nheight_mm = 601",
 }
 ABSURD = {
-    "elements of a hundredth of a millimetre": ("", "width_mm = 1000", "--h", "0.01"),
-    "elements of an atom": ("", "depth_mm = 6", "--h", "1e-7"),
+    "elements of a hundredth of a millimetre": ("", "size_x_mm = 1000", "--h", "0.01"),
+    "elements of an atom": ("", "thickness_mm = 6", "--h", "1e-7"),
     "a strip of two metres": (
-        "kind = 'sheet'\n", "width_mm = 2e3\nheight_mm = 10.1", "--h", "0.1",
+        "kind = 'sheet'\n", "size_x_mm = 2e3\nsize_y_mm = 10.1", "--h", "0.1",
     ),
-    "a floating strip of two metres": ("base = 'free'\n", "width_mm = 2e3", "--h", "0.2"),
+    "a floating strip of two metres": ("base = 'free'\n", "size_x_mm = 2e3", "--h", "0.2"),
 }  # fmt: skip
 
 

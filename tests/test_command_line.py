@@ -197,7 +197,7 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(
         "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n"
-        '[body]\nwidth_mm = 30\nheight_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
+        '[body]\nsize_x_mm = 30\nsize_y_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
     )
     for model, cause in (
         ("fem", "elements of 15 mm will have a relative error"),
@@ -216,8 +216,8 @@ def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monke
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
     (tmp_path / "scene.toml").write_text(
         '[tacton]\nam_frequency_hz = 140\nshape = "point"\nduration_s = 0.05\n'
-        '[body]\nkind = "sheet"\nmaterial = "paper"\nwidth_mm = 40\nheight_mm = 40\n'
-        'depth_mm = 0.1\nbase = "free"\nsides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n'
+        '[body]\nkind = "sheet"\nmaterial = "paper"\nsize_x_mm = 40\nsize_y_mm = 40\n'
+        'thickness_mm = 0.1\nbase = "free"\nsides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n'
     )
     assert main(["run", "scene.toml", "--tolerance", "0.001", "--quiet"]) == 0
     said = capsys.readouterr().err

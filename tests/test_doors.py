@@ -21,13 +21,12 @@ from skinwave.simulation import answered, compute
 
 POINT = '[tacton]\nshape = "circle"\nsize_mm = 6\nspeed_m_per_s = 3\nduration_s = 0.05\n'
 AM = POINT + "am_frequency_hz = 140\n"
-SMALL = "width_mm = 40\nheight_mm = 40\ndepth_mm = 8\n"
+SMALL = "size_x_mm = 40\nsize_y_mm = 40\nthickness_mm = 8\n"
 PROBES = "[probes]\npoints_mm = [[0, 0], [5, 0]]\n"
 SLAB = f'{AM}[body]\n{SMALL}sides = "clamped"\n{PROBES}'
 PAPER = f'{AM}[focus]\npeak_pressure_pa = PRESSURE\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
-PAPER += (
-    f'width_mm = 40\nheight_mm = 40\ndepth_mm = 0.1\nbase = "free"\nsides = "clamped"\n{PROBES}'
-)
+PAPER += "size_x_mm = 40\nsize_y_mm = 40\nthickness_mm = 0.1\n"
+PAPER += f'base = "free"\nsides = "clamped"\n{PROBES}'
 SOFT_PAPER, STIFF_PAPER = PAPER.replace("PRESSURE", "2000"), PAPER.replace("PRESSURE", "2")
 
 # What is warned of, the scene, the arguments, and part of the sentence.

@@ -120,7 +120,7 @@ def reported(folder):
 
 
 def compared(folder):
-    body = {"width_mm": 30, "height_mm": 30, "depth_mm": 6, "sides": "clamped"}
+    body = {"size_x_mm": 30, "size_y_mm": 30, "thickness_mm": 6, "sides": "clamped"}
     (folder / "scene.toml").write_text(table(body=body), encoding="utf-8")
     out = ["--out", str(folder / "out"), "--quiet"]
     assert main(["compare", str(folder / "scene.toml"), "--h", "6", *out]) == 0

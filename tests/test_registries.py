@@ -57,7 +57,7 @@ def test_a_scene_of_a_new_kind_is_read_and_written(disc):
     assert disc.body.depth == 0.02
     assert loads(dumps(disc)) == disc
     with pytest.raises(ValueError, match="one diameter"):
-        loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nwidth_mm = 60'))
+        loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nsize_x_mm = 60'))
     with pytest.raises(ValueError, match='relief is for kind = "palm", not "cylinder"'):
         loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nrelief = {}'))
 

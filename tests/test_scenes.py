@@ -1,6 +1,7 @@
 """Scene files: defaults, refusals, and the round trip from text to scene and back."""
 
 import re
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -85,13 +86,13 @@ WRONG = {
     "[probes]\npoints_mm = [[51, 0]]": "probe (51, 0) mm is off the body",
     "[probes]\npoints_mm = []": "give at least one probe",
     "[probes]\npoints_mm = [[0, nan]]": "coordinates must be finite",
-    "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nwidth_mm = 50": "path reaches 30 mm",
+    "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nsize_x_mm = 50": "path reaches 30 mm",
     "[body]\nkind = 'slap'": "did you mean 'slab'",
     "[body]\nmaterial = 'palms'": "did you mean 'palm'",
     "[body]\nbase = 'free'\nsides = 'free'": "unconstrained and drifts",
-    "[body]\ndepth_mm = -1": "must be finite and above 0",
-    "[body]\ndepth_mm = 15000": "body depth = 15 m is more than 2 m, the limit",
-    "[body]\nwidth_mm = 1e5": "body width = 100 m is more than 2 m, the limit",
+    "[body]\nthickness_mm = -1": "must be finite and above 0",
+    "[body]\nthickness_mm = 15000": "body depth = 15 m is more than 2 m, the limit",
+    "[body]\nsize_x_mm = 1e5": "body width = 100 m is more than 2 m, the limit",
     "[body.material]\ndensity_kg_m3 = 1000": "lacks shear_modulus_pa and poisson",
     "[tacton\n": "not valid TOML",
 }
@@ -132,3 +133,26 @@ def test_nothing_is_suggested_for_nonsense(text):
 def test_a_word_in_capitals_is_near():
     with pytest.raises(ValueError, match="did you mean 'palm'"):
         loads("[body]\nmaterial = 'PALM'")
+
+
+OLD = """
+[body]
+kind = "slab"
+width_mm = 60
+height_mm = 50
+depth_mm = 12
+"""
+
+
+def test_a_scene_of_0_2_loads_with_a_warning():
+    with pytest.warns(FutureWarning, match="is now") as told:
+        body = loads(OLD).body
+    assert (body.width, body.height, body.depth) == (0.06, 0.05, 0.012)
+    assert sorted(str(each.message) for each in told) == [
+        "[body] depth_mm is now thickness_mm; rename it",
+        "[body] height_mm is now size_y_mm; rename it",
+        "[body] width_mm is now size_x_mm; rename it",
+    ]
+    assert "thickness_mm = 12.0" in dumps(replace(loads("[body]"), body=body))
+    with pytest.raises(ValueError, match="both depth_mm and thickness_mm"):
+        loads("[body]\ndepth_mm = 12\nthickness_mm = 12")

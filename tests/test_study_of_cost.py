@@ -46,8 +46,8 @@ name = "short"
 am_frequency_hz = 140
 duration_s = 0.05
 [body]
-width_mm = 60
-height_mm = 60
+size_x_mm = 60
+size_y_mm = 60
 [probes]
 points_mm = [[0, 0], [5, 0]]
 """
@@ -56,7 +56,7 @@ points_mm = [[0, 0], [5, 0]]
 def test_the_plan_takes_exact_waves_where_there_are_any():
     assert plan(loads(SHORT)).model == "flat-body"
     assert plan(loads("[body]\nkind = 'none'")).model == "point-kernel"
-    assert plan(loads("[body]\ndepth_mm = inf")).model == "flat-body"
+    assert plan(loads("[body]\nthickness_mm = inf")).model == "flat-body"
 
 
 LOSSLESS = (
@@ -87,8 +87,8 @@ def test_elements_of_a_body_that_loses_nothing_balance_their_energy():
     "text",
     [
         "[body]\nkind = 'sheet'",
-        "[body]\nsides = 'free'\nwidth_mm = 26\nheight_mm = 26",
-        "[focus]\nprofile = 'array'\n[body]\nwidth_mm = 40\nheight_mm = 40",
+        "[body]\nsides = 'free'\nsize_x_mm = 26\nsize_y_mm = 26",
+        "[focus]\nprofile = 'array'\n[body]\nsize_x_mm = 40\nsize_y_mm = 40",
     ],
 )
 def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text):
@@ -157,8 +157,8 @@ def test_what_free_sides_send_back_is_judged_in_time(material, width, duration, 
 duration_s = {duration}
 [body]
 sides = "free"
-width_mm = {width}
-height_mm = {width}
+size_x_mm = {width}
+size_y_mm = {width}
 material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
              viscosity_pa_s={viscosity}}}
 """.replace(",\n", ",")
@@ -171,7 +171,7 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
 
 @pytest.mark.parametrize("depth", [1, 8.4, 15, 60, 300])
 def test_slabs_are_refined_along_all_axes_alike(depth):
-    body = loads(f"[body]\ndepth_mm = {depth}").body
+    body = loads(f"[body]\nthickness_mm = {depth}").body
     sizes = element_sizes(body)
     layers = np.array([cell_layers(body, h) for h in sizes])
     assert (np.diff(sizes) < 0).all()
@@ -188,7 +188,7 @@ def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
     """Also if the step to it is a short one."""
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.1)
     scene = loads(
-        "[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'\nwidth_mm = 60\nheight_mm = 60"
+        "[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'\nsize_x_mm = 60\nsize_y_mm = 60"
     )
     found = refined(scene, scene.body, 0.01)
     assert found.h == pytest.approx(2.1 * default_size(scene.body))
@@ -244,7 +244,7 @@ def test_what_is_expected_of_a_mesh_is_near_its_true_error(h):
 
 
 def test_a_body_that_nothing_holds_is_warned_of():
-    text = SHORT.replace("width_mm = 60", 'width_mm = 30\nbase = "absorbing"')
+    text = SHORT.replace("size_x_mm = 60", 'size_x_mm = 30\nbase = "absorbing"')
     scene = loads(text)
     assert any("is unconstrained" in said for said in plan(scene, 0.3, h=0.01).warnings)
     steady = compute(scene, "fem-harmonic", h=0.01).displacement
@@ -271,7 +271,7 @@ def test_a_layers_own_loss_factor_is_warned_of_too():
 
 def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
     """However long the body has been pushed."""
-    text = SHORT.replace("width_mm = 60", 'width_mm = 30\nbase = "free"\nsides = "absorbing"')
+    text = SHORT.replace("size_x_mm = 60", 'size_x_mm = 30\nbase = "free"\nsides = "absorbing"')
     scenes = [loads(text.replace("0.05", seconds)) for seconds in ("0.1", "1")]
     found = [refined(scene, scene.body, 0.05, h=0.0075).error for scene in scenes]
     assert found[0] == pytest.approx(found[1], rel=0.02)
@@ -280,7 +280,7 @@ def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
 
 def test_a_body_without_loss_is_judged_by_its_load():
     lossless = "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.45}"
-    scene = loads(SHORT.replace("width_mm = 60", f"width_mm = 30\n{lossless}"))
+    scene = loads(SHORT.replace("size_x_mm = 60", f"size_x_mm = 30\n{lossless}"))
     frequencies, _ = response_spectrum(scene, 0.05)
     assert 140 in frequencies
     assert has_wavenumber_solution(scene)  # from rest
@@ -321,15 +321,15 @@ def test_a_layer_that_no_mesh_of_a_palm_resolves_is_refused_in_one_way(h):
 @pytest.mark.parametrize("sides", ["free", "clamped"])
 def test_sides_that_reflect_are_where_they_are(sides):
     soft = "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.499, viscosity_pa_s=2}"
-    text = f"{SHORT}\n[body]\nsides = '{sides}'\nwidth_mm = 100\nheight_mm = 100\n{soft}"
-    body = loads(text.replace("[body]\nwidth_mm = 60\nheight_mm = 60\n", "", 1)).body
+    text = f"{SHORT}\n[body]\nsides = '{sides}'\nsize_x_mm = 100\nsize_y_mm = 100\n{soft}"
+    body = loads(text.replace("[body]\nsize_x_mm = 60\nsize_y_mm = 60\n", "", 1)).body
     required = plan(replace(loads(SHORT), body=body), 0.05, h=0.015)
     assert required.model == "fem"
     assert required.body == body
 
 
 def test_only_as_much_of_a_body_is_meshed_as_waves_come_back_from():
-    wide = "[focus]\nprofile = 'main_lobe'\n[body]\nwidth_mm = 600\nheight_mm = 40"
+    wide = "[focus]\nprofile = 'main_lobe'\n[body]\nsize_x_mm = 600\nsize_y_mm = 40"
     probes = "\n[probes]\npoints_mm = [[0, 0]]"
     required = plan(loads("[tacton]\nam_frequency_hz = 200\n" + wide + probes), 0.4)
     assert required.body.width < 0.3
@@ -350,8 +350,8 @@ duration_s = 0.05
 {path}
 [body]
 sides = "clamped"
-width_mm = 60
-height_mm = 60
+size_x_mm = 60
+size_y_mm = 60
 [probes]
 points_mm = [[0, 0], [-5, 3]]
 """

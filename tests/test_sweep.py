@@ -46,17 +46,17 @@ def refused(capsys, *arguments):
 
 
 def test_a_factorial_is_every_value_with_every_other():
-    met = combinations(varied("tacton.speed_m_per_s=1:12:12", "body.depth_mm=10,15"))
+    met = combinations(varied("tacton.speed_m_per_s=1:12:12", "body.thickness_mm=10,15"))
     assert len(met) == 24
-    assert met[0] == {"tacton.speed_m_per_s": 1.0, "body.depth_mm": 10}
-    assert met[-1] == {"tacton.speed_m_per_s": 12.0, "body.depth_mm": 15}
+    assert met[0] == {"tacton.speed_m_per_s": 1.0, "body.thickness_mm": 10}
+    assert met[-1] == {"tacton.speed_m_per_s": 12.0, "body.thickness_mm": 15}
 
 
 def test_zipped_values_meet_in_turn_and_must_be_as_many():
-    met = combinations(varied("tacton.size_mm=5:15:3", "body.depth_mm=9,10,11"), "zip")
+    met = combinations(varied("tacton.size_mm=5:15:3", "body.thickness_mm=9,10,11"), "zip")
     assert [tuple(each.values()) for each in met] == [(5, 9), (10, 10), (15, 11)]
     with pytest.raises(ValueError, match="lists of one length, not of 3, 2"):
-        combinations(varied("tacton.size_mm=5:15:3", "body.depth_mm=9,10"), "zip")
+        combinations(varied("tacton.size_mm=5:15:3", "body.thickness_mm=9,10"), "zip")
 
 
 def test_a_latin_hypercube_meets_every_stratum_once_and_is_the_same_again():
@@ -81,7 +81,7 @@ def test_any_key_of_a_scene_can_be_varied(scene):
     assert [len(case.scene.probes) for case in found] == [1, 2, 1, 2]
     bodies = cases(scene, combinations(varied("body=skin-slab,palm,none")))
     assert [case.scene.body.kind for case in bodies] == ["slab", "palm", "none"]
-    assert len(cases(scene, combinations(varied("body.depth_mm=10,10.0,15")))) == 2
+    assert len(cases(scene, combinations(varied("body.thickness_mm=10,10.0,15")))) == 2
 
 
 def test_rows_say_what_was_commanded_and_what_came_out(scene):
@@ -106,14 +106,18 @@ def test_rows_say_what_was_commanded_and_what_came_out(scene):
 
 
 def test_a_failing_combination_is_a_row_with_its_error(scene):
-    rows = swept("--vary", "body.width_mm=60,10", "tacton.size_mm=10,50,70", "body.depth_mm=15,inf")
+    rows = swept(
+        "--vary", "body.size_x_mm=60,10", "tacton.size_mm=10,50,70", "body.thickness_mm=15,inf"
+    )
     failed = [row["error"] for row in rows if row["status"] == "failed"]
     assert len(rows) == 12
     assert len(failed) == 8
     assert sum("off the body" in error for error in failed) == 4
     assert sum("outside 0..60 mm" in error for error in failed) == 4
-    rows = swept("--vary", "body.depth_mm=15,inf", "tacton.size_mm=11", "--model", "fem", "--h", 15)
-    errors = {row["body.depth_mm"]: row["error"] for row in rows if row["tacton.size_mm"] == 11}
+    rows = swept(
+        "--vary", "body.thickness_mm=15,inf", "tacton.size_mm=11", "--model", "fem", "--h", 15
+    )
+    errors = {row["body.thickness_mm"]: row["error"] for row in rows if row["tacton.size_mm"] == 11}
     assert errors[15] == ""
     assert "inf has no mesh" in errors[np.inf]
 
@@ -136,7 +140,7 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
     counted = lambda *a, **k: prepared.append((a, k)) or inner(*a, **k)  # noqa: E731
     monkeypatch.setattr(sweeping, "prepare", counted)
     sweeping._prepared.cache_clear()
-    rows = swept("--vary", "tacton.speed_m_per_s=2:8:6", "body.depth_mm=12,13",
+    rows = swept("--vary", "tacton.speed_m_per_s=2:8:6", "body.thickness_mm=12,13",
                  "--model", "fem", "--h", 10, "--workers", 1)  # fmt: skip
     assert {row["status"] for row in rows} == {"done"}
     assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
@@ -144,7 +148,12 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
 
 
 def test_each_row_says_how_wrong_its_mesh_is(scene):
-    smaller = ["body.width_mm=40", "body.height_mm=40", "body.depth_mm=8", "body.sides=clamped"]
+    smaller = [
+        "body.size_x_mm=40",
+        "body.size_y_mm=40",
+        "body.thickness_mm=8",
+        "body.sides=clamped",
+    ]
     rows = swept(
         "--vary", "tacton.am_frequency_hz=80,300", *smaller, "--model", "fem", "--tolerance", 0.3
     )
@@ -165,7 +174,7 @@ def test_wrong_keys_and_values_are_one_sentence(scene, capsys):
     assert "whole number" in ask("tacton.size_mm=1:2:2.5")
     assert "add :n" in ask("tacton.size_mm=1:2")
     assert "no combination makes a scene" in ask("tacton.size_mm=70,80")
-    assert "runs are outside" in ask("tacton.size_mm=1:2:1000", "body.depth_mm=1:2:1000")
+    assert "runs are outside" in ask("tacton.size_mm=1:2:1000", "body.thickness_mm=1:2:1000")
     assert "lhs needs it" in ask("tacton.size_mm=1:2", "--design", "lhs")
     assert "design 'latin' is unknown" in ask("tacton.size_mm=1,2", "--design", "latin")
     assert "below 1" in ask("tacton.size_mm=1,2", "--workers", "0")
@@ -317,7 +326,7 @@ def test_a_latin_hypercube_is_drawn_as_points_with_the_other_key_as_colour():
     points = heat.axes[0].collections[0]
     np.testing.assert_allclose(points.get_offsets()[:, 0], [row[speed] for row in rows])
     np.testing.assert_allclose(points.get_array(), [row["peak_um"] for row in rows])
-    third = [row | {"body.depth_mm": 10.0 + k} for k, row in enumerate(rows)]
+    third = [row | {"body.thickness_mm": 10.0 + k} for k, row in enumerate(rows)]
     alone = sweep_figures.line_figure(third, "peak_um", speed, None, style("report"))
     assert [line.get_linestyle() for line in alone.axes[0].lines] == ["None"]
 
@@ -468,3 +477,8 @@ def test_killed_workers_and_drivers_lose_no_row_and_double_none(scene, cluster):
     with driver("--workers", "2") as process:
         assert process.wait() == 0
     whole(dataset.read(Path("cut")), 12)
+
+
+def test_keys_of_0_2_are_varied_by_todays_names():
+    with pytest.warns(FutureWarning, match="depth_mm is now thickness_mm"):
+        assert parse("body.depth_mm=10,15").key == "body.thickness_mm"

@@ -49,6 +49,6 @@ def compliance(body: Body) -> Compliance:
     """
     if body.of_kind.compliance is None:
         raise ValueError(
-            "flat-body is for a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
+            "flat-body is for a sheet, a slab on a clamped base, or thickness_mm = inf; use fem"
         )
     return body.of_kind.compliance(body)

@@ -16,6 +16,7 @@ from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.parts import FLAT, PLAIN, Layer, Placement, Relief, check_material, solid_of
 
 BASES = ("clamped", "absorbing", "free")
+KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
 LARGEST = 2.0  # m: a body of more was meant in mm
 
 
@@ -73,7 +74,7 @@ class Body:
                 raise ValueError(
                     f"body {name} = {length:g} m is more than {LARGEST:g} m, the limit of a body; "
                     f"lengths are in metre here and in mm in a scene file, so that "
-                    f"{length:g} mm are {name} = {length / 1e3:g}, or {name}_mm = {length:g}"
+                    f"{length:g} mm are {name} = {length / 1e3:g}, or {KEYS[name]} = {length:g}"
                 )
         if kind.discretise and self.base == self.sides == "free":
             raise ValueError(

@@ -34,7 +34,7 @@ def checked(body: Body, h: float, slack: float = 1.0) -> float:
         return h
     if not isfinite(body.depth):
         exact = "use --model flat-body or " if has_exact_waves(body) else ""
-        raise ValueError(f"depth_mm = inf has no mesh; {exact}give a finite depth")
+        raise ValueError(f"thickness_mm = inf has no mesh; {exact}give a finite depth")
     longest = max(body.width, body.height, body.depth)
     if h > longest:
         raise ValueError(

@@ -59,7 +59,7 @@ def compliance(body: Body) -> Compliance:
     """
     if body.base != "clamped" and isfinite(body.depth):
         raise ValueError(
-            "flat-body is for a sheet, a slab on a clamped base, or depth_mm = inf; use fem"
+            "flat-body is for a sheet, a slab on a clamped base, or thickness_mm = inf; use fem"
         )
     return slab(body.solid, body.depth) if isfinite(body.depth) else half_space(body.solid)
 

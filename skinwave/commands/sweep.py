@@ -31,7 +31,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument(
         "--vary", action="extend", nargs="+", metavar="KEY=VALUES", required=True,
-        help="tacton.speed_m_per_s=1:12:12, body.depth_mm=10,15, body=skin-slab,palm; "
+        help="tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, body=skin-slab,palm; "
         "start:stop of lhs",
     )  # fmt: skip
     parser.add_argument("--design", default="factorial", help="factorial (default), zip or lhs")

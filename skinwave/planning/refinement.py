@@ -214,7 +214,7 @@ def convergence(
     interest (k, p) that were found with both; or they make the `same` mesh.
     """
     if same:
-        outcome = Convergence.SINGLE_MESH if body.kind == "mesh" else Convergence.SAME_MESH
+        outcome = Convergence.SINGLE_MESH if body.file else Convergence.SAME_MESH
         return outcome, UNESTIMATED[outcome]
     error = CONTROLLER.error(*found, coarser_by(body, *sizes))
     return Convergence.NOT_REACHED if error > tolerance else Convergence.REACHED, error

@@ -66,7 +66,7 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
     """Warning of rigid-body drift under a load with non-zero mean."""
     if scene.body.is_held or not mean_gain(scene):
         return ()
-    half_space = ", or take depth_mm = inf" if scene.body.of_kind.is_layer else ""
+    half_space = ", or take thickness_mm = inf" if scene.body.of_kind.is_layer else ""
     return (
         "this body is unconstrained and drifts under a pressure with non-zero mean: only motion "
         f"about the mean counts; clamp its base or its sides{half_space}",

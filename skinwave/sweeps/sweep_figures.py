@@ -29,7 +29,7 @@ NAMES = {
     "peak_um": "largest displacement", "rms_um": "RMS displacement about its mean",
     "level_db": "sensation level", "tacton.speed_m_per_s": "drawing speed",
     "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
-    "body.depth_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
+    "body.thickness_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
     "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
     "kernel_delay_ms": "delay behind the point kernel",
     "expected_error": "expected error of the mesh",

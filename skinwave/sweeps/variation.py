@@ -17,7 +17,7 @@ from meshes import reading
 from simple_model.choices import choose, meant
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, loads, read
-from skinwave.scene_keys import MATERIAL, SECTIONS
+from skinwave.scene_keys import MATERIAL, SECTIONS, renamed
 
 DESIGNS = ("factorial", "zip", "lhs")
 MOST_RUNS = 100_000
@@ -135,7 +135,7 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint
         If the file is no scene, no combination makes one, or a word is refused by each it is in.
     """
     base = read(path)
-    table = tomllib.loads(content(path))
+    table = renamed(tomllib.loads(content(path)))
     if base.body.file:
         table["body"]["file"] = base.body.file
     complete = tomllib.loads(dumps(base))
@@ -170,6 +170,9 @@ def _known(key: str) -> str:
     """The key, if a scene has it; parts of a value, as in body.material.poisson, are checked when
     the scene is read.
     """
+    head, _, name = key.partition(".")
+    if head == BODY:  # by today's name
+        key = ".".join([head, *renamed({BODY: {name: None}})[BODY]]) if name else key
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     if key != BODY and ".".join(key.split(".")[:2]) not in known:
         hint = meant(key, known) or "; a key is of the form tacton.size_mm"
