@@ -21,10 +21,10 @@ from simple_model.rhythm import ROLES
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import Body, Scene, SkinwaveWarning, dumps, loads
+from skinwave.bodies.body import BASES
 from skinwave.models import names
 from skinwave.models.prepared import prepare, reduced_lines
 from skinwave.planning.plan import plan
-from skinwave.scene import BASES
 from skinwave.simulation import compute, simulate
 
 
