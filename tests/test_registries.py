@@ -7,14 +7,14 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
-import cylinder  # noqa: F401
 import numpy as np
 import pytest
-import static_deflection
 
 import skinwave
+from skinwave import extensions, models
 from skinwave.bodies import BODIES, KINDS, Body, BodyKind, register
 from skinwave.bodies.build import build
 from skinwave.cli import main
@@ -37,6 +37,21 @@ kind = "cylinder"
 points_mm = [[0, 0], [10, 0], [25, 0]]
 """
 MESH = ["--h", "8", "--quiet"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def static_deflection():
+    """The modules from outside; what they register is gone afterwards, for all other tests."""
+    registries = (KINDS, BODIES, models._MODELS)
+    before = [dict(registry) for registry in registries]
+    import_module("cylinder")
+    yield import_module("static_deflection")
+    for registry, records in zip(registries, before, strict=True):
+        registry.clear()
+        registry.update(records)
+    os.environ.pop(extensions.VARIABLE)
+    for name in ("cylinder", "static_deflection"):
+        del sys.modules[name]
 
 
 @pytest.fixture
@@ -107,7 +122,7 @@ def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
     assert main(["sweep", "disc.toml", *bodies, *MESH, "--scheduler", "threads"]) == 0
 
 
-def test_a_new_model_runs(disc, capsys):
+def test_a_new_model_runs(disc, capsys, static_deflection):
     found = skinwave.simulate(disc, "static-deflection")
     assert found.model == "static-deflection"
     pressure = disc.pressure(disc.probe_points, found.times[7])
@@ -139,7 +154,7 @@ def test_both_models_are_compared_in_python(disc):
     assert skinwave.compare(static, waves).relative_l2.shape == (3,)
 
 
-def test_names_are_given_once():
+def test_names_are_given_once(static_deflection):
     with pytest.raises(ValueError, match="'slab' is registered already"):
         register(BodyKind(name="slab"))
     with pytest.raises(ValueError, match="'fem' is registered already"):
