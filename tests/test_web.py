@@ -26,6 +26,7 @@ from simple_model import (
 )
 from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import lobe_width, spot_width
+from skinwave.bodies import KINDS
 from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
 from skinwave.models import speeds
@@ -530,7 +531,7 @@ def test_tabulated_waves_follow_paths_of_their_own(scene, more):
 
 @pytest.mark.slow
 def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    monkeypatch.setitem(KINDS, "sheet", replace(KINDS["sheet"], interactive_size=5e-3))
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
     paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
     values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
@@ -553,7 +554,7 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
 
 @pytest.mark.parametrize("air", [False, True])
 def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    monkeypatch.setitem(KINDS, "sheet", replace(KINDS["sheet"], interactive_size=5e-3))
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=air)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
     answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
@@ -575,7 +576,7 @@ def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
 
 @pytest.mark.slow
 def test_a_palm_answers(monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "palm", 12e-3)
+    monkeypatch.setitem(KINDS, "palm", replace(KINDS["palm"], interactive_size=12e-3))
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
     answered, said = waves.BodyResponses(), []
     shown = answered(scenes.scene_of(values), lambda *told: said.append(told), moving=True)
