@@ -26,8 +26,19 @@ class Refused(MeshError):
 
 
 def read(script: Path, path: Path, *arguments: object, folder: str | os.PathLike[str]) -> None:
-    """Run a script that reads a file, with time and memory by the file's size; raises what `run`
-    does, and MeshError where it takes too long or the file is too large.
+    """Run a script that reads a file, with time and memory by the file's size.
+
+    Parameters
+    ----------
+    script : file of Python
+    path : file that it reads, its first argument
+    arguments : its further arguments
+    folder : in which it runs
+
+    Raises
+    ------
+    MeshError
+        If it takes too long or the file is too large, or as `run` does.
     """
     if (size := path.stat().st_size) > LARGEST:
         raise MeshError(
@@ -49,14 +60,21 @@ def run(
     memory: float = math.inf,
     environment: Mapping[str, str] | None = None,
 ) -> str:
-    """Run a script in a folder; what it printed. It ends with this process, however that ends,
-    imports nothing from the folder, and finds these packages.
+    """Run a script in a folder. It ends with this process, however that ends, imports nothing from
+    the folder, and finds these packages.
 
     Parameters
     ----------
+    script : file of Python
+    arguments : those of the script
+    folder : in which it runs
     timeout : float, second.
     memory : float, byte, where the platform knows such limits.
     environment : variables that it has beside those of this process.
+
+    Returns
+    -------
+    all that it printed
 
     Raises
     ------

@@ -98,11 +98,20 @@ def slab(material: Material, depth: float) -> Compliance:
 def thin_sheet(
     material: Material, thickness: float, *, air_density: float = AIR_DENSITY
 ) -> Compliance:
-    """Infinite thin sheet of `thickness` metre: G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2], m =
-    rho d, D* = mu* d^3 / 6 (1 - nu); air_density 0 for vacuum.
+    """Infinite thin sheet: G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2].
 
-    The deflection of an infinite sheet under a static load has no bound: motion is given about a
-    mean that is left out, G = 0 at w = 0.
+    m = rho d, D* = mu* d^3 / 6 (1 - nu). The deflection of an infinite sheet under a static load
+    has no bound: motion is given about a mean that is left out, G = 0 at w = 0.
+
+    Parameters
+    ----------
+    material : Material
+    thickness : metre
+    air_density : kg/m3; 0 for vacuum
+
+    Returns
+    -------
+    Compliance, m/Pa
     """
     mass_per_area = material.density * thickness
 

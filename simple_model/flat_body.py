@@ -65,15 +65,20 @@ def point_response(
     *,
     negligible: float = 0.0,
 ) -> Complex:
-    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa and standard deviation
-    `width` metre.
+    """Response g(r, w) to a Gaussian focal spot of 1 Pa.
 
     Parameters
     ----------
+    compliance : Compliance
     distances : (r,) float, metre
     frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
+    width : metre, standard deviation of the spot
     negligible : a batch of frequencies that stays below this fraction of the largest response so
         far is the last one computed; for frequencies that rise
+
+    Returns
+    -------
+    (f, r) complex, m/Pa
 
     Raises
     ------
@@ -100,10 +105,18 @@ def point_response(
 def steady_lines(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Steady-state lines: frequencies (f,) in Hz >= 0 and complex amplitudes (f, p) in metre.
+    """Steady-state lines, by wavenumber integrals.
 
-    Only the lines that the load contains above `threshold` of its strongest are computed.
-    Amplitude a stands for Re a exp(2 pi i f t). Probes may be a whole map.
+    Parameters
+    ----------
+    compliance : Compliance
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre; may be a whole map
+    threshold : of the strongest line of the load; only its lines above this are computed
+
+    Returns
+    -------
+    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p) in metre of Re a exp(2 pi i f t)
 
     Raises
     ------
@@ -129,10 +142,20 @@ def steady_lines(
 def steady_state(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Steady state of probes (p, 2) in metre at equally spaced times (t,) in s, as if the load had
-    always been there: all its lines below half the sampling rate.
+    """Steady state, as if the load had always been there: its lines below half the sampling rate.
 
     That is `flat_body` without its initial transient, for a twentieth of the time.
+
+    Parameters
+    ----------
+    compliance : Compliance
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
 
     Raises
     ------
@@ -152,11 +175,22 @@ def steady_state(
 def flat_body(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Motion of probes (p, 2) in metre from rest, at equally spaced times (t,) in s.
+    """Motion of probes from rest.
 
     By FFT over twice the duration with exponential damping, which reduces the wrap-around to 1e-5.
     Lines above half the sampling rate are left out. The rest position is that before the load: the
     deflection of an infinite sheet under a load with non-zero mean grows without bound.
+
+    Parameters
+    ----------
+    compliance : Compliance
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
 
     Raises
     ------

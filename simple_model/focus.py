@@ -163,13 +163,19 @@ def lobe_width(height: float) -> float:
 def focal_spot(
     offsets: ArrayLike, height: float = NOMINAL_HEIGHT, focus: str | FocalSpot = "main_lobe"
 ) -> Floats:
-    """Focal spot S: intensity relative to the focus (...) at offsets (..., 2) in metre from it.
+    """Focal spot S: intensity relative to the focus.
 
     Parameters
     ----------
+    offsets : (..., 2) float, metre from the focus
+    height : metre, of the focus above the array
     focus : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; or "array",
         the field of the array with its side lobes, as far as 60 mm along each axis; or a function
         of the offsets
+
+    Returns
+    -------
+    (...) float, without unit
     """
     offsets = np.asarray(offsets, np.float64)
     if not isinstance(focus, str):
@@ -181,7 +187,18 @@ def focal_spot(
 
 
 def moved_spot(points: Floats, centres: Floats, height: float, focus: str | FocalSpot) -> Floats:
-    """Focal spot S (..., n) at points (n, 2) for the focus at centres (..., 2), in metre."""
+    """Focal spot S for many positions of the focus.
+
+    Parameters
+    ----------
+    points : (n, 2) float, metre
+    centres : (..., 2) float, metre, positions of the focus
+    height, focus : as for `focal_spot`
+
+    Returns
+    -------
+    (..., n) float, without unit
+    """
     if focus == "array" or not isinstance(focus, str):
         return focal_spot(points - centres[..., None, :], height, focus)
     # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way.

@@ -63,7 +63,16 @@ def named_lines(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> dict[str, float]:
-    """Names and frequencies in Hz of the lines of a load: see `line_names`."""
+    """Names and frequencies of the lines of a load.
+
+    Parameters
+    ----------
+    pressure, threshold, most, candidates : as for `line_names`
+
+    Returns
+    -------
+    frequencies in Hz by name
+    """
     found = line_names(pressure, threshold, most=most, candidates=candidates)
     return dict(zip(found.names, found.frequencies.tolist(), strict=True))
 
@@ -75,16 +84,22 @@ def line_names(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> LineNames:
-    """The lines above a fraction of the strongest on the path, the mean left out.
+    """Lines above a fraction of the strongest on the path, the mean left out.
+
+    A path that is recorded and run through once has no f_d, and a rhythm or signal that is not
+    repeated no f_r or f_s: their lines have no names.
 
     Parameters
     ----------
+    pressure : MovingPressure
+    threshold : of the strongest line, 0..1
     most : how many of them are listed, the strongest
     candidates : names of lines that are listed whether or not they are in the load, as far as the
         Tacton has their tones and they do not coincide with one that is
 
-    A path that is recorded and run through once has no f_d, and a rhythm or signal that is not
-    repeated no f_r or f_s: their lines have no names.
+    Returns
+    -------
+    LineNames, Hz and Pa
     """
     return _line_names(pressure, threshold, most, tuple(candidates))
 

@@ -78,12 +78,23 @@ def line_table(
     highest: float = np.inf,
     settle: float = SETTLE,
 ) -> LineTable:
-    """The lines of a response to a load.
+    """Lines of a response to a load.
 
     Listed by name are the lines of the load above -60 dB of its strongest, those weaker ones that
-    are above -60 dB of the strongest in the response, and the `candidates`: names of lines that
-    are listed whether or not the load has them. Nothing above `highest` Hz is looked for, and of
-    the load no more than so many lines, the strongest.
+    are above -60 dB of the strongest in the response, and the candidates.
+
+    Parameters
+    ----------
+    pressure : MovingPressure, the load
+    response : Response
+    candidates : names of lines that are listed whether or not the load has them
+    most : how many lines of the load are looked for, the strongest
+    highest : Hz, up to which lines are looked for
+    settle : fraction of the response that is left out at its start
+
+    Returns
+    -------
+    LineTable, Hz and the unit of the response
     """
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, FITTED, most=most, candidates=candidates), highest)
@@ -106,9 +117,17 @@ def resolved_lines(
     highest: float = np.inf,
     settle: float = SETTLE,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Resolved lines by name, Hz, up to `highest`: those of a load above -60 dB, and of the
-    `candidates`, that a response is long enough to resolve, so that `lines` can be asked for them;
-    and the unresolved ones.
+    """Resolved and unresolved lines of a load, so that `lines` can be asked for the resolved ones.
+
+    Parameters
+    ----------
+    pressure : MovingPressure, whose lines above -60 dB are taken
+    response : Response, which is long enough to resolve a line or not
+    candidates, highest, settle : as for `line_table`
+
+    Returns
+    -------
+    frequencies in Hz by name, of the resolved lines and of the unresolved ones
     """
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, candidates=candidates), highest)

@@ -26,19 +26,35 @@ def published(pressure: MovingPressure) -> MovingPressure:
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation in Pa under the published load, whatever drive law and focus are given; arguments
-    and errors as of `point_kernel`.
+    """Stimulation under the published load, whatever drive law and focus are given.
+
+    Parameters
+    ----------
+    pressure, probes, times : as for `point_kernel`
+
+    Returns
+    -------
+    Response, stimulation (t, p) in Pa
     """
     response = point_kernel(published(pressure), probes, times)
     return replace(response, model="point-kernel-published")
 
 
 def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation in Pa at probes (p, 2) in metre and equally spaced times (t,) in s, under the
-    load as given.
+    """Stimulation under the load as given.
 
     Where the focus is so fast, or modulated so fast, that samples would show its lines elsewhere,
     those above half the sampling rate are left out.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    probes : (p, 2) float, metre
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    Response, stimulation (t, p) in Pa
 
     Raises
     ------

@@ -138,21 +138,38 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Line amplitudes (f, p) at exactly these frequencies (f,) in Hz: the moduli of `phasors`."""
+    """Line amplitudes: the moduli of `phasors`.
+
+    Parameters
+    ----------
+    response, frequencies, settle : as for `phasors`
+
+    Returns
+    -------
+    (f, p) float, in the unit of the response
+    """
     return np.abs(phasors(response, frequencies, settle=settle))
 
 
 def phasors(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> NDArray[np.complex128]:
-    """Phasors: complex amplitudes a (f, p) of Re a exp(2 pi i f t) at exactly these frequencies
-    (f,) in Hz, by weighted least squares.
+    """Phasors: complex amplitudes a of Re a exp(2 pi i f t), by weighted least squares.
 
-    All lines and the mean are fitted together after the first part `settle` of the response,
-    under a Kaiser window, so that neither the position of a line between two bins nor a line
-    left out nor a dying transient leaks into another; a lower window, as far as needed, where
-    lines lie closer than 2.5 over the fitted time. Lines closer than one over the fitted
-    time are unresolved and share one amplitude: see `are_resolved`. 0 Hz gives the mean.
+    All lines and the mean are fitted together under a Kaiser window, so that neither the position
+    of a line between two bins nor a line left out nor a dying transient leaks into another; a lower
+    window, as far as needed, where lines lie closer than 2.5 over the fitted time. Lines closer
+    than one over the fitted time are unresolved and share one amplitude: see `are_resolved`.
+
+    Parameters
+    ----------
+    response : Response
+    frequencies : (f,) float, Hz, exactly these; 0 gives the mean
+    settle : fraction of the response that is left out at its start
+
+    Returns
+    -------
+    (f, p) complex, in the unit of the response
 
     Raises
     ------
@@ -174,11 +191,22 @@ def are_resolved(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> NDArray[np.bool_]:
-    """Whether `lines` resolves each of these frequencies (f,) in Hz from 0 Hz and from the others.
+    """Mask of frequencies that `lines` resolves from 0 Hz and from the others.
 
     Frequencies that differ by at most `ALIKE` of the resolution are one line and need not be
-    resolved; nor does a line from others that have, by their `strengths` (f,) if given, at most 5 %
-    of it together. Unresolved lines, which are not fitted, must not leak more than 5 % into it.
+    resolved; nor does a line from others that have, by their strengths, at most 5 % of it together.
+    Unresolved lines, which are not fitted, must not leak more than 5 % into it.
+
+    Parameters
+    ----------
+    response : Response
+    frequencies : (f,) float, Hz
+    strengths : (f,) float, of any unit; all the same if not given
+    settle : fraction of the response that is left out at its start
+
+    Returns
+    -------
+    (f,) bool
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)
@@ -192,7 +220,18 @@ def are_resolved(
 
 
 def unmixed(frequencies: Floats, strengths: Floats, least: float) -> NDArray[np.bool_]:
-    """Whether no other line within so many Hz as `least`, nor rest, has 5 % of each line (f,)."""
+    """Mask of lines of which no near line, nor rest, has 5 %.
+
+    Parameters
+    ----------
+    frequencies : (f,) float, Hz
+    strengths : (f,) float, of any unit
+    least : Hz, below which lines are near each other
+
+    Returns
+    -------
+    (f,) bool
+    """
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
     mixed = (near & ~alike) @ strengths > MINOR * (alike @ strengths)
@@ -208,8 +247,21 @@ def hidden(
     *,
     settle: float = SETTLE,
 ) -> NDArray[np.bool_]:
-    """Whether more than 5 % of each line (f,), or of a fiftieth of the strongest, are likely to be
-    side lobes of those that are not fitted, of which there is so much (f,) as `rest`.
+    """Mask of lines of which more than 5 %, or of a fiftieth of the strongest if that is more, are
+    likely to be side lobes of those that are not fitted.
+
+    Parameters
+    ----------
+    response : Response
+    frequencies : (f,) float, Hz
+    strengths : (f,) float, amplitudes of the lines
+    rest : (f,) float, in the same unit, amplitudes that are not fitted
+    fitted : (f,) bool
+    settle : fraction of the response that is left out at its start
+
+    Returns
+    -------
+    (f,) bool
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
@@ -228,8 +280,21 @@ def _kaiser_transform(x: Floats, beta: float) -> Floats:
 def fit_lines(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[NDArray[np.complex128], Floats]:
-    """Complex amplitudes (f, p) as of `phasors`, and the remainder (t, p) of the whole response
-    without these lines and the mean; raises what `phasors` does.
+    """Phasors and remainder of a response.
+
+    Parameters
+    ----------
+    response, frequencies, settle : as for `phasors`
+
+    Returns
+    -------
+    complex amplitudes (f, p), and the remainder (t, p) of the whole response without these lines
+    and the mean, in its unit
+
+    Raises
+    ------
+    ValueError
+        If a frequency is not below half the sampling rate.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     nyquist = 0.5 / step(response.times)

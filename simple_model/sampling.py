@@ -69,10 +69,20 @@ def finer(highest: float, dt: float) -> int:
 
 
 def shown(pressure: MovingPressure, frequencies: Floats, times: Floats) -> NDArray[np.bool_]:
-    """Mask of the lines (f,) in Hz of a response that equally spaced times (t,) in s sample.
+    """Mask of the lines of a response that its times sample.
 
     Those below half the rate; but all of a load that does not alias. What edges and corners then
     leave above half the rate is next to nothing, and exact at each sample.
+
+    Parameters
+    ----------
+    pressure : MovingPressure, the load
+    frequencies : (f,) float, Hz
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    (f,) bool
     """
     below = frequencies < 0.5 / step(times)
     return np.asarray(below | (fold_parts(pressure, times) == 1))
@@ -90,10 +100,17 @@ def fold_parts(pressure: MovingPressure, times: Floats) -> int:
 
 
 def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
-    """Low-pass-filtered load (t, ...) at equally spaced times (t,) in s, without aliasing.
+    """Low-pass-filtered load without aliasing, by a windowed sinc.
 
-    Sampled `parts` times as finely, before and after those times too, and filtered by a windowed
-    sinc; as it is if `parts` is 1.
+    Parameters
+    ----------
+    load : function of times (n,) in s, also before and after those given, to values (n, ...)
+    times : (t,) float, s, equally spaced
+    parts : how many times as finely the load is sampled; 1 for as it is
+
+    Returns
+    -------
+    (t, ...) float, in the unit of the load
     """
     if parts == 1:
         return load(times)
@@ -115,9 +132,18 @@ def resolving_step(pressure: MovingPressure, longest: float) -> float:
 def transform(
     load: Callable[[float], Floats | Complex], w: Complex, dt: float, parts: int
 ) -> Complex:
-    """Fourier transform (f, ...) of a load sampled `parts` times within each dt in s, where `load`
-    gives every parts-th sample, from a time in 0..dt on; at frequencies w (f,) of its FFT, in
-    rad/s.
+    """Fourier transform of a load that is sampled more finely than its FFT.
+
+    Parameters
+    ----------
+    load : function of a time in 0..dt, to every parts-th sample (n, ...) from there on
+    w : (f,) complex, rad/s, frequencies of the FFT
+    dt : s, between samples of the FFT
+    parts : samples within each dt
+
+    Returns
+    -------
+    (f, ...) complex, in the unit of the load
     """
     found = 0.0
     for late in np.arange(parts) * dt / parts:

@@ -67,11 +67,21 @@ def pressure_threshold(frequency: ArrayLike) -> Floats:
 def sensation_level(
     amplitude: ArrayLike, frequency: ArrayLike, area: str = "focal_spot", *, unit: str = "m"
 ) -> Floats:
-    """Sensation level (...), dB above the threshold, of lines with amplitudes (...) in metre, peak,
-    or in Pa of the pressure at a place, see `pressure_threshold`.
+    """Sensation level of lines above the detection threshold.
 
     Of several lines the one with the highest level decides: channels do not add up.
-    Minus infinity where nothing vibrates, at 0 Hz, or where the threshold is not known.
+
+    Parameters
+    ----------
+    amplitude : (...) float, peak, of displacement or of the pressure at a place
+    frequency : (...) float, Hz
+    area : as for `threshold`
+    unit : of the amplitude, "m", or "Pa", see `pressure_threshold`
+
+    Returns
+    -------
+    (...) float, dB; minus infinity where nothing vibrates, at 0 Hz, or where the threshold is not
+    known
 
     Raises
     ------

@@ -51,7 +51,12 @@ def compare(
 
     Parameters
     ----------
+    reference, candidate : Response
     frequencies : Hz, lines whose amplitudes and phases are compared
+
+    Returns
+    -------
+    Agreement, of the candidate with the reference
 
     Raises
     ------
@@ -87,8 +92,17 @@ def compare(
 def phase_delays(
     reference: np.ndarray, candidate: np.ndarray, frequencies: Floats, probes: Floats
 ) -> Floats:
-    """Delays (f, p) in s of lines with complex amplitudes (f, p) at frequencies (f,) in Hz, as
-    `Agreement.phase_delay` has them.
+    """Delays of lines, as `Agreement.phase_delay` has them.
+
+    Parameters
+    ----------
+    reference, candidate : (f, p) complex, amplitudes, each of its own unit
+    frequencies : (f,) float, Hz
+    probes : (p, 2) float, metre
+
+    Returns
+    -------
+    (f, p) float, s; not a number where there is none
     """
     found = np.full(reference.shape, np.nan)
     for k, (a, b, f) in enumerate(zip(reference, candidate, frequencies, strict=True)):

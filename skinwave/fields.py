@@ -38,12 +38,22 @@ def field(
     h: float | None = None,
     solver: str = "auto",
 ) -> Field:
-    """Motion of a scene's whole body from rest, at equally spaced times (t,) in s from 0.
+    """Motion of a scene's whole body from rest.
 
     The body is reduced to the subspace of the load along the path: what it takes grows with the
     length of the path, and another path needs another reduction. The error
     against a coarser mesh and all else that falls short of the request is in `effort.warnings`,
     each sentence issued once as a `SkinwaveWarning`.
+
+    Parameters
+    ----------
+    scene : Scene
+    times : (t,) float, s, equally spaced from 0
+    tolerance, progress, h, solver : as for `simulate`
+
+    Returns
+    -------
+    Field, displacement (t, n, 3) in metre
 
     Raises
     ------
@@ -65,7 +75,18 @@ def field(
 def assessed_probes(
     scene: Scene, moved: Waves, h: float | None, tolerance: float, solver: str
 ) -> Response:
-    """`probe_response` with its expected error, from a coarser mesh, and all warnings."""
+    """Response of the probes with its expected error, from a coarser mesh, and all warnings.
+
+    Parameters
+    ----------
+    scene : Scene
+    moved : Waves, of the scene
+    h, tolerance, solver : as for `simulate`
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+    """
     found = probe_response(scene, moved)
     if scene.body.is_held:
         return told(scene, found, found.displacement, h, tolerance, solver)

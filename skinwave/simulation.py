@@ -53,6 +53,10 @@ def simulate(
     mapped : called like the built-in `map`, for the lines of "fem-harmonic", which are solved one
         by one; `engine.mapped_on` spreads them over the workers of a Dask scheduler
 
+    Returns
+    -------
+    Response, (t, p) displacement in metre, or stimulation in Pa of the point kernel
+
     Raises
     ------
     ValueError
@@ -79,7 +83,16 @@ def answered(
     solver: str = "auto",
     mapped: MapFunction = map,
 ) -> Response:
-    """The response of `simulate`, for callers that show its warnings themselves."""
+    """Response of `simulate`, for callers that show its warnings themselves.
+
+    Parameters
+    ----------
+    scene, model, tolerance, progress, h, dt, solver, mapped : as for `simulate`, with its errors
+
+    Returns
+    -------
+    Response
+    """
     required = required_plan(
         scene, model, tolerance, progress, h=h, dt=dt, solver=solver
     )  # fmt: skip
@@ -98,7 +111,21 @@ def required_plan(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Plan:
-    """Plan of a request; raises what `simulate` does before any work."""
+    """Plan of a request.
+
+    Parameters
+    ----------
+    scene, model, tolerance, progress, h, dt, solver : as for `simulate`
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ValueError
+        As `simulate` does before any work.
+    """
     asked = None if model == "auto" else named(model).name
     check_options(solver, h=h, dt=dt)
     return plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
@@ -115,8 +142,17 @@ def follow(
     solver: str = "auto",
     mapped: MapFunction = map,
 ) -> Response:
-    """Response of a plan, with its expected error and all warnings; arguments are those of the
-    plan.
+    """Response of a plan, with its expected error and all warnings.
+
+    Parameters
+    ----------
+    required : Plan
+    scene, tolerance, progress, h, dt, solver, mapped : those of the plan, as for `simulate`, with
+        its errors
+
+    Returns
+    -------
+    Response
     """
     if required.prepared and named(required.model).is_reduced:
         found = answer(required.prepared, scene, progress)
@@ -141,7 +177,19 @@ def compute(
     mapped: MapFunction = map,
 ) -> Response:
     """Response of one model, not planned: its expected error is unknown, and it gives no warnings.
-    Arguments and exceptions are those of `simulate`.
+
+    Parameters
+    ----------
+    scene, model, tolerance, progress, h, dt, solver, mapped : as for `simulate`, without "auto"
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    ValueError, Diverged
+        As `simulate` does.
     """
     known = named(model)
     check_options(solver, h=h, dt=dt)

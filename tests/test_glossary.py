@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-CODE = re.compile(r"\{[^{}]*\}|`[^`]*`")  # within a text: what it computes, and names
+# Within a text: what it computes, names, and a documented parameter with its class.
+CODE = re.compile(r"\{[^{}]*\}|`[^`]*`|^ +\w+(, \w+)* :( [A-Z]\w+)?")
 PACKAGES = ("fem", "meshes", "simple_model", "skinwave", "bench")
 REFUSED = {
     r"\bendless": "infinite, laterally infinite layer, half-space",

@@ -24,7 +24,18 @@ def joined(cells: Any, kind: str) -> Ints:
 
 
 def values(raw: Any, name: str, kind: str) -> np.ndarray:
-    """A cell array over all blocks of a kind, in native byte order."""
+    """Cell array over all blocks of a kind, in native byte order.
+
+    Parameters
+    ----------
+    raw : mesh as meshio reads it
+    name : of the array
+    kind : meshio's cell type
+
+    Returns
+    -------
+    (e,) int
+    """
     found = [
         np.asarray(values) for block, values in zip(raw.cells, raw.cell_data[name], strict=True)
         if block.type == kind
@@ -100,7 +111,23 @@ def outward(tets: Ints, sets: dict[str, Ints]) -> dict[str, Ints]:
 
 
 def node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
-    """Node order: the column of each node; mid-side nodes are identified by their positions."""
+    """Node order of ten-node tetrahedra; mid-side nodes are identified by their positions.
+
+    Parameters
+    ----------
+    path : file that the message names
+    points : (n, 3) float, metre
+    tets : (e, 10) int
+
+    Returns
+    -------
+    column of `tets` for each of the ten nodes
+
+    Raises
+    ------
+    MeshError
+        If nodes are too far from the middles of edges.
+    """
     nodes = points[tets]
     middles = nodes[:, EDGES].mean(axis=2)
     length = np.linalg.norm(nodes[:, EDGES[:, 1]] - nodes[:, EDGES[:, 0]], axis=2)
@@ -147,7 +174,23 @@ def gmsh_names(mesh: TetMesh, names: list[str]) -> dict[str, np.ndarray]:
 def placed(
     mesh: TetMesh, sizes: list[int], fields: dict[str, ArrayLike]
 ) -> tuple[dict[str, np.ndarray], dict[str, list[np.ndarray]]]:
-    """Fields at points, and those of tetrahedra with nothing at the facets."""
+    """Fields at points, and those of tetrahedra with nothing at the facets.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    sizes : facets in each block of them
+    fields : (n, ...) or (e, ...) by name
+
+    Returns
+    -------
+    fields at points (n, ...), and fields by block (e, ...), each by name
+
+    Raises
+    ------
+    MeshError
+        If a name is one that the mesh uses, or a field is neither at points nor at tetrahedra.
+    """
     at_points, at_cells = {}, {}
     for name, given in fields.items():
         values = np.asarray(given)

@@ -41,11 +41,9 @@ def body_from_file(
     cut to `clip` and filled with tetrahedra of h that grow beyond 30 mm from the middle. A mesh
     (`.vtu .msh .inp .vtk`) is taken as it is.
 
-    The facet sets are `surface`, `top` (seen from above), `cut` (the planes of the clip) and
-    `bottom`, the rest. A mesh that has one of these names keeps its own.
-
     Parameters
     ----------
+    path : file of a surface or mesh
     h : float, metre, edge length aimed at in the middle of the palm.
     unit : of the coordinates in the file: m, cm, mm, um or in.
     up : axis of the file that points to the device: +x, -x, ... -z.
@@ -53,6 +51,11 @@ def body_from_file(
     timeout : float, second, of the mesher.
     say : gets a sentence on each thing that was found or done.
     progress : gets the phase, and 0.
+
+    Returns
+    -------
+    TetMesh with the facet sets `surface`, `top` (seen from above), `cut` (the planes of the clip)
+    and `bottom`, the rest; a mesh that has one of these names keeps its own
 
     Raises
     ------
@@ -90,7 +93,15 @@ def body_from_file(
 def sound_surface(
     path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z", say: Say
 ) -> Surface:
-    """The surface in a file, repaired and checked.
+    """Surface in a file, repaired and checked.
+
+    Parameters
+    ----------
+    path, unit, up, say : as for `body_from_file`
+
+    Returns
+    -------
+    Surface, metre
 
     Raises
     ------

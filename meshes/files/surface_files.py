@@ -16,12 +16,17 @@ SURFACE_FORMATS = (".stl", ".ply", ".obj", ".glb", ".vtp")
 
 
 def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z") -> Surface:
-    """The triangles of a `.stl`, `.ply`, `.obj`, `.glb` or `.vtp` file, as they are in it.
+    """Triangles of a `.stl`, `.ply`, `.obj`, `.glb` or `.vtp` file, as they are in it.
 
     Parameters
     ----------
+    path : the file
     unit : of the coordinates in the file: m, cm, mm, um or in.
     up : which axis of the file points away from the palm, towards the device: +x, -x, ... -z.
+
+    Returns
+    -------
+    Surface, metre, turned so that `up` is +z
 
     Raises
     ------

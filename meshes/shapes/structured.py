@@ -61,7 +61,7 @@ class Grading:
 def sheet(
     width: float, height: float, thickness: float, h: float, *, layers: int = 1, order: int = 2
 ) -> TetMesh:
-    """A flat sheet with its edges in the facet set `clamped`.
+    """Flat sheet with its edges in the facet set `clamped`.
 
     Parameters
     ----------
@@ -69,6 +69,10 @@ def sheet(
     h : float, metre, largest side of a cell in the plane.
     layers : int, elements through the thickness.
     order : 1 or 2, four- or ten-node tetrahedra.
+
+    Returns
+    -------
+    TetMesh
     """
     lines = (_even(width, h), _even(height, h), np.linspace(-thickness, 0.0, layers + 1))
     return _with_roles(extrude(*lines, order=order), clamped="sides")
@@ -81,7 +85,7 @@ def block(
     grading: Grading | None = None,
     order: int = 2,
 ) -> TetMesh:
-    """A rectangular block: its base in the facet set `clamped`, its sides in `absorbing`.
+    """Rectangular block: its base in the facet set `clamped`, its sides in `absorbing`.
 
     Parameters
     ----------
@@ -89,6 +93,10 @@ def block(
     h : float, metre, largest side of a cell, under the focus if graded.
     grading : how cells grow away from the focus; None for equal cells.
     order : 1 or 2, four- or ten-node tetrahedra.
+
+    Returns
+    -------
+    TetMesh
     """
     x_length, y_length, depth = lengths
     if grading is None:
@@ -127,7 +135,17 @@ def middle_plane(mesh: TetMesh) -> Ints:
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
-    """Grid lines from 0 to `length`: cells of `h` up to the radius, then growing.
+    """Graded grid lines from 0: cells of equal size up to the radius, then growing.
+
+    Parameters
+    ----------
+    length : metre
+    h : metre, size of the first cells
+    grading : Grading
+
+    Returns
+    -------
+    (n,) float, metre
 
     Raises
     ------
@@ -163,11 +181,20 @@ def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
 
 
 def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
-    """Tetrahedra on the grid lines x, y, z (increasing, metre).
+    """Tetrahedra on grid lines.
 
-    The facet sets are `top`, `bottom`, `sides` and the four sides `left` (least x), `right`,
-    `front` (least y) and `back`. Diagonals alternate between cells, so that a grid with an even
-    number of cells and mirrored lines has the mirror symmetries of the rectangle.
+    Diagonals alternate between cells, so that a grid with an even number of cells and mirrored
+    lines has the mirror symmetries of the rectangle.
+
+    Parameters
+    ----------
+    x, y, z : increasing, metre
+    order : 1 or 2, four- or ten-node tetrahedra
+
+    Returns
+    -------
+    TetMesh with the facet sets `top`, `bottom`, `sides` and the four sides `left` (least x),
+    `right`, `front` (least y) and `back`
 
     Raises
     ------
@@ -189,13 +216,18 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
 
 
 def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
-    """Tetrahedra on any triangulation of a plane, three a prism; the facet set `top`.
+    """Tetrahedra on any triangulation of a plane, three a prism.
 
     Parameters
     ----------
     plane : (n, 2) float, metre
     triangles : (k, 3) int, nodes of the plane
     z : increasing heights of the layers, metre
+    order : 1 or 2, four- or ten-node tetrahedra
+
+    Returns
+    -------
+    TetMesh with the facet set `top`
     """
     ranked = np.sort(np.asarray(triangles), axis=1)  # one order for all: neighbours conform
     points, tets = _layers(np.asarray(plane), ranked, np.asarray(z))

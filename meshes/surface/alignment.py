@@ -64,7 +64,16 @@ def widest_place(surface: Surface) -> tuple[float, float]:
 
 
 def height_at(surface: Surface, x: float, y: float) -> float:
-    """The greatest z of the surface above a point of the plane, metre.
+    """Greatest z of the surface above a point of the plane.
+
+    Parameters
+    ----------
+    surface : Surface
+    x, y : metre
+
+    Returns
+    -------
+    float, metre
 
     Raises
     ------

@@ -13,7 +13,18 @@ def project_to_level_set(
     gradient: Callable[[Floats], Floats],
     steps: int = 4,
 ) -> Floats:
-    """Points (n, 3) near a level set, moved onto it by Newton steps along its gradient."""
+    """Points moved onto a level set by Newton steps along its gradient.
+
+    Parameters
+    ----------
+    points : (n, 3) float, metre, near the level set
+    level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3)
+    steps : Newton steps
+
+    Returns
+    -------
+    (n, 3) float, metre
+    """
     for _ in range(steps):
         slope = gradient(points)
         steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)

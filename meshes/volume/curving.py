@@ -29,15 +29,20 @@ Function = Callable[[Floats], Floats]
 def curve_boundary(
     mesh: TetMesh, level_set: Function, gradient: Function, facets: Ints | None = None
 ) -> TetMesh:
-    """The mesh with the nodes of boundary facets moved onto a level set.
+    """Mesh with the nodes of boundary facets moved onto a level set.
 
     Corners move first, with the middles of the edges between them, then mid-side nodes. Where
     an element would lose more than 70 % of its Jacobian somewhere, or its volume, its nodes stay.
 
     Parameters
     ----------
+    mesh : TetMesh of ten-node tetrahedra
     level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3).
     facets : (k, 6) int, the boundary facets that lie on it; all of the boundary if not given.
+
+    Returns
+    -------
+    TetMesh
 
     Raises
     ------

@@ -20,12 +20,15 @@ def palm_mesh(
 ) -> TetMesh:
     """Ten-node tetrahedra of a palm whose boundary nodes lie on its true surface.
 
-    The facet sets are `surface` (all of it), `top` (what the device sees), `wrist` and `fingers`
-    (the ends, which look along the hand) and `back`, the rest.
-
     Parameters
     ----------
-    h, sizing, timeout : as for `tetrahedralise`.
+    palm : Palm
+    h, sizing, timeout : as for `tetrahedralise`, with its errors
+
+    Returns
+    -------
+    TetMesh with the facet sets `surface` (all of it), `top` (what the device sees), `wrist` and
+    `fingers` (the ends, which look along the hand) and `back`, the rest
     """
     # Facets of the contour must be finer than elements, or the mesher keeps its corners.
     body = surface(palm, min(h / 1.5, palm.thickness / 8))

@@ -33,14 +33,19 @@ GOOD = 25.0  # degrees: smaller angles may not shrink, larger ones not below it
 def smoothed(
     mesh: TetMesh, sizing: Sizing | None = None, project: Projection | None = None
 ) -> TetMesh:
-    """The 4-node mesh with its inner nodes moved; no least angle below 25 degrees gets less, and
-    those that there are get larger where one node's move can do it.
+    """Smoothed four-node mesh: its inner nodes moved so that no least angle below 25 degrees gets
+    less, and those that there are get larger where one node's move can do it.
 
     Parameters
     ----------
+    mesh : TetMesh of four-node tetrahedra
     sizing : function of points (n, 3) in metre to edge lengths (n,) asked for; None if equal.
     project : function that moves points (n, 3) near the surface onto it, along which its nodes then
         slide, each to the mean of its facets; without it, and on sharp edges, they stay.
+
+    Returns
+    -------
+    TetMesh
     """
     points, tets = np.array(mesh.points), mesh.tets
     facets = boundary_facets(tets)

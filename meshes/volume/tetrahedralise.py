@@ -48,16 +48,21 @@ def tetrahedralise(
     timeout: float = 120.0,
     epsilon: float | None = None,
 ) -> TetMesh:
-    """Four-node tetrahedra that fill a closed surface, with its facets in the set `surface`.
+    """Four-node tetrahedra that fill a closed surface.
 
     Parameters
     ----------
+    surface : Surface
     h : float, metre, edge length that is aimed at.
     sizing : function of points (n, 3) in metre to edge lengths (n,) in metre that are aimed at;
         `graded` makes one. None for h everywhere.
     timeout : float, second, after which the mesher is stopped.
     epsilon : float, metre, how far the mesh may lie from the surface; a twentieth of h if not
         given. Where a surface curves, elements get as small as it needs: less is slower.
+
+    Returns
+    -------
+    TetMesh with its facets in the set `surface`
 
     Raises
     ------
@@ -123,7 +128,13 @@ def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:
-    """Check that a body can be meshed with an edge length in metre.
+    """Check that a body can be meshed with an edge length.
+
+    Parameters
+    ----------
+    surface : Surface
+    name : of the length in the message
+    length : metre
 
     Raises
     ------

@@ -39,13 +39,19 @@ def build(
     symmetry: str = "",
     discretise: Callable[[Body, float], Discretised] | None = None,
 ) -> Build:
-    """Mesh a body with elements of h in metre, or as fine as the scene set needs.
+    """Mesh of a body with its materials and boundary conditions.
 
     Parameters
     ----------
+    body : Body
+    h : metre, element size; the default of the body if not given
     symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
         part with positive coordinates is meshed, with symmetry conditions on these planes
     discretise : instead of that of its kind
+
+    Returns
+    -------
+    Build
 
     Raises
     ------

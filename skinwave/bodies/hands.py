@@ -40,9 +40,14 @@ def support(
 
     Parameters
     ----------
+    body : Body
     mesh : as it lies before it is placed
     outward : unit normals (k q, 3) out of the body at the points of its facets
     ends : of more surfaces than its base, the condition and the cosine (k q,) with their direction
+
+    Returns
+    -------
+    fem.Support, over all of the boundary
     """
     below = [] if "bottom" in mesh.facets else [(body.base, -outward[:, 2])]
     stiffness, absorbed = np.zeros((2, len(outward)))

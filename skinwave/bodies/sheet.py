@@ -25,8 +25,14 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
 
     Parameters
     ----------
+    body : Body, a sheet
+    h : metre, element size
     thickness : of the equivalent in metre, `SHEET_THICKNESS` of the shorter side if not given, and
         no less than the sheet's own
+
+    Returns
+    -------
+    Discretised
     """
     thickness = max(body.depth, thickness or SHEET_THICKNESS * min(body.width, body.height))
     return Discretised(
@@ -73,7 +79,17 @@ def air_mass(body: Body, frequency: float) -> float:
 
 
 def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
-    """Added mass of the air around a meshed sheet, for `fem.reduce`; None in vacuum.
+    """Added mass of the air around a meshed sheet, for `fem.reduce`.
+
+    Parameters
+    ----------
+    body : Body, a sheet
+    build : its mesh
+    operators : those of the mesh
+
+    Returns
+    -------
+    AddedMass, or None in vacuum
 
     Raises
     ------

@@ -34,14 +34,35 @@ MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 def meshed(
     body: Body, h: float | None, clock: Clock, report: Progress, symmetry: str = ""
 ) -> Build:
-    """Mesh a body; its materials and boundary conditions."""
+    """Mesh of a body with its materials and boundary conditions, timed and reported.
+
+    Parameters
+    ----------
+    body, h, symmetry : as for `bodies.build.build`, with its errors
+    clock : Clock, which takes the time
+    report : called with the name of the phase and the fraction done
+
+    Returns
+    -------
+    Build
+    """
     with clock("mesh"):
         report("mesh", 0.0)
         return build_body(body, h, symmetry)
 
 
 def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
-    """Assemble a meshed body's operators."""
+    """Operators of a meshed body, timed and reported.
+
+    Parameters
+    ----------
+    build : Build
+    clock, report : as for `meshed`
+
+    Returns
+    -------
+    fem.Operators
+    """
     with clock("assemble"):
         report("assemble", 0.0)
         return operators(build)
@@ -50,13 +71,22 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
 def energy_balance(
     spent: fem.EnergyBalance, stored: float = 0.0, when: str = ""
 ) -> tuple[float, float]:
-    """Relative error of the energy balance, if small enough to trust a response, and the share of
-    the losses that was radiated.
+    """Relative error of the energy balance, if small enough to trust a response.
+
+    Parameters
+    ----------
+    spent : energies, or powers, of the response
+    stored : in the same unit, energy at its end
+    when : where in the response, for the message
+
+    Returns
+    -------
+    relative error, and the share of the losses that was radiated
 
     Raises
     ------
     Diverged
-        If it is not.
+        If the error is too large.
     """
     imbalance = fem.imbalance(spent, stored)
     if not imbalance <= MOST_IMBALANCE:
@@ -77,7 +107,25 @@ def transient_answer(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Response:
-    """Direct time integration of all dofs in steps of dt, interpolated by a cubic spline."""
+    """Direct time integration of all dofs, interpolated by a cubic spline.
+
+    Parameters
+    ----------
+    scene : Scene
+    times : (t,) float, s, equally spaced from 0
+    report, h, dt, solver : as for `simulate`, `report` its progress
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+
+    Raises
+    ------
+    Diverged
+        As `marched` does.
+    ValueError
+        As `step_count` does, or if the body has no mesh of that size.
+    """
     dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
     clock = Clock()
@@ -114,7 +162,19 @@ def marched(
     stored: Callable[[fem.State], float],
     report: Progress,
 ) -> tuple[Floats, tuple[float, float]]:
-    """Probe readings (steps + 1, p) of each state, and the last energy balance.
+    """Probe readings of a time integration, its energy balance checked on the way.
+
+    Parameters
+    ----------
+    balanced : states from rest on, each with the energies up to it
+    steps : int, after which it ends
+    read : function of a displacement (3 n,) in metre, to readings (p,)
+    stored : function of a state, to the energy in J that it has
+    report : called with "march" and the fraction done
+
+    Returns
+    -------
+    readings (steps + 1, p), and the last `energy_balance`
 
     Raises
     ------
@@ -161,10 +221,26 @@ def harmonic_answer(
     threshold: float = 1e-3,
     mapped: MapFunction = map,
 ) -> Response:
-    """Steady state: one factorisation for each line of the load above the threshold, but for the
-    mean if the body is unconstrained.
+    """Steady state: one factorisation for each line of the load, but for the mean if the body is
+    unconstrained.
 
-    `mapped` is called like the built-in `map`; it may spread the lines over other machines.
+    Parameters
+    ----------
+    scene : Scene
+    times : (t,) float, s, equally spaced
+    report, h, solver, mapped : as for `simulate`, `report` its progress
+    threshold : of the strongest line; weaker ones are left out
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+
+    Raises
+    ------
+    ValueError
+        If the load has too many lines, or the body no mesh of that size.
+    Diverged
+        If the energy balance of a line is violated.
     """
     clock = Clock()
     build = meshed(scene.body, h, clock, report)
@@ -215,7 +291,19 @@ def _line(
 
 
 def discretised(response: Response, build: Build, h: float, dt: float = 0.0) -> Response:
-    """The response with its element size in metre, time step in s and mesh."""
+    """Response with its discretisation named in its effort.
+
+    Parameters
+    ----------
+    response : Response
+    build : Build
+    h : metre, element size
+    dt : s, time step; 0 without one
+
+    Returns
+    -------
+    Response
+    """
     mesh = cache.digest(build.mesh.points, build.mesh.tets)
     return replace(response, effort=replace(response.effort, h=h, dt=dt, mesh=mesh))
 

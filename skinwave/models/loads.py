@@ -21,10 +21,19 @@ def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
 
 
 def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:
-    """Probe operator S (p, 3 n): displacement into a meshed body, in metre, at probes (p, 2) in
-    metre.
+    """Probe operator S: displacement into a meshed body.
 
     The surface in a file is made of flat triangles, at whose edges its own normals jump: there the
     direction into the body is that of the mean normal about a probe.
+
+    Parameters
+    ----------
+    body : Body
+    build : its mesh
+    probes : (p, 2) float, metre
+
+    Returns
+    -------
+    (p, 3 n) sparse, without unit
     """
     return probe_operator(build.mesh, probes, patch=body.of_kind.normal_patch)

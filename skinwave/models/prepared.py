@@ -74,7 +74,17 @@ def prepare(
     """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
     cache, once per machine.
 
-    With `symmetry`, as in `bodies.build`, once for all Tactons that have it.
+    Parameters
+    ----------
+    body : Body
+    probes : (p, 2) float, metre
+    progress, h, solver : as for `simulate`
+    tolerance : relative error of the reduction
+    symmetry : as in `bodies.build.build`: for all Tactons that have it
+
+    Returns
+    -------
+    `Prepared`
     """
     clock = Clock()
     (progress or silent)("mesh", 0.0)
@@ -164,7 +174,19 @@ def _prepared_anew(
 
 
 def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
-    """Cost of an offline stage with its time, memory and mesh, of elements of h in metre."""
+    """Cost of an offline stage with its time, memory and mesh.
+
+    Parameters
+    ----------
+    effort : Effort, of the reduction
+    clock : its times
+    build : Build
+    h : metre, element size
+
+    Returns
+    -------
+    Effort
+    """
     return replace(
         effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
         mesh=cache.digest(build.mesh.points, build.mesh.tets),
@@ -182,6 +204,21 @@ def _mirrored(probes: Floats, symmetry: str) -> Floats:
 def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -> Response:
     """Online stage: response of a reduced body to a scene's Tacton from rest, as the steady state
     of every line of the load and the free vibration of its start.
+
+    Parameters
+    ----------
+    prepared : Prepared, for the body and the probes of the scene
+    scene : Scene
+    progress : called with the name of the phase and the fraction done
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+
+    Raises
+    ------
+    Diverged
+        If the energy balance is violated.
     """
     clock, times = Clock(), sample_times(scene)
     if progress:

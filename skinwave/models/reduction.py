@@ -80,9 +80,18 @@ def reduce_body(
 
     Parameters
     ----------
+    body : Body
+    build : its mesh
+    operators : those of the mesh
     outputs : (p, 3 n) sparse, as `fem.reduce` takes them
+    tolerance : relative error of the reduction
     surface : load operator (3 n, k) and points (k, 3), of `bodies.surface_load` or a part of them
     loads : (3 n, j), as `fem.reduce` takes them
+    solver, report : as for `simulate`, `report` its progress
+
+    Returns
+    -------
+    ReducedBody, and the fem.ReducedModel of it
     """
     P, points = surface
     model = fem.reduce(

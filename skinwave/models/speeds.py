@@ -60,13 +60,21 @@ def shown_period(pressure: MovingPressure) -> float:
 def shown_part(
     pressure: MovingPressure, fastest: float, frames: int | None = None, most: int = MOST
 ) -> tuple[float, int]:
-    """Duration in s of an animation and its number of frames: `EACH` to a period of the `fastest`
-    line in Hz that counts. A pattern that takes more than `most` frames is shown in part, as long
-    as these last, with the smallest jump where it repeats.
+    """Duration and number of frames of an animation: `EACH` frames to a period of its fastest line.
+
+    A pattern that takes more than `most` frames is shown in part, as long as these last, with the
+    smallest jump where it repeats.
 
     Parameters
     ----------
+    pressure : MovingPressure
+    fastest : Hz, the fastest line that counts
     frames : so many of the same time instead
+    most : frames of a pattern that is shown in full
+
+    Returns
+    -------
+    duration in s, and number of frames
     """
     span, tacton = shown_period(pressure), pressure.tacton
     needed = ceil(EACH * fastest * span * (1 - SAME))

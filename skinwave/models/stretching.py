@@ -87,7 +87,18 @@ def meshed_sheet(body: Body, h: float) -> Build:
 
 
 def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membrane:
-    """Membrane with the stiffness that a meshed sheet lacks, or a given share of the whole."""
+    """Membrane with the stiffness that a meshed sheet lacks.
+
+    Parameters
+    ----------
+    body : Body, a sheet
+    made : its mesh
+    share : of the sheet's whole stiffness, instead of what is lacking
+
+    Returns
+    -------
+    fem.Membrane
+    """
     ratio = body.depth / float(np.ptp(made.mesh.points[:, 2]))
     share = 1 - ratio**2 if share is None else share
     triangles = middle_plane(made.mesh)
@@ -123,7 +134,26 @@ def full_answer(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Response:
-    """Direct time integration of all dofs, from equilibrium under the mean pressure."""
+    """Direct time integration of all dofs at large deflection, from equilibrium under the mean
+    pressure.
+
+    Parameters
+    ----------
+    scene : Scene, with a clamped sheet
+    times : (t,) float, s, equally spaced from 0
+    report, h, dt, solver : as for `simulate`, `report` its progress
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+
+    Raises
+    ------
+    Diverged
+        If a step or the equilibrium does not converge, or the energy balance is violated.
+    ValueError
+        As `step_count` does, or if the body has no mesh of that size.
+    """
     clock = Clock()
     with clock("assemble"):
         report("assemble", 0.0)
@@ -164,7 +194,17 @@ def reduced_answer(
     dt: float | None = None,
     solver: str = "auto",
 ) -> Response:
-    """Time integration of the sheet's bending modes, from equilibrium under the mean pressure."""
+    """Time integration of the sheet's bending modes at large deflection, from equilibrium under the
+    mean pressure.
+
+    Parameters
+    ----------
+    scene, times, report, h, dt, solver : as for `full_answer`, with its errors
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+    """
     clock = Clock()
     with clock("reduce"):
         report("reduce", 0.0)

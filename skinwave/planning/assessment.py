@@ -40,8 +40,16 @@ def assessed(
 
     Parameters
     ----------
+    scene : Scene
+    response : Response, of the reduced body
+    prepared : Prepared
     h : float, metre, element size, the default of the body if not given
+    tolerance, solver : as for `simulate`
     compared : element size in metre to compare with, and the body with it; chosen if not given
+
+    Returns
+    -------
+    Response
     """
     fine = quantity_of_interest(prepared, scene, response)
     return told(scene, response, fine, h, tolerance, solver, compared=compared)
@@ -57,8 +65,17 @@ def told(
     *,
     compared: Coarser | None = None,
 ) -> Response:
-    """Response of any linear finite-element model, `assessed` by its quantity of interest `fine`:
-    waveforms (t, p), or the lines (f, p) of an unconstrained body.
+    """Response of any linear finite-element model, with its expected error and all warnings.
+
+    Parameters
+    ----------
+    scene, response, h, tolerance, solver, compared : as for `assessed`
+    fine : quantity of interest of the response: waveforms (t, p), or the lines (f, p) of an
+        unconstrained body
+
+    Returns
+    -------
+    Response
     """
     body, size = scene.body, h or default_size(scene.body)
     other, coarse = compared or coarser_body(scene, h, tolerance, solver)
@@ -76,7 +93,16 @@ def coarser_body(
     tolerance: float = 0.05,
     solver: str = "auto",
 ) -> Coarser:
-    """Coarser element size in metre that `assessed` compares with, and the body reduced with it."""
+    """Coarser mesh that `assessed` compares with.
+
+    Parameters
+    ----------
+    scene, h, tolerance, solver : as for `assessed`
+
+    Returns
+    -------
+    element size in metre, and the body reduced with it
+    """
     body = scene.body
     other = compared_with(body, h) if h else _coarser(body, default_size(body))
     return other, _prepared(body, scene.probes, other, solver, reduction_tolerance(tolerance))
@@ -90,12 +116,19 @@ def sentences(
     h: float | None = None,
     error: float = 0.0,
 ) -> tuple[str, ...]:
-    """All warnings of a response, by whichever interface it is returned; computes no mesh.
+    """Warnings of a response, all of them, by whichever interface it is returned; computes no mesh.
 
     Parameters
     ----------
+    scene : Scene
+    response : Response
+    tolerance : relative error that is asked for
     h : float, metre, size of the elements of a linear model
     error : float, relative, expected of these elements; nan if it is not known
+
+    Returns
+    -------
+    sentences
     """
     if named(response.model).default_size and h:
         known = of_elements(scene, h, error, tolerance)

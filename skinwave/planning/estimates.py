@@ -56,7 +56,18 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """Cutoff frequency in Hz above which the motion of every probe is negligible."""
+    """Cutoff frequency above which the motion of every probe is negligible.
+
+    Parameters
+    ----------
+    frequencies : (f,) float, Hz, ascending
+    shares : (f, p) float, of the power of each probe's motion
+    tolerance : relative error that is asked for, of which a third is negligible
+
+    Returns
+    -------
+    float, Hz
+    """
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
@@ -115,10 +126,20 @@ def _loss_at_cut_off(body: Body) -> float:
 
 
 def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
-    """Reflection of absorbing sides `half` (2,) metre away, over the probes' own steady motion.
+    """Reflection of absorbing sides, over the probes' own steady motion.
 
     By mirror images of the focus in the four sides and the wavenumber integral of the infinite
-    body, for the lines of the load. 1, for unknown, of a body with too little loss for that.
+    body, for the lines of the load.
+
+    Parameters
+    ----------
+    scene : Scene
+    half : (2,) float, metre, distances of the sides along x and y from the middle
+    highest : Hz, of the lines that count
+
+    Returns
+    -------
+    float, 0..1; 1, for unknown, of a body with too little loss for that
     """
     body, width = scene.body, spot_width(scene.pressure.height)
     path = _along(scene.tacton.trajectory)

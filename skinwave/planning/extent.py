@@ -33,9 +33,19 @@ def symmetry(scene: Scene) -> str:
 
 
 def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[PlanRow]]:
-    """The body out to where reflections are negligible, and the reason if that is not all of it.
+    """Extent of the body out to where reflections are negligible.
 
     Only absorbing sides are moved inwards: reflections from others belong to the response.
+
+    Parameters
+    ----------
+    scene : Scene
+    tolerance : relative error that is asked for
+    highest : Hz, of the lines that count
+
+    Returns
+    -------
+    Body, and the reason if it is not all of the scene's
     """
     body = scene.body
     plain = body.of_kind.is_layer and body.base == "clamped" and body.is_plain

@@ -62,13 +62,19 @@ def plan(
     solver: str = "auto",
     progress: Progress | None = None,
 ) -> Plan:
-    """Plan a scene's simulation to a relative error of `tolerance` in its probes' waveforms.
+    """Plan a scene's simulation to a relative error in its probes' waveforms.
 
     Parameters
     ----------
+    scene : Scene
+    tolerance : that error, 0..1
     model, h, dt : given choices: a model's name, element size in metre, time step in s; with both
         a model and h all of the body is modelled
     solver, progress : for the meshes that are tried where the scene needs elements
+
+    Returns
+    -------
+    Plan
 
     Raises
     ------

@@ -108,7 +108,18 @@ def refined(
     """Coarsest mesh of a sequence that is accurate to a tolerance, or that of a given h, with its
     expected error.
 
-    If the finest of the sequence is not, that one is returned, with its error.
+    Parameters
+    ----------
+    scene : Scene, with load and probes
+    body : Body that is meshed, the scene's or a part of it
+    tolerance : relative error that is asked for
+    progress, solver : as for `simulate`
+    symmetry : as in `bodies.build.build`
+    h : metre, element size
+
+    Returns
+    -------
+    Refined; the finest of the sequence, with its error, if that is not accurate either
 
     Raises
     ------
@@ -185,7 +196,17 @@ def _layered(body: Body, layers: int, near: float) -> float:
 
 
 def coarser_by(body: Body, other: float, h: float) -> float:
-    """Refinement ratio of two meshes, coarser over finer, along the axis where they differ less."""
+    """Refinement ratio of two meshes, coarser over finer, along the axis where they differ less.
+
+    Parameters
+    ----------
+    body : Body
+    other, h : metre, element sizes, coarser and finer
+
+    Returns
+    -------
+    float
+    """
     if not _has_cell_layers(body):
         return other / h
     down = cell_layers(body, h) / cell_layers(body, other)
@@ -193,8 +214,18 @@ def coarser_by(body: Body, other: float, h: float) -> float:
 
 
 def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
-    """Quantity of interest of a response: waveforms (t, p); of an unconstrained body the lines
-    (f, p) without the mean, because rigid-body drift would hide the rest.
+    """Quantity of interest of a response.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    scene : Scene
+    found : Response, of the reduced body
+
+    Returns
+    -------
+    waveforms (t, p) in metre; of an unconstrained body the lines (f, p) without the mean, because
+    rigid-body drift would hide the rest
     """
     if scene.body.is_held:
         return found.displacement
@@ -210,8 +241,19 @@ def convergence(
     *,
     same: bool,
 ) -> tuple[Convergence, float]:
-    """Outcome and relative error of the second of two element sizes in metre, by the quantities of
-    interest (k, p) that were found with both; or they make the `same` mesh.
+    """Convergence of two element sizes: outcome and relative error of the second.
+
+    Parameters
+    ----------
+    body : Body
+    sizes : metre, both element sizes
+    found : (k, p), the quantities of interest that were found with them
+    tolerance : relative error that is asked for
+    same : whether both make one mesh
+
+    Returns
+    -------
+    Convergence, and the error; 1 or nan where it cannot be estimated, see `UNESTIMATED`
     """
     if same:
         outcome = Convergence.SINGLE_MESH if body.file else Convergence.SAME_MESH
@@ -221,8 +263,18 @@ def convergence(
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
-    """Element size in metre that meets a tolerance, by the error with h; a slab's cells are at most
-    as high as its depth.
+    """Element size that meets a tolerance, by the error with another.
+
+    Parameters
+    ----------
+    body : Body; a slab's cells are at most as high as its depth
+    h : metre, the other element size
+    error : relative, with it
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    float, metre
     """
     size = min(h, body.depth if body.of_kind.is_layer else h)
     return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

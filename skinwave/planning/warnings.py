@@ -18,7 +18,19 @@ LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its 
 
 
 def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple[str, ...]:
-    """Warnings of linear elements of h in metre, whose relative `error` is expected, or nan."""
+    """Warnings of linear elements.
+
+    Parameters
+    ----------
+    scene : Scene
+    h : metre, element size
+    error : relative, expected of it, or nan
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    sentences
+    """
     size = 1e3 * enough(scene.body, h, error, tolerance)
     return (
         *error_unknown(error),
@@ -82,7 +94,19 @@ def _scene_damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
 def damping_misfit(
     scene: Scene, frequencies: Floats, shares: Floats, tolerance: float
 ) -> tuple[str, ...]:
-    """Warning of lines where Rayleigh damping is far from the loss factor that it is fitted to."""
+    """Warning of lines where Rayleigh damping is far from the loss factor that it is fitted to.
+
+    Parameters
+    ----------
+    scene : Scene
+    frequencies : (f,) float, Hz
+    shares : (f, p) float, of the power of each probe's motion
+    tolerance : relative; weaker lines are left out
+
+    Returns
+    -------
+    one sentence, or none
+    """
     if not any(solid.loss_factor for _, solid in scene.body.strata):
         return ()
     by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND)
@@ -102,7 +126,19 @@ def damping_misfit(
 
 
 def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
-    """Warning of an expected error above the tolerance."""
+    """Warning of an expected error above the tolerance.
+
+    Parameters
+    ----------
+    what : that has the error, a sentence's subject
+    error : relative
+    tolerance : relative error that is asked for
+    cure : a sentence's end before "enough"
+
+    Returns
+    -------
+    one sentence, or none
+    """
     if not error > tolerance:
         return ()
     percent = f"{100 * error:.0f}" if error > 0.1 else f"{100 * error:.2g}"
