@@ -278,12 +278,7 @@ def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
         for t in 1e3 * np.arange(start % between - 2 * between, view.ray.times[-1], between):
             ax.plot([0, view.speed * 100], [t, t + 100], color="black", lw=1.1, ls="dashed")
         ax.plot(
-            [],
-            [],
-            color="black",
-            lw=1.1,
-            ls="dashed",
-            label=f"surface wave, {view.speed:.2g} m/s",
+            [], [], color="black", lw=1.1, ls="dashed", label=f"surface wave, {view.speed:.2g} m/s"
         )
     if name == "track" and view.track is not None:
         length = 1e3 * path.length

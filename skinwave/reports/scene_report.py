@@ -42,12 +42,7 @@ ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be ass
 
 
 def write_report(
-    results: Path,
-    out: Path,
-    style: Style,
-    progress: Progress,
-    *,
-    formats: Sequence[str] = ("png",),
+    results: Path, out: Path, style: Style, progress: Progress, *, formats: Sequence[str] = ("png",)
 ) -> None:
     """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder.
 

@@ -19,14 +19,7 @@ from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, with_body
 from skinwave.simulation import check_options, compute
 from skinwave.studies import paper15
-from skinwave.studies.changes import (
-    Drawn,
-    Maps,
-    element_maps,
-    first_of,
-    quick_maps,
-    shown,
-)
+from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
 from skinwave.studies.claims import evaluate, write_claims
 from skinwave.studies.study_page import (
     StudyOutcome,

@@ -169,12 +169,7 @@ def column_of_two_layers() -> Case:
 def layered_column_mesh(lengths: list[float], cells: int) -> TetMesh:
     """A column of one cell across, regions numbered from the base upwards."""
     ends = np.concatenate([[0], np.cumsum(lengths)]) - sum(lengths)
-    z = np.concatenate(
-        [
-            [ends[0]],
-            *(np.linspace(a, b, cells + 1)[1:] for a, b in pairwise(ends)),
-        ]
-    )
+    z = np.concatenate([[ends[0]], *(np.linspace(a, b, cells + 1)[1:] for a, b in pairwise(ends))])
     side = [0.0, min(lengths) / cells * 2]
     mesh = meshes.extrude(side, side, z)
     middle = mesh.points[mesh.tets[:, :4]].mean(axis=1)[:, 2]
