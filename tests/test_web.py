@@ -774,6 +774,18 @@ def session(request):
     made.worker.close()
 
 
+def test_the_state_of_a_page_is_numbers_texts_and_what_they_make_up(session):
+    def plain(value):
+        if isinstance(value, dict):
+            return all(isinstance(key, str) and plain(each) for key, each in value.items())
+        if isinstance(value, list | tuple):
+            return all(map(plain, value))
+        return value is None or isinstance(value, str | bytes | int | float)
+
+    assert session.state.waves_stale is True
+    assert [key for key, value in session.state.to_dict().items() if not plain(value)] == []
+
+
 def test_a_move_changes_what_is_shown(session):
     before = session.state.spectrum_plot
     with session.state:
