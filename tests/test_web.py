@@ -31,7 +31,7 @@ from skinwave.cli import main
 from skinwave.models import speeds
 from skinwave.planning.plan import plan
 from skinwave.propagation import share_outside
-from skinwave.scene import BODIES, Body
+from skinwave.scene import BODIES, KINDS, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
 from skinwave.steps import PREPARING, Step, follower
@@ -528,9 +528,13 @@ def test_tabulated_waves_follow_paths_of_their_own(scene, more):
     assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(exact)
 
 
+def meshed_with(monkeypatch, kind, h):
+    monkeypatch.setitem(KINDS, kind, replace(KINDS[kind], interactive_size=h))
+
+
 @pytest.mark.slow
 def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    meshed_with(monkeypatch, "sheet", 5e-3)
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
     paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
     values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
@@ -553,7 +557,7 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
 
 @pytest.mark.parametrize("air", [False, True])
 def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "sheet", 5e-3)
+    meshed_with(monkeypatch, "sheet", 5e-3)
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=air)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
     answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
@@ -575,7 +579,7 @@ def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
 
 @pytest.mark.slow
 def test_a_palm_answers(monkeypatch):
-    monkeypatch.setitem(waves.SIZES, "palm", 12e-3)
+    meshed_with(monkeypatch, "palm", 12e-3)
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
     answered, said = waves.BodyResponses(), []
     shown = answered(scenes.scene_of(values), lambda *told: said.append(told), moving=True)
