@@ -16,6 +16,7 @@ from skinwave.bodies.build import build
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.comparison import compare
+from skinwave.models import Request
 from skinwave.models.full import harmonic_answer
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import (
@@ -79,7 +80,8 @@ def test_elements_of_a_body_that_loses_nothing_balance_their_energy():
     text = SHORT.replace("[body]", f"[body]\nsides = 'clamped'\n{LOSSLESS}")
     scene = loads(text.replace("VISCOUS", "0"))
     times = np.arange(500) / 1e4
-    found = harmonic_answer(scene, times, lambda what, done: None, h=0.01)
+    request = Request(times=times, tolerance=0.05, report=lambda what, done: None, h=0.01)
+    found = harmonic_answer(scene, request)
     assert found.effort.energy_imbalance < 0.01
 
 

@@ -26,13 +26,12 @@ from simple_model import (
 )
 from simple_model.flat_body import point_response, steady_lines
 from simple_model.focus import lobe_width, spot_width
-from skinwave.bodies import KINDS
 from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
 from skinwave.models import speeds
 from skinwave.planning.plan import plan
 from skinwave.propagation import share_outside
-from skinwave.scene import BODIES, Body
+from skinwave.scene import BODIES, KINDS, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
 from skinwave.steps import PREPARING, Step, follower
@@ -529,9 +528,13 @@ def test_tabulated_waves_follow_paths_of_their_own(scene, more):
     assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(exact)
 
 
+def meshed_with(monkeypatch, kind, h):
+    monkeypatch.setitem(KINDS, kind, replace(KINDS[kind], interactive_size=h))
+
+
 @pytest.mark.slow
 def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
-    monkeypatch.setitem(KINDS, "sheet", replace(KINDS["sheet"], interactive_size=5e-3))
+    meshed_with(monkeypatch, "sheet", 5e-3)
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
     paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
     values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
@@ -554,7 +557,7 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
 
 @pytest.mark.parametrize("air", [False, True])
 def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
-    monkeypatch.setitem(KINDS, "sheet", replace(KINDS["sheet"], interactive_size=5e-3))
+    meshed_with(monkeypatch, "sheet", 5e-3)
     own = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=air)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
     answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
@@ -576,7 +579,7 @@ def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
 
 @pytest.mark.slow
 def test_a_palm_answers(monkeypatch):
-    monkeypatch.setitem(KINDS, "palm", replace(KINDS["palm"], interactive_size=12e-3))
+    meshed_with(monkeypatch, "palm", 12e-3)
     values = STARTS | {"body": "palm", "duration": 0.1, "size": 8.0}
     answered, said = waves.BodyResponses(), []
     shown = answered(scenes.scene_of(values), lambda *told: said.append(told), moving=True)
@@ -773,6 +776,18 @@ def session(request):
     made.state.ready()
     yield made
     made.worker.close()
+
+
+def test_the_state_of_a_page_is_numbers_texts_and_what_they_make_up(session):
+    def plain(value):
+        if isinstance(value, dict):
+            return all(isinstance(key, str) and plain(each) for key, each in value.items())
+        if isinstance(value, list | tuple):
+            return all(map(plain, value))
+        return value is None or isinstance(value, str | bytes | int | float)
+
+    assert session.state.waves_stale is True
+    assert [key for key, value in session.state.to_dict().items() if not plain(value)] == []
 
 
 def test_a_move_changes_what_is_shown(session):

@@ -111,7 +111,7 @@ def register(model: Model) -> Model:
         If there is one of that name.
     """
     home = BUILT_IN.get(model.name)
-    if home and model.solve.__module__ != f"{__name__}.{home}":
+    if home and not model.solve.__module__.startswith(f"{__name__}."):
         raise ValueError(f"'{model.name}' is registered already; choose another name")
     extensions.add(_MODELS, model.name, model, model.solve)
     return model

@@ -20,7 +20,7 @@ from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
-from skinwave.models import MapFunction
+from skinwave.models import Request
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import Body, Scene
 
@@ -98,38 +98,13 @@ def energy_balance(
     return imbalance, radiated
 
 
-def transient_answer(
-    scene: Scene,
-    times: Floats,
-    report: Progress,
-    *,
-    h: float | None = None,
-    dt: float | None = None,
-    solver: str = "auto",
-) -> Response:
-    """Direct time integration of all dofs, interpolated by a cubic spline.
-
-    Parameters
-    ----------
-    scene : Scene
-    times : (t,) float, s, equally spaced from 0
-    report, h, dt, solver : as for `simulate`, `report` its progress
-
-    Returns
-    -------
-    Response, displacement (t, p) in metre
-
-    Raises
-    ------
-    Diverged
-        As `marched` does.
-    ValueError
-        As `step_count` does, or if the body has no mesh of that size.
-    """
-    dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+def transient_answer(scene: Scene, request: Request) -> Response:
+    """Direct time integration of all dofs in steps of dt, interpolated by a cubic spline."""
+    times, report, solver = request.times, request.report, request.solver
+    dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
     clock = Clock()
-    build = meshed(scene.body, h, clock, report)
+    build = meshed(scene.body, request.h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
     S = surface_motion(scene.body, build, scene.probe_points)
@@ -143,16 +118,12 @@ def transient_answer(
         states = fem.transient(ops, force, dt, solver=solver)
         balanced = fem.with_energy_balance(ops, islice(states, steps + 1), force)
         stepped, energy = marched(
-            balanced,
-            steps,
-            lambda u: S @ u,
-            lambda state: fem.stored(ops, state),
-            report,
+            balanced, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
         )
     displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
     used = fem.available()[0] if solver == "auto" else solver
     found = _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
-    return discretised(found, build, h or default_size(scene.body), dt)
+    return discretised(found, build, request.h or default_size(scene.body), dt)
 
 
 def marched(
@@ -211,39 +182,14 @@ def step_count(duration: float, dt: float) -> int:
     return max(3, ceil(duration / dt - 1e-9))
 
 
-def harmonic_answer(
-    scene: Scene,
-    times: Floats,
-    report: Progress,
-    *,
-    h: float | None = None,
-    solver: str = "auto",
-    threshold: float = 1e-3,
-    mapped: MapFunction = map,
-) -> Response:
-    """Steady state: one factorisation for each line of the load, but for the mean if the body is
-    unconstrained.
-
-    Parameters
-    ----------
-    scene : Scene
-    times : (t,) float, s, equally spaced
-    report, h, solver, mapped : as for `simulate`, `report` its progress
-    threshold : of the strongest line; weaker ones are left out
-
-    Returns
-    -------
-    Response, displacement (t, p) in metre
-
-    Raises
-    ------
-    ValueError
-        If the load has too many lines, or the body no mesh of that size.
-    Diverged
-        If the energy balance of a line is violated.
+def harmonic_answer(scene: Scene, request: Request) -> Response:
+    """Steady state: one factorisation for each line of the load above a threshold, but for the mean
+    if the body is unconstrained.
     """
+    times, report, solver = request.times, request.report, request.solver
+    threshold = request.tolerance / 50  # of the strongest line
     clock = Clock()
-    build = meshed(scene.body, h, clock, report)
+    build = meshed(scene.body, request.h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
     S = surface_motion(scene.body, build, scene.probe_points)
@@ -261,7 +207,7 @@ def harmonic_answer(
         amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
         total = fem.EnergyBalance()
         report("lines", 0.0)
-        answers = mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
+        answers = request.mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
         for k, (amplitudes[k], power) in enumerate(answers):
             report("lines", (k + 1) / len(frequencies))
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
@@ -272,7 +218,7 @@ def harmonic_answer(
     count = len(frequencies)
     used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
     found = _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
-    return discretised(found, build, h or default_size(scene.body))
+    return discretised(found, build, request.h or default_size(scene.body))
 
 
 def _line(

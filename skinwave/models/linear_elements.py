@@ -34,19 +34,6 @@ def _reduced(scene: Scene, request: Request) -> Response:
     return answer(prepared, scene, request.report)
 
 
-def _harmonic(scene: Scene, request: Request) -> Response:
-    return harmonic_answer(
-        scene, request.times, request.report, h=request.h, solver=request.solver,
-        threshold=request.tolerance / 50, mapped=request.mapped,
-    )  # fmt: skip
-
-
-def _transient(scene: Scene, request: Request) -> Response:
-    return transient_answer(
-        scene, request.times, request.report, h=request.h, dt=request.dt, solver=request.solver
-    )
-
-
 FEM = register(
     Model(
         name="fem",
@@ -66,7 +53,7 @@ HARMONIC = register(
         name="fem-harmonic",
         method="10-node tetrahedra, line by line",
         words="the steady state of linear waves on 10-node tetrahedra",
-        solve=_harmonic,
+        solve=harmonic_answer,
         refuse=partial(vacuum_only, "fem-harmonic"),
         error=None,
         default_size=default_size,
@@ -79,7 +66,7 @@ TRANSIENT = register(
         name="fem-transient",
         method="10-node tetrahedra, step by step",
         words="linear waves on 10-node tetrahedra, step by step",
-        solve=_transient,
+        solve=transient_answer,
         refuse=partial(vacuum_only, "fem-transient"),
         error=None,
         default_size=default_size,

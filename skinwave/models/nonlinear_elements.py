@@ -2,9 +2,8 @@
 
 from functools import partial
 
-from simple_model import Response
 from skinwave.bodies.body import Body
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.linear_elements import vacuum_only
 from skinwave.models.stretching import (
     expected_error,
@@ -23,18 +22,6 @@ def _error(scene: Scene, h: float | None) -> float:
     return expected_error(scene.body, h)
 
 
-def _reduced(scene: Scene, request: Request) -> Response:
-    return reduced_answer(
-        scene, request.times, request.report, h=request.h, dt=request.dt, solver=request.solver
-    )
-
-
-def _full(scene: Scene, request: Request) -> Response:
-    return full_answer(
-        scene, request.times, request.report, h=request.h, dt=request.dt, solver=request.solver
-    )
-
-
 def _refuse_of_full(body: Body) -> None:
     sheet_only(body, "fem-nonlinear-transient")
     vacuum_only("fem-nonlinear-transient", body)
@@ -46,7 +33,7 @@ REDUCED = register(
         method=METHOD,
         words="a sheet that stretches as it bends, in its modes, about its rest under the mean "
         "pressure",
-        solve=_reduced,
+        solve=reduced_answer,
         refuse=lambda body: sheet_only(body, "fem-nonlinear"),
         error=_error,
         default_size=partial(stretching_size, reduced=True),
@@ -59,7 +46,7 @@ FULL = register(
         name="fem-nonlinear-transient",
         method=METHOD,
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
-        solve=_full,
+        solve=full_answer,
         refuse=_refuse_of_full,
         error=_error,
         default_size=partial(stretching_size, reduced=False),

@@ -30,7 +30,8 @@ from simple_model.load_spectrum import (
 from simple_model.sampling import resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
-from skinwave.effort import Clock, Progress, peak_memory, versions
+from skinwave.effort import Clock, peak_memory, versions
+from skinwave.models import Request
 from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
 from skinwave.models.loads import surface_load
 from skinwave.scene import Body, Scene
@@ -125,53 +126,26 @@ def mean_pressure(pressure: MovingPressure, points: Floats) -> Floats:
     return (along[:, lines.harmonics[mean]] @ lines.coefficients[mean]).real
 
 
-def full_answer(
-    scene: Scene,
-    times: Floats,
-    report: Progress,
-    *,
-    h: float | None = None,
-    dt: float | None = None,
-    solver: str = "auto",
-) -> Response:
-    """Direct time integration of all dofs at large deflection, from equilibrium under the mean
-    pressure.
-
-    Parameters
-    ----------
-    scene : Scene, with a clamped sheet
-    times : (t,) float, s, equally spaced from 0
-    report, h, dt, solver : as for `simulate`, `report` its progress
-
-    Returns
-    -------
-    Response, displacement (t, p) in metre
-
-    Raises
-    ------
-    Diverged
-        If a step or the equilibrium does not converge, or the energy balance is violated.
-    ValueError
-        As `step_count` does, or if the body has no mesh of that size.
-    """
-    clock = Clock()
+def full_answer(scene: Scene, request: Request) -> Response:
+    """Direct time integration of all dofs, from equilibrium under the mean pressure."""
+    clock, size = Clock(), request.h or stretching_size(scene.body, reduced=False)
     with clock("assemble"):
-        report("assemble", 0.0)
-        made = meshed_sheet(scene.body, h or stretching_size(scene.body, reduced=False))
+        request.report("assemble", 0.0)
+        made = meshed_sheet(scene.body, size)
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
     S = fem.probe_operator(made.mesh, scene.probe_points)
-    dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     found = _about_rest(
-        "fem-nonlinear-transient", scene, times, report, clock,
+        "fem-nonlinear-transient", scene, request, clock,
         body=body,
         mean=P @ mean_pressure(scene.pressure, points),
         force=lambda t: P @ scene.pressure(points, t, over=dt),
         read=lambda u: S @ u,
-        dt=dt, solver=solver,
+        dt=dt,
         effort=Effort(dofs=len(body.operators.free)),
     )  # fmt: skip
-    return discretised(found, made, h or stretching_size(scene.body, reduced=False), dt)
+    return discretised(found, made, size, dt)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -185,55 +159,37 @@ class _Reduced:
     dofs: int
 
 
-def reduced_answer(
-    scene: Scene,
-    times: Floats,
-    report: Progress,
-    *,
-    h: float | None = None,
-    dt: float | None = None,
-    solver: str = "auto",
-) -> Response:
-    """Time integration of the sheet's bending modes at large deflection, from equilibrium under the
-    mean pressure.
-
-    Parameters
-    ----------
-    scene, times, report, h, dt, solver : as for `full_answer`, with its errors
-
-    Returns
-    -------
-    Response, displacement (t, p) in metre
-    """
-    clock = Clock()
+def reduced_answer(scene: Scene, request: Request) -> Response:
+    """Time integration of the sheet's bending modes, from equilibrium under the mean pressure."""
+    clock, size = Clock(), request.h or stretching_size(scene.body, reduced=True)
     with clock("reduce"):
-        report("reduce", 0.0)
-        sheet = _reduced(scene.body, h, solver)
+        request.report("reduce", 0.0)
+        sheet = _reduced(scene.body, size, request.solver)
         hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
         read = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
 
     def force(t: float) -> Floats:
         return (np.exp(2j * pi * hz * t) @ forces).real
 
-    dt = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     found = _about_rest(
-        "fem-nonlinear", scene, times, report, clock,
+        "fem-nonlinear", scene, request, clock,
         body=sheet.modes.elastic,
         mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
         read=lambda z: read @ z,
-        dt=dt, solver=solver,
+        dt=dt,
         effort=Effort(
             dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
         ),
     )  # fmt: skip
-    return discretised(found, sheet.made, h or stretching_size(scene.body, reduced=True), dt)
+    return discretised(found, sheet.made, size, dt)
 
 
 @lru_cache(maxsize=1)
-def _reduced(body: Body, h: float | None, solver: str) -> _Reduced:
+def _reduced(body: Body, h: float, solver: str) -> _Reduced:
     """Reduce the sheet to its modes, cached for many Tactons in a row."""
-    made = meshed_sheet(body, h or stretching_size(body, reduced=True))
+    made = meshed_sheet(body, h)
     operators = stretching_body(body, made).operators
     modes = fem.stretching_modes(
         made.mesh, operators, membrane(body, made, 1.0), mode_count(body),
@@ -253,11 +209,12 @@ def mode_count(body: Body) -> int:
 
 
 def _about_rest(
-    model: str, scene: Scene, times: Floats, report: Progress, clock: Clock, *,
+    model: str, scene: Scene, request: Request, clock: Clock, *,
     body: fem.Elastic, mean: Floats, force: Callable[[float], Floats],
-    read: Callable[[Floats], Floats], dt: float, solver: str, effort: Effort,
+    read: Callable[[Floats], Floats], dt: float, effort: Effort,
 ) -> Response:  # fmt: skip
     """Time integration from the static equilibrium under the mean load (preload)."""
+    times, report, solver = request.times, request.report, request.solver
     steps = step_count(float(times[-1]), dt)
     kept = lru_cache(maxsize=2)(force)
     with clock("preload"):

@@ -31,7 +31,9 @@ def connect(session: Session) -> None:
     )  # fmt: skip
     for answered, keys in watched:
         session.state.change(*keys)(_without_state(answered, session))
-    for move in (select, restart, zoom, own_path):
+    for move in (
+        entered, select, restart, zoom, follow, own_path, preset, undo, redo, pin, exchange, cancel,
+    ):  # fmt: skip
         session.server.trigger(move.__name__)(partial(move, session))
     for name, made in offered(session).items():
         session.server.trigger(name)(made)
@@ -88,9 +90,9 @@ def _checked(session: Session, given: Values) -> tuple[Values, dict[str, str], d
     return accepted, errors, typed
 
 
-def setter(session: Session, key: str) -> Callable[[Any], None]:
-    """Function that a control's field calls with what was typed."""
-    return lambda given: turn(session, {key: given})
+def entered(session: Session, key: str, given: Any) -> None:
+    """Set the control of a field in which something was typed."""
+    turn(session, {choose("control", str(key), KEYS): given})
 
 
 def follow(session: Session, own: str) -> None:

@@ -98,7 +98,7 @@ def refresh(session: Session) -> None:
         state.update({"problem": str(error), "stale": True})
         return
     session.number += 1
-    waiting = session.scene.body.of_kind.discretise
+    waiting = session.scene.body.of_kind.discretise is not None
     if not waiting:
         session.worker.cancel()
         session.waves = None
