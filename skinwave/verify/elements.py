@@ -10,7 +10,7 @@ import meshes
 from fem.assembly import element_stiffness
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import EDGES
-from skinwave.verify.case import Case, Check, below, described
+from skinwave.verify.case import Case, Check, below, described, yes
 from skinwave.verify.references import Floats
 
 DisplacementField = Callable[[Floats], Floats]
@@ -124,9 +124,8 @@ def inverted() -> Case:
         "is inverted",
     )
     touched = np.flatnonzero((mesh.tets == mesh.tets[3, 4]).any(axis=1))
-    named = float(any(case.said.startswith(f"element {e} ") for e in touched))
-    what = "the element that it names has the moved node"
-    check = Check(what=what, value=named, reference=1.0, error=1 - named, bar=0.0)
+    named = any(case.said.startswith(f"element {e} ") for e in touched)
+    check = yes("the element that it names has the moved node", named)
     return replace(case, checks=(*case.checks, check))
 
 
@@ -151,11 +150,7 @@ def refused(
         sentence = "nothing: it was accepted"
     except kind as error:
         sentence = str(error)
-    named = float(said in sentence)
-    check = Check(
-        what=f'refused, naming "{said}"',
-        value=named, reference=1.0, error=1 - named, bar=0.0,
-    )  # fmt: skip
+    check = yes(f'refused, naming "{said}"', said in sentence)
     return Case(title=title, source=source, mesh=mesh, checks=(check,), said=sentence)
 
 
