@@ -32,9 +32,8 @@ HANKEL = "Hankel's integral on the real axis: Sneddon, Fourier Transforms (1951)
 def exact_half_space() -> Case:
     """A half-space under a focus at rest and in vibration."""
     poissons = (0.0, 0.3, 0.49, 0.5)
-    rest = [
-        abs(point_response(half_space(SKIN, poisson=nu), RADII, [0.0], WIDTH)[0]) for nu in poissons
-    ]
+    bodies = [half_space(SKIN, poisson=nu) for nu in poissons]
+    rest = [abs(point_response(body, RADII, [0.0], WIDTH)[0]) for body in bodies]
     closed = [
         references.gaussian_at_rest(RADII, width=WIDTH, shear_modulus=7.86e3, poisson=nu)
         for nu in poissons
@@ -56,11 +55,10 @@ def exact_half_space() -> Case:
 
 def exact_sheet() -> Case:
     """A focus on an infinite paper sheet, with the added mass of air."""
-    w = 2 * np.pi * FREQUENCIES[1:]
-    found = point_response(thin_sheet(fem.PRESETS["paper"], THICKNESS), RADII, w, WIDTH)
-    exact = np.array(
-        [references.gaussian_response(_paper(hz), RADII, width=WIDTH) for hz in FREQUENCIES[1:]]
-    )
+    hz = FREQUENCIES[1:]
+    body = thin_sheet(fem.PRESETS["paper"], THICKNESS)
+    found = point_response(body, RADII, 2 * np.pi * hz, WIDTH)
+    exact = [references.gaussian_response(_paper(f), RADII, width=WIDTH) for f in hz]
     return Case(
         title="Wavenumber integral (flat-body): a focus on paper with air",
         source=f"Cremer, Heckl and Petersson, Structure-Borne Sound (2005); {HANKEL}",

@@ -82,12 +82,9 @@ def modulation_frequencies() -> Case:
         for k, (x, _) in enumerate(PROBES)
     ]
     fast = float(lines(_answered(0.5, am=1000.0), [1000.0])[0, 0])
-    made = build(BODY, H)
-    ops = operators(made)
-    load = MovingPressure(tacton=Tacton(), drive="linear")
-    points = fem.facet_points(made.mesh)[:, :2]
-    force = fem.load_operator(made.mesh) @ load(points, 0.0)
-    u = fem.probe_operator(made.mesh, PROBES) @ fem.harmonic(ops, force, 1000.0)[0]
+    made, load = build(BODY, H), MovingPressure(tacton=Tacton(), drive="linear")
+    force = fem.load_operator(made.mesh) @ load(fem.facet_points(made.mesh)[:, :2], 0.0)
+    u = fem.probe_operator(made.mesh, PROBES) @ fem.harmonic(operators(made), force, 1000.0)[0]
     checks.append(relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m"))
     return Case(
         title="Amplitude modulation from 1 Hz to 1 kHz",

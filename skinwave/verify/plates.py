@@ -124,9 +124,8 @@ def thin_sheets() -> Case:
         x, y = lines.setdefault(sheet, ([], []))
         x.append(aspect)
         y.append(100 * checks[-1].error)
-    lost = [
-        abs(found / exact - 1) for found, exact, _ in (_strip_bending(1e-4, a) for a in (20, 50))
-    ]
+    single = [_strip_bending(1e-4, aspect) for aspect in (20, 50)]
+    lost = [abs(found / exact - 1) for found, exact, _ in single]
     return Case(
         title="Sheets of thickness / width 0.0001 to 0.2, elements of aspect 1 to 50",
         source="Filon (1903): strip under a sine of pressure, exact; Kirchhoff's plate for scale",

@@ -143,10 +143,8 @@ def column_of_two_layers() -> Case:
     moduli = [m.first_lame + 2 * m.shear_modulus for m in solids.values()]
     rest = sum(length / m for length, m in zip(lengths, moduli, strict=True))
     hz = np.array([5.0, 20.0, 50.0, 100.0])
-    w = 2 * np.pi * hz
-    expected = references.layered_column(
-        w, lengths, [rho, rho], [m * (1 + 1j * w * lag) for m in moduli]
-    )
+    dynamic = [m * (1 + 2j * np.pi * hz * lag) for m in moduli]
+    expected = references.layered_column(2 * np.pi * hz, lengths, [rho, rho], dynamic)
     found = fem.harmonic(ops, force, hz) @ read
     return Case(
         title="Column of two layers, stiffness ratio 1e6",
@@ -187,10 +185,8 @@ def _pressure_errors(mesh: TetMesh, u: Floats, material: fem.Material) -> tuple[
     middle = corners.mean(axis=1)
     near = np.flatnonzero(np.linalg.norm(middle, axis=1) < 0.012)
     found, volume = _element_pressures(mesh, u, material, near)
-    r = np.hypot(*middle[near, :2].T)
-    closed = references.gaussian_mean_pressure(
-        r, -middle[near, 2], width=WIDTH, poisson=material.poisson
-    )
+    r, depth, nu = np.hypot(*middle[near, :2].T), -middle[near, 2], material.poisson
+    closed = references.gaussian_mean_pressure(r, depth, width=WIDTH, poisson=nu)
     error = found - closed
     cell = _cells(mesh, near)
     average = np.bincount(cell, volume * error) / np.bincount(cell, volume)
