@@ -93,7 +93,7 @@ def energy_kept() -> Case:
     a = ops.expand(fem.factorise(ops.M).solve(-(ops.K @ u[free])))
     start = fem.State(time=0.0, displacement=u, velocity=zero, acceleration=a)
     states = islice(fem.transient(ops, lambda t: zero, 1e-4, initial=start), 10_001)
-    energies = np.array([_energy(ops, state) for state in states])
+    energies = np.array([fem.stored(ops, state) for state in states])
     return Case(
         title="Free vibration conserves energy, 10,000 steps",
         source="Hughes, The Finite Element Method (1987), chapter 9: average acceleration",
@@ -192,11 +192,6 @@ def _answers(length: float, time: float, mass: float) -> Floats:
     moved = [fem.static(ops, force), *fem.harmonic(ops, force, [140 / time]), late]
     frequencies = fem.modes(ops, 3)[0] * time
     return np.concatenate([*(S @ u / length for u in moved), frequencies])
-
-
-def _energy(ops: fem.Operators, state: fem.State) -> float:
-    v, x = state.velocity[ops.free], state.displacement[ops.free]
-    return float((v @ ops.M @ v + x @ ops.K @ x) / 2)
 
 
 def _eigenvalue(matrix: Floats) -> complex:

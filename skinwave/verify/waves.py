@@ -16,6 +16,7 @@ from skinwave.verify.statics import QUARTER, RADII, WIDTH, focus_force, on_axis,
 
 FOREARM: dict[str, Any] = {"density": 1000.0, "shear_modulus": 7.86e3, "viscosity": 5.03}
 ACHENBACH = "Achenbach, Wave Propagation in Elastic Solids (1973)"
+SLIDING = {"left": "x", "right": "x", "front": "y", "back": "y"}
 LYSMER = "Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969)"
 
 
@@ -140,9 +141,8 @@ def _strip_modes(k: float) -> Floats:
     """Angular frequencies of half a wavelength of a plate between sliding ends."""
     x = np.linspace(0, np.pi / k, max(8, int(np.ceil(4 * np.pi / k))) + 1)
     mesh = meshes.extrude(x, [0, 0.25], np.linspace(-1, 0, 5))
-    sliding = {"left": "x", "right": "x", "front": "y", "back": "y"}
     material = fem.Material(density=1, shear_modulus=1, poisson=0.3)
-    return 2 * np.pi * fem.modes(fem.assemble(mesh, material, fixed=sliding), 12)[0]
+    return 2 * np.pi * fem.modes(fem.assemble(mesh, material, fixed=SLIDING), 12)[0]
 
 
 def absorbed_pulse() -> Case:
@@ -210,8 +210,8 @@ def oblique_in_plane() -> Case:
 
 def _surface_wave(mesh: TetMesh, material: fem.Material) -> float:
     """Frequency of the mode that moves the top most like cos(2 pi x)."""
-    fixed = {"left": "x", "right": "x", "front": "y", "back": "y", "bottom": "xyz"}
-    hz, shapes = fem.modes(fem.assemble(mesh, material, fixed=fixed), 6)
+    ops = fem.assemble(mesh, material, fixed={**SLIDING, "bottom": "xyz"})
+    hz, shapes = fem.modes(ops, 6)
     top = np.unique(mesh.facets["top"])
     wave = np.abs(np.cos(2 * np.pi * mesh.points[top, 0]) @ shapes[3 * top + 2])
     return float(hz[np.argmax(wave)])
@@ -238,9 +238,8 @@ def _strip(k: float, length: float, h: float) -> TetMesh:
     """Half a trace wavelength wide (one cell for normal incidence), one cell across."""
     width = np.pi / k if k else h
     n = int(np.ceil(width / h))
-    return meshes.extrude(
-        np.linspace(0, width, n + 1), [0, h], np.linspace(-length, 0, int(length / h) + 1)
-    )
+    z = np.linspace(-length, 0, int(length / h) + 1)
+    return meshes.extrude(np.linspace(0, width, n + 1), [0, h], z)
 
 
 def _reflected_sh(angle: float) -> float:
@@ -265,9 +264,8 @@ def _reflected_sh(angle: float) -> float:
 def _reflected_in_plane(k: float, waves: Floats) -> Floats:
     """Reflection (P and SV in, P and SV out) at the base, from two ways to push the top."""
     mesh, length = _strip(k, 3.0, 0.1), 3.0
-    fixed = {"left": "x", "right": "x", "front": "y", "back": "y"}
     material = fem.Material(density=1, shear_modulus=1, poisson=0.25)
-    ops = fem.assemble(mesh, material, fixed=fixed, absorbing="bottom")
+    ops = fem.assemble(mesh, material, fixed=SLIDING, absorbing="bottom")
     P, x = fem.load_operator(mesh), fem.facet_points(mesh)[:, 0]
     normal = P @ np.cos(k * x)
     shear = np.roll((P @ np.sin(k * x)).reshape(-1, 3), 1, axis=1).ravel()
