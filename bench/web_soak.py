@@ -49,16 +49,18 @@ def family(pid: int) -> list[int]:
     return found
 
 
-def memory(pid: int) -> float:
-    """Memory in MB of a process and all that it has started; shared pages count once."""
-    kilobytes = 0
-    for each in family(pid):
-        try:
-            said = Path(f"/proc/{each}/smaps_rollup").read_text()
-        except OSError:
-            continue
-        kilobytes += int(re.search(r"^Pss:\s+(\d+)", said, re.M)[1])  # type: ignore[index]
-    return kilobytes / 1024
+def read(path: str) -> bytes:
+    """Contents of a file of /proc; none if its process has ended."""
+    try:
+        return Path(path).read_bytes()
+    except OSError:
+        return b""
+
+
+def held(pid: int) -> float:
+    """MB that a process holds of its own; shared pages count once."""
+    found = re.search(rb"^Pss:\s+(\d+)", read(f"/proc/{pid}/smaps_rollup"), re.M)
+    return int(found[1]) / 1024 if found else 0.0
 
 
 def heap(page: Page) -> float:
@@ -137,7 +139,7 @@ def turned(
             for page in pages:
                 settled(page)
             time.sleep(LATER + 3)  # the process that waits for the next page is ready
-            sizes.append([memory(server), *map(heap, pages)])
+            sizes.append([sum(map(held, family(server))), *map(heap, pages)])
             print(f"{time.monotonic() - start:5.0f} s, {sum(made.values())} moves: server "
                   f"{sizes[-1][0]:.0f} MB, pages {sizes[-1][1]:.1f} and {sizes[-1][2]:.1f} MB",
                   flush=True)  # fmt: skip

@@ -20,7 +20,7 @@ from typing import Any
 
 import aiohttp
 
-from bench.web_soak import COMMAND, family
+from bench.web_soak import COMMAND, family, held, read
 from skinwave.web.controls import CHOICES, NUMBERS, presets
 from tests.page_client import Client, Refused, browser, opened
 
@@ -83,7 +83,7 @@ def page_processes(server: int) -> list[int]:
     """Processes of pages, of which one may be the one that waits for the next."""
     return [
         pid for pid in family(server)
-        if b"skinwave.web.serve" in _read(f"/proc/{pid}/cmdline")
+        if b"skinwave.web.serve" in read(f"/proc/{pid}/cmdline")
     ]  # fmt: skip
 
 
@@ -93,19 +93,6 @@ async def killing(server: int, rng: random.Random, made: Made) -> None:
         if there := page_processes(server):
             os.kill(rng.choice(there), signal.SIGKILL)
             made["killed"] += 1
-
-
-def held(pid: int) -> float:
-    """MB that a process holds of its own."""
-    found = re.search(rb"^Pss:\s+(\d+)", _read(f"/proc/{pid}/smaps_rollup"), re.M)
-    return int(found[1]) / 1024 if found else 0.0
-
-
-def _read(path: str) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError:
-        return b""
 
 
 async def used(server: int, address: str, seconds: float, rng: random.Random, pages: int) -> Any:
@@ -132,7 +119,7 @@ async def used(server: int, address: str, seconds: float, rng: random.Random, pa
 
 def _alive(pid: int) -> bool:
     """Whether a process is there, and not only its exit code."""
-    return b") Z " not in _read(f"/proc/{pid}/stat") and Path(f"/proc/{pid}").exists()
+    return b") Z " not in read(f"/proc/{pid}/stat") and Path(f"/proc/{pid}").exists()
 
 
 def stress(seconds: float, seed: int, pages: int) -> bool:

@@ -73,9 +73,8 @@ def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
     _legend(figure, runs, scales=True)
-    inch = (
-        style.zoom / figure.get_figheight()
-    )  # fixed margins: a computed layout takes twice as long
+    # Fixed margins: a computed layout takes twice as long.
+    inch = style.zoom / figure.get_figheight()
     top = 0.8 + 0.2 * (len(runs) > IN_A_ROW)
     figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
     return figure
@@ -127,32 +126,29 @@ def answered(run: Run) -> str:
     return label(run.column) if run.body == "none" else f"{label(run.body)} ({run.model})"
 
 
+def sized(value: float, unit: str, digits: int = 3) -> str:
+    """A pressure in Pa, or a motion in metre as µm, with its unit."""
+    if unit == "Pa":
+        return f"{significant(value, digits)} Pa"
+    return f"{significant(1e6 * value, digits)} µm"
+
+
 def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     """One entry a model, with what 1 on the waveform axis stands for if that is one number."""
     handles, labels = [], []
     for run in runs:
         style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        labels.append(answered(run) + (f", 1 = {_scale_text(run)}" if scales else ""))
+        scale = sized(_largest(run), run.response.unit)
+        labels.append(answered(run) + f", 1 = {scale}" * scales)
     kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
     if kinds:
         style = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
         handles.append(figure.axes[0].plot([], [], **style)[0])
         labels.append(f"open: {', '.join(kinds)}")
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper center" if figure.get_layout_engine() else "upper center",
-        ncols=len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2),
-        frameon=False,
-    )
-
-
-def _scale_text(run: Run) -> str:
-    scale = _largest(run)
-    if run.response.unit == "Pa":
-        return f"{significant(scale)} Pa"
-    return f"{significant(1e6 * scale)} µm"
+    where: Any = "outside upper center" if figure.get_layout_engine() else "upper center"
+    ncols = len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2)
+    figure.legend(handles, labels, loc=where, ncols=ncols, frameon=False)
 
 
 def _shown(run: Run) -> slice:
@@ -196,9 +192,8 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
             at, size = np.array(found).reshape(-1, 2).T  # a constant pressure has none
             height = 20 * np.log10(np.maximum(size / top, 1e-12))
             seen = height > FLOOR
-            ax.plot(
-                at[seen], height[seen], ls="", marker=marker(run.column), ms=4, mfc=mfc, **style
-            )
+            style |= {"ls": "", "marker": marker(run.column), "ms": 4, "mfc": mfc}
+            ax.plot(at[seen], height[seen], **style)
     ax.set_xlim(0, HIGHEST)
     ax.set_ylim(FLOOR, 14)
     ax.set_yticks(np.arange(FLOOR, 1, 20))
@@ -217,14 +212,8 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
         level = moving_rms(run.response)
         radius = 1e3 * np.hypot(*run.response.probes.T)
         decibel = 20 * np.log10(np.maximum(level / max(level.max(), 1e-300), 1e-12))
-        ax.plot(
-            radius,
-            decibel,
-            color=inked(run.column),
-            marker=marker(run.column),
-            lw=_width(run),
-            ms=5,
-        )
+        style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "ms": 5}
+        ax.plot(radius, decibel, lw=_width(run), **style)
     for drop in (-6, -20):
         ax.axhline(drop, color="0.6", lw=0.8, ls="--", zorder=0)
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2

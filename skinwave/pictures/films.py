@@ -71,14 +71,9 @@ def seam(view: View) -> str:
     jump = speeds.seam(view.scene.tacton, view.period)
     if jump < ROUND_OFF:
         return f"one period of {span}, which repeats without a seam"
-    of = (
-        f"a pattern of {significant(1e3 * whole)} ms"
-        if whole
-        else "a pattern that never quite repeats"
-    )
-    return (
-        f"{span} of {of}; where it begins again, phases jump by up to {100 * jump:.2g} % of a turn"
-    )
+    repeats = f"of {significant(1e3 * whole)} ms" if whole else "that never quite repeats"
+    turn = f"phases jump by up to {100 * jump:.2g} % of a turn"
+    return f"{span} of a pattern {repeats}; where it begins again, {turn}"
 
 
 def lasts(frames: int) -> float:

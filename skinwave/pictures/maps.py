@@ -15,10 +15,10 @@ from matplotlib.tri import Triangulation
 from meshes.tetmesh import Floats
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
-from skinwave.numbers import significant
-from skinwave.pictures.figures import inked, label
+from skinwave.pictures.figures import inked, label, sized
 from skinwave.pictures.styles import Style
 from skinwave.pictures.views import Trace, View, path_points, spread_radius, starting_time
+from skinwave.scene import Scene
 
 SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # distinguishable with every kind of colour vision
 PIXELS = 201  # of a map's side
@@ -39,10 +39,8 @@ class Raster:
     @property
     def frame(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top in mm, as images want it."""
-        left, right, bottom, top = (
-            1e3 * float(v) for v in (self.x[0], self.x[-1], self.y[0], self.y[-1])
-        )
-        return left, right, bottom, top
+        x, y = 1e3 * self.x, 1e3 * self.y
+        return float(x[0]), float(x[-1]), float(y[0]), float(y[-1])
 
 
 def common_raster(views: Sequence[View]) -> Raster:
@@ -78,8 +76,8 @@ def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
 
 def decibel(view: View) -> Floats:
     """RMS motion (s,) in dB below the view's own largest."""
-    floor = 1e-9 * max(float(view.rms.max()), 1e-300)
-    return 20 * np.log10(np.maximum(view.rms, floor) / max(float(view.rms.max()), 1e-300))
+    largest = max(float(view.rms.max()), 1e-300)
+    return 20 * np.log10(np.maximum(view.rms, 1e-9 * largest) / largest)
 
 
 def rms_figure(views: Sequence[View], style: Style) -> Figure:
@@ -96,7 +94,7 @@ def rms_figure(views: Sequence[View], style: Style) -> Figure:
                 ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors="white",
                            linewidths=1.3, linestyles=dashes)  # fmt: skip
             _draw_borderline(ax, raster, sampled(np.maximum(view.sensation, -100.0)))
-            _draw_path(ax, view, "black")
+            draw_path(ax, view.scene, "black")
             radii = " / ".join(f"{1e3 * spread_radius(view, d):.0f}" for d in DROPS)
             _title(ax, view, f"spread {radii} mm")
         figure.colorbar(image, ax=list(axes), label="RMS motion, dB re the model's largest")
@@ -121,7 +119,7 @@ def difference_figure(reference: View, views: Sequence[View], style: Style) -> F
             more = np.maximum(sampler(view, raster)(decibel(view)), DEEPEST) - base
             image = ax.imshow(more, cmap=SIGNED, vmin=DEEPEST, vmax=-DEEPEST, extent=raster.frame,
                               origin="lower")  # fmt: skip
-            _draw_path(ax, view, "black")
+            draw_path(ax, view.scene, "black")
             _title(ax, view, f"minus {label(reference.column)}")
         figure.colorbar(image, ax=list(axes), label="difference of RMS levels, dB")
     return figure
@@ -144,7 +142,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                     sampled(view.pushed[frame] / view.peak), cmap=SIGNED, vmin=-1,
                     vmax=1, extent=raster.frame, origin="lower",
                 )  # fmt: skip
-                _draw_path(ax, view, "black")
+                draw_path(ax, view.scene, "black")
                 _draw_focus(ax, view, float(view.times[frame]))
             row[0].set_ylabel(f"{label(view.column)}\n±1 = {peak_text(view)}\ny, mm",
                               color=inked(view.column))  # fmt: skip
@@ -196,21 +194,15 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
                 ax.set_title(label(view.column), color=inked(view.column))
                 _draw_world_lines(ax, view, name)
             row[0].set_ylabel("time, ms")
-        bar = figure.colorbar(
-            image,
-            ax=axes,
-            label="motion about its mean over the largest\n(above: at its place)",
-            shrink=0.6,
-        )
+        title = "motion about its mean over the largest\n(above: at its place)"
+        bar = figure.colorbar(image, ax=axes, label=title, shrink=0.6)
         bar.set_ticks([-1, -0.5, 0, 0.5, 1])
     return figure
 
 
 def peak_text(view: View) -> str:
     """The largest motion of a view with its unit."""
-    if view.unit == "Pa":
-        return f"{significant(view.peak)} Pa"
-    return f"{significant(1e6 * view.peak)} µm"
+    return sized(view.peak, view.unit)
 
 
 def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Sequence[Axes]]:
@@ -227,8 +219,9 @@ def _title(ax: Axes, view: View, below: str) -> None:
     ax.set_title(f"{label(view.column)}\n{below}", fontsize="medium")
 
 
-def _draw_path(ax: Axes, view: View, ink: str) -> None:
-    path = 1e3 * path_points(view.scene)
+def draw_path(ax: Axes, scene: Scene, ink: str) -> None:
+    """The path of the focus, or the place where it rests."""
+    path = 1e3 * path_points(scene)
     if len(path) > 1:
         ax.plot(*path.T, color=ink, ls="dotted", lw=1.2)
     else:
@@ -277,9 +270,8 @@ def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
         between = 1 / max(view.tone, 20.0)
         for t in 1e3 * np.arange(start % between - 2 * between, view.ray.times[-1], between):
             ax.plot([0, view.speed * 100], [t, t + 100], color="black", lw=1.1, ls="dashed")
-        ax.plot(
-            [], [], color="black", lw=1.1, ls="dashed", label=f"surface wave, {view.speed:.2g} m/s"
-        )
+        named = f"surface wave, {view.speed:.2g} m/s"
+        ax.plot([], [], color="black", lw=1.1, ls="dashed", label=named)
     if name == "track" and view.track is not None:
         length = 1e3 * path.length
         turns = int(view.track.times[-1] * path.drawing_frequency) + 1

@@ -12,17 +12,10 @@ from simple_model import Effort, Response
 from simple_model.load_spectrum import path_samples
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
+from skinwave.models import reduction
 from skinwave.models.full import assembled, meshed
 from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times, spent
-from skinwave.models.reduction import (
-    ReducedResponse,
-    from_rest,
-    oscillating,
-    read_at,
-    reduce_body,
-    respond,
-)
 from skinwave.scene import Scene
 from skinwave.simulation import check_options
 
@@ -37,7 +30,7 @@ class Waves:
 
     mesh: TetMesh
     basis: Floats
-    motion: ReducedResponse
+    motion: reduction.ReducedResponse
     effort: Effort
 
 
@@ -47,7 +40,7 @@ def probe_response(scene: Scene, moved: Waves) -> Response:
     read = fem.probe_operator(moved.mesh, points) @ moved.basis
     return Response(
         model="fem", times=times, probes=points,
-        displacement=from_rest(moved.motion, times) @ read.T, effort=moved.effort,
+        displacement=reduction.from_rest(moved.motion, times) @ read.T, effort=moved.effort,
     )  # fmt: skip
 
 
@@ -69,18 +62,17 @@ def waves(
         report("factorise", 0.0)
         spots = scene.pressure.spot(points, path_samples(scene.pressure))
         subspace = sparse.csr_array(fem.load_subspace(P @ spots.T, tolerance / 10).T)
-        reduced, model = reduce_body(
+        reduced, model = reduction.reduce_body(
             scene.body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
             report=report,
         )  # fmt: skip
     with clock("lines"):
-        motion = respond(reduced, scene.pressure)
+        motion = reduction.respond(reduced, scene.pressure)
+    offline = spent(reduced.effort, clock, build, h or default_size(scene.body))
     effort = replace(
-        spent(reduced.effort, clock, build, h or default_size(scene.body)),
-        steps=len(motion.frequencies),
-        energy_imbalance=motion.imbalance,
+        offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
         radiated=motion.radiated,
-    )
+    )  # fmt: skip
     mesh, basis = build.mesh, model.basis
     if build.drag is not None:  # the layer around a body is none of it
         mesh, nodes = part(mesh, build.drag == 0)
@@ -105,7 +97,7 @@ def check_values(frames: int, nodes: int) -> None:
 
 def vibration(moved: Waves, times: Floats) -> Floats:
     """Reduced coordinates (t, r) of the steady state about its mean at times as in `from_rest`."""
-    moving = oscillating(moved.motion)
+    moving = reduction.oscillating(moved.motion)
     if not len(moving.frequencies):
         return np.zeros((len(times), moving.lines.shape[1]))
     rates = np.asarray(2j * np.pi * moving.frequencies, np.complex128)
@@ -116,5 +108,5 @@ def line_amplitudes(moved: Waves, read: sparse.csr_array) -> tuple[Floats, Float
     """Frequencies (f,) in Hz above 0 and amplitudes (f, p) in metre that an operator (p, 3 n)
     reads.
     """
-    seen = read_at(oscillating(moved.motion), read @ moved.basis)
+    seen = reduction.read_at(reduction.oscillating(moved.motion), read @ moved.basis)
     return seen.frequencies, np.abs(seen.lines)

@@ -39,8 +39,5 @@ def renderer() -> Renderer:
         said = []
     if said:
         return Renderer(found=True, said=said[-1])
-    return Renderer(
-        found=False,
-        said="no picture in three dimensions can be drawn here: the GL libraries are missing; on "
-        f"Debian, apt install {PACKAGES}",
-    )
+    missing = "no picture in three dimensions can be drawn here: the GL libraries are missing"
+    return Renderer(found=False, said=f"{missing}; on Debian, apt install {PACKAGES}")

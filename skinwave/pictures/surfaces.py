@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from skinwave.pictures.figures import label
-from skinwave.pictures.views import path_points
+from skinwave.pictures.maps import draw_path
 from skinwave.propagation import NEAR, OUTSIDE
 from skinwave.scene import Scene
 from skinwave.surface import SurfaceMap
@@ -23,14 +23,11 @@ def surfaces_figure(scene: Scene, surfaces: Mapping[str, SurfaceMap]) -> Figure:
     kernel = next(iter(surfaces.values()))
     figure = Figure(figsize=((SIDE + 0.75) * len(surfaces), SIDE + 0.75), layout="constrained")
     axes = figure.subplots(1, len(surfaces), sharex=True, sharey=True, squeeze=False)[0]
-    path = 1e3 * path_points(scene)
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         x, y = 1e3 * surface.x, 1e3 * surface.y
         scale, unit = (1e6, "µm") if surface.unit == "m" else (1.0, "Pa")
-        image = ax.imshow(
-            scale * surface.rms, cmap=COLOURS, vmin=0, origin="lower",
-            extent=(x[0], x[-1], y[0], y[-1]),
-        )  # fmt: skip
+        extent = (x[0], x[-1], y[0], y[-1])
+        image = ax.imshow(scale * surface.rms, cmap=COLOURS, vmin=0, origin="lower", extent=extent)
         for field, drop, colour, dashes in (
             (kernel.rms, OUTSIDE, "#ff9e4a", "dashed"),
             (surface.rms, NEAR, "white", "solid"),
@@ -38,23 +35,15 @@ def surfaces_figure(scene: Scene, surfaces: Mapping[str, SurfaceMap]) -> Figure:
             level = np.nanmax(field) * 10 ** (drop / 20)
             if np.nanmin(field) < level:
                 ax.contour(x, y, field, [level], colors=colour, linewidths=1.3, linestyles=dashes)
-        if len(path) > 1:
-            ax.plot(*path.T, color="white", ls="dotted", lw=1.3)
-        else:
-            ax.plot(*path.T, color="white", marker="+", ls="none")
+        draw_path(ax, scene, "white")
         ax.set_title(label(column) + f" ({surface.note})" * bool(surface.note), fontsize=10)
         ax.set_xlabel("x, mm")
         figure.colorbar(image, ax=ax, label=f"RMS about the mean, {unit}", shrink=0.85)
     axes[0].set_ylabel("y, mm")
-    figure.legend(
-        handles=[
-            Line2D([], [], color="#ff9e4a", ls="dashed"),
-            Line2D([], [], color="0.6", ls="solid"),
-            Line2D([], [], color="0.6", ls="dotted"),
-        ],
-        labels=[f"kernel's {OUTSIDE:g} dB", f"{NEAR:g} dB", "path of the focus"],
-        loc="outside lower center", ncols=3, frameon=False,
-    )  # fmt: skip
+    inks = (("#ff9e4a", "dashed"), ("0.6", "solid"), ("0.6", "dotted"))
+    handles = [Line2D([], [], color=ink, ls=dashes) for ink, dashes in inks]
+    labels = [f"kernel's {OUTSIDE:g} dB", f"{NEAR:g} dB", "path of the focus"]
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 

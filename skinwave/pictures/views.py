@@ -303,9 +303,8 @@ def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
     if room < ROOM:  # the path ends where the body does
         room, way = 0.98 * reach[0] + origin[0], -1.0
     distance = np.linspace(0, room, ALONG)
-    return _traced(
-        scene, origin + way * np.column_stack([distance, 0 * distance]), distance, motion
-    )
+    places = origin + way * np.column_stack([distance, 0 * distance])
+    return _traced(scene, places, distance, motion)
 
 
 def _track(scene: Scene, motion: Motion) -> Trace | None:

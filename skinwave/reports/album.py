@@ -176,9 +176,11 @@ def _plan(
     table = asdict(replace(required, prepared=None)) | {"tolerance": PLANNED}
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     trust: dict[str, Any] = {"command": command, "model": required.model}
-    drawn = [run for run in runs if run.scene == scene]
+    drawn = [run.response.displacement for run in runs if run.scene == scene]
     if drawn and scene.body.of_kind.discretise:
-        trust["misfit"] = _misfit(_planned_answer(scene, required, solver), drawn[0].response)
+        planned = _planned_answer(scene, required, solver).displacement
+        size = float(np.linalg.norm(planned)) or 1.0
+        trust["misfit"] = float(np.linalg.norm(drawn[0] - planned)) / size
     trust["cases"] = _verified(progress)
     (folder / "trust.json").write_text(json.dumps(trust, indent=1), encoding="utf-8")
 
@@ -199,12 +201,6 @@ def _planned_answer(scene: Scene, required: Plan, solver: str) -> Response:
     return compute(scene, required.model, PLANNED, h=required.h, solver=solver)
 
 
-def _misfit(planned: Response, drawn: Response) -> float:
-    """Relative difference of two responses over all probes."""
-    size = float(np.linalg.norm(planned.displacement))
-    return float(np.linalg.norm(drawn.displacement - planned.displacement)) / (size or 1.0)
-
-
 def open_album(folder: Path) -> Album:
     """Results in a folder that `run`, `compare` or `report` wrote; no model is run.
 
@@ -217,9 +213,8 @@ def open_album(folder: Path) -> Album:
     found = [path for path in map(record.responses, scenes) if path]
     runs = [_run(path) for path in sorted(found, key=_order)]
     if not runs:
-        raise ValueError(
-            f"{folder} holds no {record.RESPONSES[0]}; give a scene file or a result folder"
-        )
+        missing = f"{folder} holds no {record.RESPONSES[0]}"
+        raise ValueError(f"{missing}; give a scene file or a result folder")
     views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own = folder / "scene.toml"
     scene = read(own) if own.exists() else runs[-1].scene

@@ -55,11 +55,10 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
     views = list(album.views.values())
     if not views:
         return [document.paragraph(NO_VIEWS)]
+    said = f"Views in three dimensions and the film are left out: {renderer().said}."
+    parts: list[str] = [document.paragraph(said)]
     if renderer().found:
         parts = _spatial(album, views, gallery, progress)
-    else:
-        said = f"Views in three dimensions and the film are left out: {renderer().said}."
-        parts = [document.paragraph(said)]
     for name, draw, caption in flat(views, gallery.style):
         progress(f"draw {name}", 0.0)
         parts.append(gallery.figure(name, draw(), caption))
@@ -77,16 +76,17 @@ def _spatial(
     progress("draw side by side", 0.0)
     beside = render.picture(views, style, frame)
     parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
-    path = gallery.folder / "film.gif"
+    path, count = gallery.folder / "film.gif", len(own.times)
     film(path, views, style, progress, panel=FILM_PANEL)
-    parts.append(_film_part(path, _film(own)))
+    slower = numbers.significant(lasts(count) / own.period, 2)
+    parts.append(
+        _film_part(path, f"Film: {seam(own)}. {count} frames, {slower} times more slowly.")
+    )
     if len(own.tets):
         progress("draw cut open", 0.0)
         cut = render.picture([own], style, _behind(own), camera="front", cut=True)
-        caption = (
-            f"{label(own.column)} cut open along y = 0, the section below the black line: "
-            f"{render.shown_scale(own)}. {MARKS}"
-        )
+        section = f"{label(own.column)} cut open along y = 0, the section below the black line"
+        caption = f"{section}: {render.shown_scale(own)}. {MARKS}"
         parts.append(gallery.image("cut-open", cut, caption))
     progress("draw from above", 0.0)
     above = render.picture(views, style, frame, camera="top")
@@ -104,9 +104,7 @@ def _spatial(
     return parts
 
 
-def flat(
-    views: Sequence[View], style: Style
-) -> Iterable[tuple[str, Callable[[], Figure], str]]:  # fmt: skip
+def flat(views: Sequence[View], style: Style) -> Iterable[tuple[str, Callable[[], Figure], str]]:
     """Name, how it is drawn and caption of every map."""
     bodies = [view for view in views if view.unit == "m"]
     kernel = next((view for view in views if view.column == SAME_LOAD.name), None)
@@ -176,13 +174,6 @@ def _film_part(path: Path, caption: str) -> str:
     with Pillow.open(path) as film:
         film.save(buffer, format="webp", save_all=True, quality=FILM_QUALITY, method=2, loop=0)
     return document.picture(buffer.getvalue(), caption, "film", "webp")
-
-
-def _film(view: View) -> str:
-    """Caption of the film: the part of the motion that it plays, and how much more slowly."""
-    count = len(view.times)
-    slower = numbers.significant(lasts(count) / view.period, 2)
-    return f"Film: {seam(view)}. {count} frames, {slower} times more slowly."
 
 
 def _part(image: render.Image, caption: str, name: str) -> str:

@@ -21,19 +21,9 @@ from skinwave.reports.gallery import Gallery, pictures, run_figures, tactons
 from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
-from skinwave.studies import summary, tables
+from skinwave.studies import description, summary, tables
 from skinwave.studies.changes import Drawn, beside_kernels, shown
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import (
-    above,
-    extent,
-    levels_of,
-    modelled,
-    path_of,
-    spot_of,
-    tones_of,
-    unresolved,
-)
 from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
 TABLED = 12  # lines in the table of lines
@@ -130,9 +120,10 @@ def _write_data(folder: Path, album: Album) -> None:
 
 def _asked(album: Album) -> str:
     rows = _asked_rows(album.scene)
-    scene = document.Markup(
+    folded = document.Markup(
         '<details class="screen"><summary>The scene in full</summary>{}</details>'
-    ).format(document.preformatted(dumps(album.scene)))
+    )
+    scene = folded.format(document.preformatted(dumps(album.scene)))
     return document.section("What was asked", document.table(["", ""], rows), scene)
 
 
@@ -141,20 +132,20 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
     depth = pressure.depth_of_modulation
     of_depth = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
     return [
-        ["focus", path_of(tacton)],
-        ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
-        ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
-        ["drive", f"{pressure.drive}{of_depth}, {spot_of(pressure)}, "
+        ["focus", description.path_of(tacton)],
+        ["amplitude modulation", ", ".join(description.tones_of(tacton)) or "none"],
+        ["amplitude", ", ".join(description.levels_of(tacton)) or "100 % of full drive"],
+        ["drive", f"{pressure.drive}{of_depth}, {description.spot_of(pressure)}, "
                   f"{pressure.peak_pressure:g} Pa at full drive, "
                   f"{1e3 * pressure.height:g} mm above the array"],
-        ["body", extent(body) + above(body)],
+        ["body", description.extent(body) + description.above(body)],
         ["duration", f"{tacton.duration:g} s"],
         ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
     ]  # fmt: skip
 
 
 def _modelled(album: Album) -> list[str]:
-    parts = [document.paragraph(text) for text in modelled(list(album.runs))]
+    parts = [document.paragraph(text) for text in description.modelled(list(album.runs))]
     if album.planned is None:
         return [*parts, document.paragraph("No plan was saved with these results; skinwave plan "
                                          "scene.toml makes one.")]  # fmt: skip
@@ -172,7 +163,7 @@ def _modelled(album: Album) -> list[str]:
 def _lines(runs: Sequence[Run]) -> str:
     """Lines of each model at the probe that moves most, the strongest of any first."""
     probe = strongest_probe(runs)
-    said = document.Markup().join(map(document.paragraph, unresolved(runs)))
+    said = document.Markup().join(map(document.paragraph, description.unresolved(runs)))
     known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
     if not known and not any(run.unnamed for run in runs):
         return said or document.paragraph("A constant pressure on a focus at rest has no line.")
@@ -239,8 +230,7 @@ def _comparison(album: Album) -> list[str]:
     if any(len(runs) > 1 for runs in groups.values()):
         parts.append(tables.agreement_table(groups))
     long = [run for run in album.runs if run.scene.tacton.duration >= ASSESSED]
-    assessed_claims = evaluate(long)
-    if assessed_claims:
+    if assessed_claims := evaluate(long):
         parts.append(document.paragraph("Claims of Lim, Seifi and Park, evaluated on these runs:"))
         parts.append(tables.claims_table(assessed_claims))
     return parts or [document.paragraph("There is one model only.")]
@@ -252,16 +242,14 @@ def _effort(album: Album) -> str:
 
 
 def _trust(album: Album) -> list[str]:
-    bodies = [run for run in album.runs if run.response.unit == "m"]
-    found = []
-    for run in bodies:
-        effort = run.response.effort
-        if effort.dofs:
-            found.append(
-                f"{label(run.body)}: relative error of the energy balance "
-                f"{effort.energy_imbalance:.0e} (refused beyond 1e-2); estimated relative error of "
-                f"the reduced-order model {significant(100 * effort.estimate, 2)} %."
-            )
+    efforts = [(run.body, run.response.effort) for run in album.runs if run.response.unit == "m"]
+    found = [
+        f"{label(body)}: relative error of the energy balance {effort.energy_imbalance:.0e} "
+        "(refused beyond 1e-2); estimated relative error of the reduced-order model "
+        f"{significant(100 * effort.estimate, 2)} %."
+        for body, effort in efforts
+        if effort.dofs
+    ]
     trust: Mapping[str, Any] = album.trust or {}
     if {"misfit", "model"} <= trust.keys():
         found.append(
@@ -294,8 +282,6 @@ def _again(album: Album) -> list[str]:
     named = ", ".join(f"{name} {version}" for name, version in made.items())
     command = (album.trust or {}).get("command") or "skinwave report scene.toml"
     said = renderer().said if renderer().found else "none"
-    return [
-        document.Markup("<p><code>{}</code></p>").format(command),
-        document.paragraph(f"Computed with {named}; drawn with {said}. The scene:"),
-        document.preformatted(dumps(album.scene)),
-    ]
+    made_by = document.paragraph(f"Computed with {named}; drawn with {said}. The scene:")
+    code = document.Markup("<p><code>{}</code></p>").format(command)
+    return [code, made_by, document.preformatted(dumps(album.scene))]

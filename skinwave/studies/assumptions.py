@@ -114,11 +114,9 @@ def relaxed(
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
     own = beyond_published(scene.pressure.drive, MovingPressure.drive)
-    pressure = replace(
-        scene.pressure,
-        focus="array" if "main lobe only" in dropped else spot,
-        drive=own if "linear drive" in dropped else PUBLISHED,
-    )
+    focus = "array" if "main lobe only" in dropped else spot
+    drive = own if "linear drive" in dropped else PUBLISHED
+    pressure = replace(scene.pressure, focus=focus, drive=drive)
     if "continuous path" in dropped:
         path = held(scene.tacton.trajectory, update_rate, points)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
@@ -163,12 +161,9 @@ def held(
     phases = np.arange(count) / count
     places = path.at_phase(phases)
     closed = np.vstack([places, places[:1]])
-    return Trajectory(
-        shape="recorded",
-        points=tuple(map(tuple, closed.tolist())),
-        times=tuple((period * np.append(phases, 1.0)).tolist()),
-        hold=True,
-    )
+    points_held = tuple(map(tuple, closed.tolist()))
+    times = tuple((period * np.append(phases, 1.0)).tolist())
+    return Trajectory(shape="recorded", points=points_held, times=times, hold=True)
 
 
 def check_rate(update_rate: float) -> None:
@@ -262,11 +257,9 @@ def as_relaxing(solid: Material, w: float) -> Material:
         return solid
     time = min(RELAXATION_TIME, (1 - LEAST_LASTING) * solid.shear_modulus / loss / w)
     turned = w * time
-    return replace(
-        _of_modulus(solid, solid.shear_modulus - loss * turned),
-        viscosity=0.0,
-        prony=(PronyTerm(modulus=loss * (1 + turned**2) / turned, time=time),),
-    )
+    term = PronyTerm(modulus=loss * (1 + turned**2) / turned, time=time)
+    lasting = _of_modulus(solid, solid.shear_modulus - loss * turned)
+    return replace(lasting, viscosity=0.0, prony=(term,))
 
 
 def as_viscous(solid: Material, w: float) -> Material:
@@ -274,11 +267,8 @@ def as_viscous(solid: Material, w: float) -> Material:
     if not w or not solid.fast_modulus:
         return solid
     relaxing = complex(solid.relaxing_modulus(w))
-    return replace(
-        _of_modulus(solid, solid.shear_modulus + relaxing.real),
-        viscosity=solid.viscosity + relaxing.imag / w,
-        prony=(),
-    )
+    stiffer = _of_modulus(solid, solid.shear_modulus + relaxing.real)
+    return replace(stiffer, viscosity=solid.viscosity + relaxing.imag / w, prony=())
 
 
 def strongest_line(scene: Scene) -> float:

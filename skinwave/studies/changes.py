@@ -106,15 +106,11 @@ def element_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
     """A body's map by elements, cached, and the kernel's."""
     x, y = grid(scene)
     below = kernel_map(scene.pressure, x, y)
-    physics = scene.body, scene.pressure
-    name, names = (
-        cache.key("surface", *physics, x, y, h, solver, versions()),
-        ("x", "y", "rms", "level"),
-    )
+    name = cache.key("surface", scene.body, scene.pressure, x, y, h, solver, versions())
+    names = ("x", "y", "rms", "level")
     if (entry := cache.load(name)) is not None:
-        return SurfaceMap(
-            **{n: entry[n] for n in names}, unit="m", note=entry["meta"]["note"]
-        ), below
+        arrays = {n: entry[n] for n in names}
+        return SurfaceMap(**arrays, unit="m", note=entry["meta"]["note"]), below
     surface = body_map(scene, x, y, h=h, solver=solver)
     cache.store(name, {"note": surface.note}, **{n: getattr(surface, n) for n in names})
     return surface, below
@@ -146,11 +142,8 @@ def _shares(scene: Scene) -> tuple[float, float] | None:
     if not has_wavenumber_integral(scene):
         return None
     solid = scene.body.solid
-    varied = [
-        solid,
-        *(solid.scaled(modulus=k) for k in (1 / STIFFER, STIFFER)),
-        *(solid.scaled(loss=k) for k in (1 / LOSSIER, LOSSIER)),
-    ]
+    varied = [solid, *(solid.scaled(modulus=k) for k in (1 / STIFFER, STIFFER))]
+    varied += [solid.scaled(loss=k) for k in (1 / LOSSIER, LOSSIER)]
     x, y = grid(scene)
     kernel = kernel_map(scene.pressure, x, y).rms
     bodies = [replace(scene, body=replace(scene.body, material=each)) for each in varied]

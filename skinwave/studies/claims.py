@@ -20,6 +20,7 @@ PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer
 ABSENT = -120.0  # dB
 MUCH_LOWER = -20.0  # dB: a tenth
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
+REACH = 6.0  # Hz from a line within which its spectral peak is looked for
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +50,9 @@ def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
         groups.setdefault((run.body, run.model), []).append(run)
     assessed_claims = []
     for (body, model), group in groups.items():
-        for claim, (applies, assess) in CLAIMS.items():
-            if chosen := [run for run in group if applies(run) and _is_told(run, claim)]:
+        for claim, (kinds, assess) in CLAIMS.items():
+            about = [run for run in group if (run.is_am, run.is_stm) in kinds]
+            if chosen := [run for run in about if _is_told(run, claim)]:
                 holds, value, bar, sentence = assess(chosen)
                 assessed_claims.append(
                     AssessedClaim(
@@ -91,38 +93,28 @@ def _is_told(run: Run, claim: str) -> bool:
 
 def _single_line(runs: list[Run]) -> Assessment:
     worst = max(_others(run).max() for run in runs)
-    return (
-        worst < ABSENT,
-        worst,
-        ABSENT,
-        f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM",
-    )
+    sentence = f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM"
+    return worst < ABSENT, worst, ABSENT, sentence
 
 
 def _am_harmonics(runs: list[Run]) -> Assessment:
     second = min(_strongest(run, ["2f_AM"]) for run in runs)
     third = min(_strongest(run, ["3f_AM"]) for run in runs)
     weakest = min(second, third)
-    return (
-        weakest > PRESENT,
-        weakest,
-        PRESENT,
-        f"at the least 2 f_AM is at {decibel(second)} dB and 3 f_AM at {decibel(third)} dB re f_AM",
+    sentence = (
+        f"at the least 2 f_AM is at {decibel(second)} dB and 3 f_AM at {decibel(third)} dB re f_AM"
     )
+    return weakest > PRESENT, weakest, PRESENT, sentence
 
 
 def _drawn_lines(runs: list[Run]) -> Assessment:
     offset = max(
-        abs(_peak(run, f"{n}f_d".lstrip("1")) - n * _drawing(run))
+        abs(_peak(run, f"{n}f_d".lstrip("1")) - n * run.scene.tacton.trajectory.drawing_frequency)
         for run in runs
         for n in (1, 2, 3)
     )
-    return (
-        offset <= ON_BIN,
-        offset,
-        ON_BIN,
-        f"the peaks next to 1, 2 and 3 f_d are at most {offset:.2f} Hz away from them",
-    )
+    sentence = f"the peaks next to 1, 2 and 3 f_d are at most {offset:.2f} Hz away from them"
+    return offset <= ON_BIN, offset, ON_BIN, sentence
 
 
 def _same_places(runs: list[Run]) -> Assessment:
@@ -130,37 +122,31 @@ def _same_places(runs: list[Run]) -> Assessment:
     places = np.array([[_peak(run, name) for name in names] for run in runs])
     drift = float(np.ptp(places, axis=0).max())
     first = 20 * np.log10([run.lines["f_d"].max() for run in runs])
-    return (
-        drift <= ON_BIN,
-        drift,
-        ON_BIN,
+    sentence = (
         f"the lines of {len(runs)} paths lie within {drift:.2f} Hz of each other; "
-        f"their f_d amplitudes differ by {np.ptp(first):.1f} dB",
+        f"their f_d amplitudes differ by {np.ptp(first):.1f} dB"
     )
+    return drift <= ON_BIN, drift, ON_BIN, sentence
 
 
 def _pairs_only(runs: list[Run]) -> Assessment:
     drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
     weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
-    return (
-        drawn < ABSENT and weakest > PRESENT,
-        drawn,
-        ABSENT,
+    sentence = (
         f"the strongest line at n f_d is at {decibel(drawn)} dB re f_AM, the weakest of the pairs "
-        f"n f_d +- f_AM (n = 1, 2) at {decibel(weakest)} dB",
+        f"n f_d +- f_AM (n = 1, 2) at {decibel(weakest)} dB"
     )
+    return drawn < ABSENT and weakest > PRESENT, drawn, ABSENT, sentence
 
 
 def _both_multiples(runs: list[Run]) -> Assessment:
     drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
     double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
-    return (
-        drawn > PRESENT,
-        drawn,
-        PRESENT,
+    sentence = (
         f"f_d is at {decibel(drawn)} dB re f_AM or above in every Tacton, 2 f_AM at "
-        f"{decibel(double)} dB or above",
+        f"{decibel(double)} dB or above"
     )
+    return drawn > PRESENT, drawn, PRESENT, sentence
 
 
 def _am_highest(runs: list[Run]) -> Assessment:
@@ -189,13 +175,11 @@ def _am_highest_measured(runs: list[Run]) -> Assessment:
 def _much_lower(runs: list[Run]) -> Assessment:
     value = max(_others(run).max() for run in runs)
     lower = sum(bool(_others(run).max() < MUCH_LOWER) for run in runs)
-    return (
-        value < MUCH_LOWER,
-        value,
-        MUCH_LOWER,
+    sentence = (
         f"the strongest other line is at {decibel(value, signed=True)} dB re f_AM; in {lower} of "
-        f"{len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe",
+        f"{len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
     )
+    return value < MUCH_LOWER, value, MUCH_LOWER, sentence
 
 
 def _exact_frequencies(runs: list[Run]) -> Assessment:
@@ -205,37 +189,23 @@ def _exact_frequencies(runs: list[Run]) -> Assessment:
         for name in (["f_AM"] if run.is_am else ["f_d"])
     ]
     worst = max(offsets)
-    return (
-        worst <= ON_BIN,
-        worst,
-        ON_BIN,
-        f"the spectral peaks are at most {worst:.2f} Hz from the commanded f_AM and f_d",
-    )
+    sentence = f"the spectral peaks are at most {worst:.2f} Hz from the commanded f_AM and f_d"
+    return worst <= ON_BIN, worst, ON_BIN, sentence
 
 
-def _pure_am(run: Run) -> bool:
-    return run.is_am and not run.is_stm
-
-
-def _pure_stm(run: Run) -> bool:
-    return run.is_stm and not run.is_am
-
-
-def _both(run: Run) -> bool:
-    return run.is_am and run.is_stm
-
-
-CLAIMS: dict[str, tuple[Callable[[Run], bool], Callable[[list[Run]], Assessment]]] = {
-    "S1": (_pure_am, _single_line),
-    "S2": (_pure_stm, _drawn_lines),
-    "S3": (_both, _pairs_only),
-    "S4": (_both, _am_highest),
-    "S5": (lambda run: run.is_am != run.is_stm, _exact_frequencies),
-    "M1": (_pure_am, _am_harmonics),
-    "M2": (_pure_stm, _same_places),
-    "M3": (_both, _both_multiples),
-    "M4": (_both, _am_highest_measured),
-    "M5": (_both, _much_lower),
+# Whether the amplitude is modulated, and whether the focus moves, in runs that a claim is about.
+AM, STM, BOTH = (True, False), (False, True), (True, True)
+CLAIMS: dict[str, tuple[tuple[tuple[bool, bool], ...], Callable[[list[Run]], Assessment]]] = {
+    "S1": ((AM,), _single_line),
+    "S2": ((STM,), _drawn_lines),
+    "S3": ((BOTH,), _pairs_only),
+    "S4": ((BOTH,), _am_highest),
+    "S5": ((AM, STM), _exact_frequencies),
+    "M1": ((AM,), _am_harmonics),
+    "M2": ((STM,), _same_places),
+    "M3": ((BOTH,), _both_multiples),
+    "M4": ((BOTH,), _am_highest_measured),
+    "M5": ((BOTH,), _much_lower),
 }
 # Lines, one of these sets of which a claim is about; claims not listed are about all lines.
 DRAWN = (("f_d", "2f_d", "3f_d"),)
@@ -262,16 +232,13 @@ TEXTS = {
 }
 
 
-def _decibel(ratio: Floats) -> Floats:
-    return 20 * np.log10(np.maximum(ratio, 1e-15))
-
-
 def _probe_levels(run: Run, names: Iterable[str], reference: str, velocity: bool = False) -> Floats:
     """(line, probe) levels in dB re a reference line at the same probe."""
     names = list(names)
     weight = {name: run.frequencies[name] if velocity else 1.0 for name in [*names, reference]}
     base = np.maximum(run.lines[reference] * weight[reference], np.finfo(float).tiny)
-    return _decibel(np.array([run.lines[name] * weight[name] for name in names]) / base)
+    ratios = np.array([run.lines[name] * weight[name] for name in names]) / base
+    return 20 * np.log10(np.maximum(ratios, 1e-15))
 
 
 def _rivals(run: Run) -> list[str]:
@@ -298,18 +265,14 @@ def _strongest(run: Run, names: list[str], reference: str = "f_AM") -> float:
     return float(_probe_levels(run, names, reference).max())
 
 
-def _drawing(run: Run) -> float:
-    return run.scene.tacton.trajectory.drawing_frequency
-
-
-def _peak(run: Run, line: str, reach: float = 6.0) -> float:
+def _peak(run: Run, line: str) -> float:
     """Frequency in Hz of the spectral peak next to a line, at the probe where it is strongest.
 
     Interpolated between bins on the logarithm; infinitely far if there is no peak in reach.
     """
     f, amplitude = spectrum(run.response)
     x = amplitude[:, int(np.argmax(run.lines[line]))]
-    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= reach)
+    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= REACH)
     if len(near) < 3:  # too short a Tacton for its spectrum to resolve
         return np.inf
     top = near[np.argmax(x[near])]

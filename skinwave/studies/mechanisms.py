@@ -9,6 +9,7 @@ the load keeps its ratio to f_AM when the drive is turned down, and a line of th
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -107,28 +108,24 @@ def paper_vs_skin(
                 quiet = replace(still, amplitude=amplitude)
                 response = ask(_scene("amplitude", quiet, body, drive))
                 f, twice = lines(steady(response), [AM, 2 * AM])[:, 0]
-                ratios.append(
-                    Ratio(body=body_name, mechanism=mechanism, amplitude=amplitude,
-                          ratio=float(twice / f))
-                )  # fmt: skip
+                found_by = {"body": body_name, "mechanism": mechanism}
+                ratios.append(Ratio(**found_by, amplitude=amplitude, ratio=float(twice / f)))
     return Findings(lines=tuple(found), ratios=tuple(ratios), failed=tuple(failed))
 
 
 def _mechanisms(
     body: Body, h: float | None, progress: Progress, name: str
-) -> dict[str, tuple[str, Callable[[Scene], Response]]]:
+) -> Mapping[str, tuple[str, Callable[[Scene], Response]]]:
     """Mechanism -> drive law, and the function that computes a scene's response with it."""
-    prepared = prepare(
-        body, np.array(PROBES), lambda phase, done: progress(f"{name}: {phase}", done), h=h
-    )
-    found: dict[str, tuple[str, Callable[[Scene], Response]]] = {
-        "linear load": ("linear", lambda scene: answer(prepared, scene)),
-        "squared load": ("pressure_squared", lambda scene: answer(prepared, scene)),
-    }
+
+    def report(phase: str, done: float) -> None:
+        progress(f"{name}: {phase}", done)
+
+    linear = partial(answer, prepare(body, np.array(PROBES), report, h=h))
+    found = {"linear load": ("linear", linear), "squared load": ("pressure_squared", linear)}
     if body.of_kind.is_plate:
-        found["squared load, stretching"] = (
-            "pressure_squared", lambda scene: compute(scene, "fem-nonlinear", h=h)
-        )  # fmt: skip
+        stretching = partial(compute, model="fem-nonlinear", h=h)
+        found["squared load, stretching"] = ("pressure_squared", stretching)
     return found
 
 
@@ -138,12 +135,9 @@ def _scene(name: str, tacton: Tacton, body: Body, drive: str) -> Scene:
 
 def steady(response: Response) -> Response:
     """The later half of a response, after the transient."""
-    half = len(response.times) // 2
-    return replace(
-        response,
-        times=response.times[half:] - response.times[half],
-        displacement=response.displacement[half:],
-    )
+    times, half = response.times, len(response.times) // 2
+    later = response.displacement[half:]
+    return replace(response, times=times[half:] - times[half], displacement=later)
 
 
 def _lines(

@@ -33,9 +33,6 @@ def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) 
 
 def beside_kernels(scene: Scene) -> dict[str, Scene]:
     """The scene without its body by model: under the published load, and under its own."""
-    return {
-        "point-kernel-published": replace(
-            with_body(scene, BODIES["none"]), pressure=published(scene.pressure)
-        ),
-        "point-kernel": with_body(scene, BODIES["none"]),
-    }
+    bare = with_body(scene, BODIES["none"])
+    paper = replace(bare, pressure=published(scene.pressure))
+    return {"point-kernel-published": paper, "point-kernel": bare}

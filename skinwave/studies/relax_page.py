@@ -26,10 +26,8 @@ LINE_COLUMNS = (
 def sentence(e: Effect) -> str:
     """Sentence on the effect and the cost of dropping an assumption."""
     x, y = (1e3 * v for v in e.where)
-    text = (
-        f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at ({x:g}, {y:g}) mm by "
-    )
-    text += f"{significant(100 * e.waveform)} %"
+    text = f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at "
+    text += f"({x:g}, {y:g}) mm by {significant(100 * e.waveform)} %"
     if e.decibel:
         line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
         text += f" and the {line} line by {decibel(e.decibel[line], signed=True)} dB"
@@ -40,10 +38,8 @@ def sentence(e: Effect) -> str:
 def write(folder: Path, found: Hierarchy) -> None:
     """index.html, relax.png, relax.csv, relax.json and the waveforms, responses.npz."""
     effects = found.effects()
-    record = {
-        "effects": [asdict(e) for e in effects],
-        "steps": [_record(step) for step in found.every],
-    }
+    steps = [_record(step) for step in found.every]
+    record = {"effects": [asdict(e) for e in effects], "steps": steps}
     (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
     (folder / "relax.csv").write_bytes(csv_table(LINE_COLUMNS, _line_rows(found)))
     answered = [r for r in found.every if r.response]
@@ -53,6 +49,7 @@ def write(folder: Path, found: Hierarchy) -> None:
     np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
     drawn = png(figure(effects), dpi=130)
     (folder / "relax.png").write_bytes(drawn)
+    said = map(document.paragraph, map(sentence, effects))
     parts = [
         document.warnings_banner(efforts(found)),
         document.paragraph(
@@ -60,9 +57,7 @@ def write(folder: Path, found: Hierarchy) -> None:
             "another. Waveforms are compared after the factor that fits best where one is a "
             "pressure and the other a displacement."
         ),
-        document.section(
-            "What each assumption changes", *map(document.paragraph, map(sentence, effects))
-        ),
+        document.section("What each assumption changes", *said),
         document.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
         document.table(*effect_table(effects)),
         document.section("Steps", document.table(*step_table(found))),

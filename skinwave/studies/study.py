@@ -18,18 +18,10 @@ from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, with_body
 from skinwave.simulation import check_options, compute
-from skinwave.studies import paper15
+from skinwave.studies import paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
 from skinwave.studies.claims import evaluate, write_claims
-from skinwave.studies.study_page import (
-    StudyOutcome,
-    again,
-    effort_section,
-    efforts,
-    overview_png,
-    page_parts,
-    tacton_png,
-)
+from skinwave.studies.study_page import StudyOutcome
 from skinwave.surface import has_wavenumber_integral
 
 
@@ -72,15 +64,13 @@ def run_study(
         bodies = _begun_bodies(scenes, aside, progress, h, solver)
         maps = _begun_maps(scenes, aside, progress, h, solver)
         groups, prepared, figures = _answered(scenes, folder, aside, bodies, progress, h, solver)
-        figures["overview"] = aside.submit(overview_png, groups)
+        figures["overview"] = aside.submit(study_page.overview_png, groups)
         runs = [run for group in groups.values() for run in group]
         outcome = StudyOutcome(
             assessed_claims=evaluate(runs),
-            warnings=document.worst_warnings(efforts(runs)),
+            warnings=document.worst_warnings(study_page.efforts(runs)),
             runs=len(runs),
             planned=sum(map(len, scenes.values())),
-            seconds=0.0,
-            peak_memory=0,
         )
         progress("write tables", 0.0)
         write_claims(folder / "claims.csv", outcome.assessed_claims)
@@ -90,13 +80,13 @@ def run_study(
         first = None
         with suppress(KeyboardInterrupt):
             first = shown(groups, maps) if outcome.runs == outcome.planned else None
-        parts = page_parts(folder, groups, first, outcome, progress, figures)
+        parts = study_page.page_parts(folder, groups, first, outcome, progress, figures)
         spent = replace(
             outcome,
             seconds=time.perf_counter() - started,
             peak_memory=peak_memory() + aside.submit(peak_memory).result(),
         )
-        parts += [effort_section(groups, prepared, spent), again(command)]
+        parts += [study_page.effort_section(groups, prepared, spent), study_page.again(command)]
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
     return spent
 
@@ -202,7 +192,7 @@ def _answered(
             write_run(folder / name / column, run)
             groups.setdefault(name, []).append(run)
             if len(groups[name]) == len(scenes[name]):
-                figures[name] = aside.submit(tacton_png, name, groups[name])
+                figures[name] = aside.submit(study_page.tacton_png, name, groups[name])
             progress(f"response of {name} by {column}", (k + 1) / len(every))
     if not groups:
         raise KeyboardInterrupt

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -34,8 +33,8 @@ class StudyOutcome:
     warnings: list[str]
     runs: int
     planned: int
-    seconds: float
-    peak_memory: int
+    seconds: float = 0.0
+    peak_memory: int = 0
 
 
 def write_single(folder: Path, run: Run) -> None:
@@ -67,13 +66,16 @@ def page_parts(
     """Parts of index.html, and a PNG of each figure in it."""
     runs = [run for group in groups.values() for run in group]
     (folder / "figures").mkdir()
-    drawn = partial(_picture, folder, "propagation")
+
+    def drawn(figure: Figure, caption: str) -> str:
+        return _kept(folder, "propagation", png(figure), caption)
+
     begun = not figures["overview"].cancel()
     overview = figures["overview"].result() if begun else overview_png(groups)
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
-        *_introduction(outcome, groups),
+        _introduction(outcome, groups),
         *map(document.paragraph, unresolved(runs)),
         _kept(folder, "overview", overview, OVERVIEW_CAPTION),
         document.section("What propagation changes", summary.per_tacton(changes(groups))),
@@ -114,16 +116,11 @@ def effort_section(
 ) -> str:
     """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]
-    efforts = {
-        body: replace(
-            p.effort,
-            **{
-                name: max(getattr(r.response.effort, name) for r in runs if r.body == body)
-                for name in ("energy_imbalance", "radiated")
-            },
-        )
-        for body, p in prepared.items()
-    }
+    efforts = {}
+    for body, p in prepared.items():
+        spent = [r.response.effort for r in runs if r.body == body]
+        worst = max(e.energy_imbalance for e in spent), max(e.radiated for e in spent)
+        efforts[body] = replace(p.effort, energy_imbalance=worst[0], radiated=worst[1])
     return document.section("Effort", tables.effort_table(efforts, len(groups), outcome.seconds))
 
 
@@ -146,29 +143,23 @@ def _images(
     return {name: here[name] if name in here else figures[name].result() for name in groups}
 
 
-def _picture(folder: Path, name: str, figure: Figure, caption: str) -> str:
-    """A figure drawn once: as a file, and inside the page."""
-    return _kept(folder, name, png(figure), caption)
-
-
 def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:
+    """A figure drawn once: as a file, and inside the page."""
     (folder / "figures" / f"{name}.png").write_bytes(image)
     return document.picture(image, caption, name)
 
 
-def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> list[str]:
+def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> str:
     if outcome.runs == outcome.planned:
         state = f"{len(groups)} Tacton{'s' * (len(groups) != 1)}, {outcome.runs} runs."
     else:
         state = f"Interrupted: {outcome.runs} of {outcome.planned} runs are finished and shown."
-    return [
-        document.paragraph(
-            f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
-            "doi 10.1145/3613905.3650981), as published and under the load that the bodies "
-            "receive, beside finite elements of these bodies. Amplitudes of every line are in "
-            "lines.csv, waveforms in responses.npz; each run's folder has its scene."
-        )
-    ]
+    return document.paragraph(
+        f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
+        "doi 10.1145/3613905.3650981), as published and under the load that the bodies "
+        "receive, beside finite elements of these bodies. Amplitudes of every line are in "
+        "lines.csv, waveforms in responses.npz; each run's folder has its scene."
+    )
 
 
 def _disagreements(assessed_claims: list[AssessedClaim]) -> list[str]:

@@ -7,11 +7,10 @@ from matplotlib.figure import Figure
 
 from skinwave.document import Markup, paragraph, table
 from skinwave.numbers import decibel, significant
-from skinwave.pictures.figures import label
+from skinwave.pictures.figures import label, sized
 from skinwave.pictures.surfaces import SURFACES, surfaces_figure
 from skinwave.propagation import Component, Propagation, Reach, added_lines
 from skinwave.run import Run
-from skinwave.scene import Body
 from skinwave.studies.changes import Shown
 
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
@@ -37,21 +36,15 @@ def top(shown: Shown, draw: Callable[[Figure, str], str], name: str = "") -> lis
         parts[0] = paragraph(f"{name}, one of the Tactons below: {sentences(shown)[0]}")
     if shown.surfaces and shown.changes[shown.body.column].strongest:
         parts.append(draw(surfaces_figure(shown.kernel.scene, shown.surfaces), SURFACES))
-    return [
-        *parts,
-        small_table(list(shown.changes.values()), shown.kernel.tacton),
-        beside_published(shown.kernel, shown.published),
-    ]
+    bodies = small_table(list(shown.changes.values()), shown.kernel.tacton)
+    return [*parts, bodies, beside_published(shown.kernel, shown.published)]
 
 
 def sentences(shown: Shown) -> list[str]:
     """Effect of propagation, effect of the drive law, and reach above threshold with its error."""
     found = shown.changes[shown.body.column]
-    return [
-        _propagated(found),
-        _driven(shown.kernel, shown.published),
-        " ".join([_above_threshold(found), _sure(shown)]),
-    ]
+    driven = _driven(shown.kernel, shown.published)
+    return [_propagated(found), driven, f"{_above_threshold(found)} {_sure(shown)}"]
 
 
 def small_table(columns: Sequence[Propagation], name: str) -> str:
@@ -102,11 +95,12 @@ def beside_published(kernel: Run, published: Run) -> Markup:
 def _propagated(found: Propagation) -> str:
     if found.strongest is None:
         return NOTHING
-    lag = _lag(found)
+    f, lag = found.strongest.frequency, ""
+    if found.delay is not None:
+        lag = f" by {significant(1e3 * found.delay, 2)} ms at {f:.0f} Hz"
     if found.share is None:
-        return (
-            f"On the {label(found.column)} motion lags the point kernel under the same load{lag}."
-        )
+        on = label(found.column)
+        return f"On the {on} motion lags the point kernel under the same load{lag}."
     spread, before = _reach(found.spread), _reach(found.kernel_spread)
     more = f"; it spreads {spread} mm from the path at -6 dB where the kernel has {before} mm"
     return (
@@ -114,12 +108,6 @@ def _propagated(found: Propagation) -> str:
         f"the point kernel, under the same load, predicts next to none{more}"
         + (f", and lags it{lag}." if lag else ".")
     )
-
-
-def _lag(found: Propagation) -> str:
-    if found.delay is None or found.strongest is None:
-        return ""
-    return f" by {significant(1e3 * found.delay, 2)} ms at {found.strongest.frequency:.0f} Hz"
 
 
 def _driven(kernel: Run, published: Run) -> str:
@@ -164,30 +152,23 @@ def _above_threshold(found: Propagation) -> str:
 
 
 def _sure(shown: Shown) -> str:
-    body = shown.body.scene.body
+    error = "The numerical error is not known"
     if np.isfinite(shown.error):
         error = f"Numerical error about {_percent(shown.error)}"
-    else:
-        error = "The numerical error is not known"
-    return f"{error}; {_material(body, shown.shares)}."
-
-
-def _material(body: Body, shares: tuple[float, float] | None) -> str:
-    if body.of_kind.is_plate:
-        return "grammage, stiffness and support of the sheet that was measured are not published"
+    if shown.body.scene.body.of_kind.is_plate:
+        text = "grammage, stiffness and support of the sheet that was measured are not published"
+        return f"{error}; {text}."
     text = "skin's stiffness is known to a factor of 2, its loss to one of 5"
-    if shares is None:
-        return text
-    least, most = (significant(100 * share, 2) for share in shares)
-    return f"{text}: with these, varied one by one, the share is {least} to {most} %"
+    if shown.shares is not None:
+        least, most = (significant(100 * share, 2) for share in shown.shares)
+        text += f": with these, varied one by one, the share is {least} to {most} %"
+    return f"{error}; {text}."
 
 
 def _component(found: Component | None, unit: str = "m") -> str:
     if found is None:
         return "none"
-    size = 1e6 * found.amplitude if unit == "m" else found.amplitude
-    said = f"{significant(size, 2)} {'µm' if unit == 'm' else unit}"
-    return f"{found.name}, {found.frequency:.0f} Hz, {said}"
+    return f"{found.name}, {found.frequency:.0f} Hz, {sized(found.amplitude, unit, 2)}"
 
 
 def _highest_sensation(found: Component | None) -> str:

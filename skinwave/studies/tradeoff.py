@@ -140,11 +140,8 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
     reference = results[fine[-1].name][0]
     measured = [_measure(scene, c, reference, *results[c.name]) for c in todo]
     check = compare(reference, results[fine[0].name][0])
-    return Study(
-        measured=tuple(sorted(measured, key=lambda m: m.cold)),
-        reference=fine[-1],
-        self_convergence=float(check.relative_l2.max()),
-    )
+    by_cost, converged = sorted(measured, key=lambda m: m.cold), float(check.relative_l2.max())
+    return Study(measured=tuple(by_cost), reference=fine[-1], self_convergence=converged)
 
 
 def write(folder: Path, scene: Scene, found: Study) -> None:
@@ -164,15 +161,10 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
     ]  # fmt: skip
     header = ["candidate (* on the front)", "waveform error, %", "largest line error, dB"]
     header += ["delay, ms", "cold, s", "warm, s", "peak memory, MiB", "dofs"]
-    (folder / "index.html").write_text(
-        document.page(
-            f"Speed against accuracy: {scene.name}",
-            document.picture(drawn, CAPTION, "tradeoff"),
-            document.table(header, rows),
-            *map(document.paragraph, sentences(found)),
-        ),
-        encoding="utf-8",
-    )
+    parts = [document.picture(drawn, CAPTION, "tradeoff"), document.table(header, rows)]
+    parts += map(document.paragraph, sentences(found))
+    page = document.page(f"Speed against accuracy: {scene.name}", *parts)
+    (folder / "index.html").write_text(page, encoding="utf-8")
 
 
 CAPTION = (
@@ -200,13 +192,10 @@ def sentences(found: Study) -> list[str]:
             "meshed body by reflections at the latter's sides."
         )
     for bar in BARS:
-        m = found.cheapest(bar)
-        texts.append(
-            f"Within {100 * bar:g} %: {m.candidate.name}, {m.cold:.2g} s (error "
-            f"{100 * m.error:.2g} %)."
-            if m
-            else f"Within {100 * bar:g} %: none of these."
-        )
+        best = "none of these"
+        if m := found.cheapest(bar):
+            best = f"{m.candidate.name}, {m.cold:.2g} s (error {100 * m.error:.2g} %)"
+        texts.append(f"Within {100 * bar:g} %: {best}.")
     return texts
 
 
@@ -250,11 +239,9 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     if named(candidate.model).is_reduced:
         discretisation = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
         prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **discretisation)  # type: ignore[arg-type]
-        response = answer(prepared, scene)
-        cold = time.perf_counter() - started
-        again = time.perf_counter()
+        response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
-        return response, cold, time.perf_counter() - again, peak_memory()
+        return response, ready - started, time.perf_counter() - ready, peak_memory()
     if candidate.half_space:
         scene = replace(scene, body=replace(scene.body, depth=inf))
     response = compute(scene, candidate.model, h=candidate.h, dt=candidate.dt)

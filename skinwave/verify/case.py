@@ -83,46 +83,54 @@ class Result:
 def relative(
     what: str, found: SupportsFloat, expected: SupportsFloat, bar: float, unit: str = ""
 ) -> Check:
-    """Relative error of one number."""
+    """Relative error of one number. All values are given in SI units and shown in `unit`."""
     value, reference = float(found), float(expected)
-    error = abs(value / reference - 1)
-    return Check(what=what, value=value, reference=reference, error=error, bar=bar, unit=unit)
+    return _check(what, value, reference, abs(value / reference - 1), bar, unit)
 
 
 def largest(what: str, found: ArrayLike, expected: ArrayLike, bar: float, unit: str = "") -> Check:
     """The largest relative error of several numbers, at the place where it is."""
     found, expected = np.ravel(found), np.ravel(expected)
-    worst = int(np.argmax(np.abs(found / expected - 1)))
-    error = float(np.abs(found[worst] / expected[worst] - 1))
-    value, reference = float(np.abs(found[worst])), float(np.abs(expected[worst]))
-    return Check(what=what, value=value, reference=reference, error=error, bar=bar, unit=unit)
+    errors = np.abs(found / expected - 1)
+    worst = int(np.argmax(errors))
+    return _check(what, abs(found[worst]), abs(expected[worst]), errors[worst], bar, unit)
 
 
 def misfit(what: str, found: ArrayLike, expected: ArrayLike, bar: float, unit: str = "") -> Check:
     """Relative L2 distance of two curves or fields; the values are their largest magnitudes."""
     found, expected = np.asarray(found), np.asarray(expected)
     error = float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
-    value, reference = float(np.abs(found).max()), float(np.abs(expected).max())
-    return Check(what=what, value=value, reference=reference, error=error, bar=bar, unit=unit)
+    return _check(what, np.abs(found).max(), np.abs(expected).max(), error, bar, unit)
 
 
 def below(what: str, value: SupportsFloat, bar: float, unit: str = "") -> Check:
     """A number whose reference is 0, absolute."""
-    return Check(
-        what=what, value=float(value), reference=0.0, error=abs(float(value)), bar=bar, unit=unit
-    )
+    return _check(what, float(value), 0.0, abs(float(value)), bar, unit)
+
+
+def absolute(what: str, found: complex, expected: complex, bar: float) -> Check:
+    """Absolute error of one number, of which magnitudes are shown."""
+    return _check(f"{what} (absolute)", abs(found), abs(expected), abs(found - expected), bar)
+
+
+def yes(what: str, is_so: bool) -> Check:
+    """A check that something is so."""
+    return _check(what, float(is_so), 1.0, 1.0 - is_so, 0.0)
 
 
 def order(what: str, sizes: ArrayLike, errors: ArrayLike, expected: float, band: float) -> Check:
     """Fitted slope of log error against log size; its error is absolute."""
-    found = slope(sizes, errors)
+    return absolute(what, slope(sizes, errors), expected, band)
+
+
+def _check(
+    what: str, value: float, reference: float, error: float, bar: float, unit: str = ""
+) -> Check:
+    scale = {"um": 1e6, "mm": 1e3}.get(unit, 1.0)
     return Check(
-        what=f"{what} (absolute)",
-        value=found,
-        reference=expected,
-        error=abs(found - expected),
-        bar=band,
-    )
+        what=what, value=float(scale * value), reference=float(scale * reference),
+        error=float(error), bar=bar, unit=unit,
+    )  # fmt: skip
 
 
 def slope(sizes: ArrayLike, errors: ArrayLike) -> float:

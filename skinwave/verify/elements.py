@@ -10,7 +10,7 @@ import meshes
 from fem.assembly import element_stiffness
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import EDGES
-from skinwave.verify.case import Case, Check, below, described
+from skinwave.verify.case import Case, Check, below, described, yes
 from skinwave.verify.references import Floats
 
 DisplacementField = Callable[[Floats], Floats]
@@ -25,7 +25,7 @@ def distorted_cube() -> TetMesh:
     points = straight.points.copy()
     inner = ((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1)
     points[inner] += np.random.default_rng(3).uniform(-0.08, 0.08, (inner.sum(), 3))
-    return meshes.quadratic(_moved(straight, points))
+    return meshes.quadratic(replace(straight, points=points))
 
 
 def cube_with_slivers() -> TetMesh:
@@ -39,7 +39,7 @@ def cube_with_slivers() -> TetMesh:
     def bent(fraction: float) -> TetMesh:
         points = straight.points.copy()
         points[corner] = start + fraction * (end - start)
-        return _moved(straight, points)
+        return replace(straight, points=points)
 
     low, high = 0.0, 0.9999
     for _ in range(40):
@@ -77,9 +77,8 @@ def quadratic_patch() -> Case:
     mesh, mu, lam = distorted_cube(), 1.0, 1.5
     x = mesh.points
     field = np.stack([x[:, 0] ** 2 + x[:, 1] * x[:, 2], x[:, 1] ** 2, x[:, 0] * x[:, 2]], axis=1)
-    force = np.broadcast_to(
-        -np.array([(lam + mu) * 3 + 2 * mu, (lam + mu) * 2 + 2 * mu, 0.0]), x.shape
-    )
+    minus_force = np.array([(lam + mu) * 3 + 2 * mu, (lam + mu) * 2 + 2 * mu, 0.0])
+    force = np.broadcast_to(-minus_force, x.shape)
     M = fem.assemble(mesh, unit(0.3), fixed=np.zeros(x.shape, bool)).M
     found = held_outside(mesh, 0.3, field.ravel(), M @ force.ravel())
     return Case(
@@ -114,7 +113,7 @@ def inverted() -> Case:
     mesh = meshes.block((1.0, 1.0, 1.0), 1.0)
     points = mesh.points.copy()
     points[mesh.tets[3, 4]] += 2.0
-    bent = _moved(mesh, points)
+    bent = replace(mesh, points=points)
     case = refused(
         "Expected invalid: an inverted element is refused with its number",
         f"{ZIENKIEWICZ}, chapter 9: det J > 0",
@@ -124,9 +123,8 @@ def inverted() -> Case:
         "is inverted",
     )
     touched = np.flatnonzero((mesh.tets == mesh.tets[3, 4]).any(axis=1))
-    named = float(any(case.said.startswith(f"element {e} ") for e in touched))
-    what = "the element that it names has the moved node"
-    check = Check(what=what, value=named, reference=1.0, error=1 - named, bar=0.0)
+    named = any(case.said.startswith(f"element {e} ") for e in touched)
+    check = yes("the element that it names has the moved node", named)
     return replace(case, checks=(*case.checks, check))
 
 
@@ -151,16 +149,12 @@ def refused(
         sentence = "nothing: it was accepted"
     except kind as error:
         sentence = str(error)
-    named = float(said in sentence)
-    check = Check(
-        what=f'refused, naming "{said}"',
-        value=named, reference=1.0, error=1 - named, bar=0.0,
-    )  # fmt: skip
+    check = yes(f'refused, naming "{said}"', said in sentence)
     return Case(title=title, source=source, mesh=mesh, checks=(check,), said=sentence)
 
 
 def _followed(mesh: TetMesh, poisson: float, bar: float, where: str = "") -> Check:
-    exact = _linear(mesh.points)
+    exact = mesh.points @ np.random.default_rng(0).standard_normal((3, 3)).T
     found = held_outside(mesh, poisson, exact.ravel(), np.zeros(mesh.n_dofs))
     return below(f"largest error / largest displacement{where}", _gap(found, exact), bar)
 
@@ -180,14 +174,6 @@ def _gap(found: Floats, exact: Floats) -> float:
     return float(np.abs(found - exact.ravel()).max() / np.abs(exact).max())
 
 
-def _linear(x: Floats) -> Floats:
-    return x @ np.random.default_rng(0).standard_normal((3, 3)).T
-
-
 def unit(poisson: float) -> fem.Material:
     """Density 1 and shear modulus 1."""
     return fem.Material(density=1, shear_modulus=1, poisson=poisson)
-
-
-def _moved(mesh: TetMesh, points: Floats) -> TetMesh:
-    return TetMesh(points=points, tets=mesh.tets, facets=mesh.facets)

@@ -203,12 +203,10 @@ def free_energy() -> Case:
     # 6 Pa deflect the coarse sheet by three thicknesses.
     u = nonlinear.static(body, P @ np.full(P.shape[1], 6.2))
     start, steps, dt = replace(fem.at_rest(mesh.n_dofs), displacement=u), 2000, 1e-4
-    states = islice(
-        nonlinear.dynamic(body, lambda t, u: 0 * u, dt, initial=start, tolerance=1e-3), steps + 1
-    )
-    energy, centre = np.array(
-        [(nonlinear.total_energy(body, s), (S @ s.displacement)[0]) for s in states]
-    ).T
+    moved = nonlinear.dynamic(body, lambda t, u: 0 * u, dt, initial=start, tolerance=1e-3)
+    states = list(islice(moved, steps + 1))
+    energy = np.array([nonlinear.total_energy(body, s) for s in states])
+    centre = np.array([(S @ s.displacement)[0] for s in states])
     drift = energy / energy[0] - 1
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
     return Case(
@@ -266,7 +264,7 @@ def reduced_against_full() -> Case:
         below(f"probe {k + 1}, over its motion about the mean", np.linalg.norm(e), 0.03)
         for k, e in enumerate(error.T)
     ]
-    shown = 1e6 * full.displacement[:, 0], 1e6 * modes.displacement[:, 0]
+    every, few = ((1e3 * u.times, 1e6 * u.displacement[:, 0]) for u in (full, modes))
     return Case(
         title="A sheet in its bending modes against all of its dofs",
         source="the same equations without reduction; Hollkamp and Gordon, J Sound Vib 318:1139 "
@@ -276,8 +274,7 @@ def reduced_against_full() -> Case:
         checks=tuple(checks),
         plot=Plot(
             x="time, ms", y="displacement of the centre, um", drawn=("all dofs",),
-            lines={"all dofs": (1e3 * full.times, shown[0]), "modes":
-                   (1e3 * modes.times[::10], shown[1][::10])},
+            lines={"all dofs": every, "modes": (few[0][::10], few[1][::10])},
         ),
     )  # fmt: skip
 
@@ -301,6 +298,7 @@ def amplitude_test() -> Case:
         for model in ("fem", "fem-nonlinear")
     }
     linear, stretching = found["fem"], found["fem-nonlinear"]
+    percent = [100 * a for a in amplitudes]
     change = max(stretching) / min(stretching) - 1
     changes = Check(what="nonlinear sheet: it changes by at least 5 %", value=change,
                     reference=0.05, error=max(0.0, 0.05 - change), bar=0.0)  # fmt: skip
@@ -316,9 +314,6 @@ def amplitude_test() -> Case:
         ),
         plot=Plot(
             x="amplitude, %", y="line at 2 f / line at f",
-            lines={
-                "linear sheet": ([100 * a for a in amplitudes], linear),
-                "nonlinear sheet": ([100 * a for a in amplitudes], stretching),
-            },
+            lines={"linear sheet": (percent, linear), "nonlinear sheet": (percent, stretching)},
         ),
     )  # fmt: skip

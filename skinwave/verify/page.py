@@ -66,28 +66,21 @@ def summary_table(results: list[Result]) -> str:
 
 
 def _summary(results: list[Result]) -> str:
+    link = Markup('<a href="#{}">{}</a><br><small>{}</small>').format
     rows = [
-        [
-            Markup('<a href="#{}">{}</a><br><small>{}</small>').format(
-                r.entry.name, r.case.title, _quantity(r.case.worst)
-            ),
-            *_numbers(r.case.worst),
-            _passed(r.case.passed),
-            f"{r.seconds:.1f}",
-        ]
+        [link(r.entry.name, r.case.title, _quantity(r.case.worst)), *_numbers(r.case.worst),
+         _passed(r.case.passed), f"{r.seconds:.1f}"]
         for r in results
-    ]
+    ]  # fmt: skip
     return document.table(["case, and its check nearest to the tolerance", *HEADER, "", "s"], rows)
 
 
 def _shown(result: Result) -> str:
     """One case on the page."""
-    case = result.case
+    case, heading = result.case, Markup('<h3 id="{}">{} {}</h3>')
     rows = [[_quantity(c), *_numbers(c), _passed(c.passed)] for c in case.checks]
     parts = [
-        Markup('<h3 id="{}">{} {}</h3>').format(
-            result.entry.name, case.title, _passed(case.passed)
-        ),
+        heading.format(result.entry.name, case.title, _passed(case.passed)),
         Markup("<p><small>Source: {}.<br>Mesh: {}.</small></p>").format(case.source, case.mesh),
         document.table(["quantity", *HEADER, ""], rows),
     ]
@@ -106,12 +99,8 @@ def _figure(plot: Plot) -> Figure:
     measured = [name for name in plot.lines if name not in plot.drawn]
     joined = "-" if plot.log or not plot.drawn else ""
     for k, name in enumerate(measured):
-        style: dict[str, Any] = {
-            "marker": "os^vD"[k % 5],
-            "color": COLOURS[k % len(COLOURS)],
-            "ls": joined,
-        }
-        ax.plot(*plot.lines[name], ms=4, lw=1, label=name, **style)
+        style: dict[str, Any] = {"marker": "os^vD"[k % 5], "color": COLOURS[k % len(COLOURS)]}
+        ax.plot(*plot.lines[name], ms=4, lw=1, ls=joined, label=name, **style)
     for k, name in enumerate(plot.drawn):
         style = {"color": ("0.2", "0.6")[k % 2], "ls": "--" if plot.log else "-"}
         ax.plot(*plot.lines[name], lw=1, label=name, zorder=1, **style)

@@ -6,11 +6,11 @@ import numpy as np
 
 import fem
 import meshes
-from meshes.tetmesh import Floats
 from skinwave.bodies.absorbing_layer import layer_drag
 from skinwave.bodies.slab import slab_lines
 from skinwave.scene import Body
 from skinwave.verify.case import Case, Plot, below
+from skinwave.verify.statics import WIDTH
 
 HERTZ = np.array([20.0, 51.0, 70.0, 80.0, 90.0, 100.0, 111.0, 140.0, 191.0, 271.0])
 PROBES = np.arange(5) * 0.005  # m
@@ -48,10 +48,7 @@ def _motion(body: Body, *, layer: bool) -> fem.Complex:
         mesh, body.solid, fixed={"bottom": "xyz", "mirror_x": "x", "front": "y", "back": "y"},
         absorbing="right", drag=layer_drag(body, mesh) if layer else None,
     )  # fmt: skip
-    force = fem.load_operator(mesh) @ _line_focus(fem.facet_points(mesh))
+    x = fem.facet_points(mesh)[:, 0]
+    force = fem.load_operator(mesh) @ np.exp(-(x**2) / (2 * WIDTH**2))
     S = fem.probe_operator(mesh, np.column_stack([PROBES, np.full(len(PROBES), H / 2)]))
     return np.array([S @ fem.harmonic(ops, force, f)[0] for f in HERTZ])
-
-
-def _line_focus(points: Floats) -> Floats:
-    return np.exp(-(points[:, 0] ** 2) / (2 * 4.35e-3**2))
