@@ -11,9 +11,7 @@ CASE = {
     "passed": bool,
 }  # fmt: skip
 TRUST = {"command?": str, "model?": str, "misfit?": float, "cases?": [CASE]}
-PLAN = {
-    "rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str]
-}  # fmt: skip
+PLAN = {"rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str]}
 EFFORT = {
     f"{field.name}?": {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}.get(
         field.name, str if isinstance(field.default, str) else float

@@ -202,11 +202,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         peak_memory=peak_memory(),
     )
     return Response(
-        model="fem",
-        times=times,
-        probes=prepared.probes,
-        displacement=displacement,
-        effort=effort,
+        model="fem", times=times, probes=prepared.probes, displacement=displacement, effort=effort
     )
 
 

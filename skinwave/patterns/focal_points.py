@@ -79,9 +79,7 @@ def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fals
         duration = times[-1] + (times[-1] - times[-2]) if count > 1 else 1.0
         centre = (float(places[0, 0, 0]), float(places[0, 0, 1]))
         return Tacton(
-            amplitude=float(levels[0, 0]),
-            duration=duration,
-            trajectory=Trajectory(centre=centre),
+            amplitude=float(levels[0, 0]), duration=duration, trajectory=Trajectory(centre=centre)
         )
     if count < 2:
         times, places, levels = np.array([0.0, 1.0]), *(

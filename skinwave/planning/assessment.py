@@ -71,10 +71,7 @@ def told(
 
 
 def coarser_body(
-    scene: Scene,
-    h: float | None = None,
-    tolerance: float = 0.05,
-    solver: str = "auto",
+    scene: Scene, h: float | None = None, tolerance: float = 0.05, solver: str = "auto"
 ) -> Coarser:
     """Coarser element size in metre that `assessed` compares with, and the body reduced with it."""
     body = scene.body

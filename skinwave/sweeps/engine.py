@@ -137,10 +137,7 @@ def _threads(count: int) -> Iterator[Executor]:
 
 
 def _run_on_cluster(
-    work: Callable[[Any], Any],
-    items: Sequence[Any],
-    address: str,
-    done: Callable[[int, Any], None],
+    work: Callable[[Any], Any], items: Sequence[Any], address: str, done: Callable[[int, Any], None]
 ) -> None:
     from distributed import KilledWorker, as_completed
 

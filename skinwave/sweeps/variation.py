@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from fem.materials import PRESETS
 from meshes import reading
 from simple_model.choices import choose, meant
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, loads, read
-from skinwave.scene_keys import MATERIAL, SECTIONS, renamed
+from skinwave.scene_keys import MATERIAL, SECTIONS, renamed, written
 
 DESIGNS = ("factorial", "zip", "lhs")
 MOST_RUNS = 100_000
@@ -251,20 +252,13 @@ def _with(node: Any, complete: Any, path: Sequence[str], value: Any) -> Any:
         k = int(head)
         return [*node[:k], _with(node[k], None, rest, value), *node[k + 1 :]]
     if isinstance(node, str):  # a preset's name stands for its table
-        choose("material", node, _presets())
-        solid = solid_of(node)
-        node = {key: field.write(getattr(solid, field.name)) for key, field in MATERIAL.items()}
+        choose("material", node, list(PRESETS))
+        node = written(MATERIAL, solid_of(node))
     if not isinstance(node, dict):
         raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
     before = complete.get(head) if isinstance(complete, dict) else None
     inner = node.get(head, before if rest and before is not None else {})
     return node | {head: _with(inner, before, rest, value)}
-
-
-def _presets() -> Sequence[str]:
-    from fem.materials import PRESETS
-
-    return list(PRESETS)
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:

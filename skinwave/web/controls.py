@@ -42,9 +42,7 @@ NUMBERS = {
     "am": Number(label="AM frequency", unit="Hz", low=0, high=500, step=1, start=140),
     "am2": Number(label="Second AM frequency", unit="Hz", low=0, high=500, step=1, start=0),
     "envelope": Number(label="Envelope frequency", unit="Hz", low=0, high=100, step=0.5, start=0),
-    "duration": Number(
-        label="Duration", unit="s", low=0.1, high=10, step=0.1, start=1, least=0.01
-    ),
+    "duration": Number(label="Duration", unit="s", low=0.1, high=10, step=0.1, start=1, least=0.01),
     "size": Number(label="Size", unit="mm", low=0, high=60, step=0.5, start=20),
     "speed": Number(label="Drawing speed", unit="m/s", low=0, high=40, step=0.1, start=12),
     "drawn": Number(label="Drawing frequency", unit="Hz", low=1, high=500, step=1, start=100),
@@ -53,7 +51,7 @@ NUMBERS = {
     "ramp": Number(label="Ramp", unit="ms", low=0, high=100, step=1, start=0),
     "x": Number(label="Point x", unit="mm", low=-50, high=50, step=0.1, start=10),
     "y": Number(label="Point y", unit="mm", low=-50, high=50, step=0.1, start=0),
-}  # fmt: skip
+}
 RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
 OWN_BODY = "from the scene"
 CHOICES: dict[str, tuple[str, ...]] = {
