@@ -14,7 +14,7 @@ from simple_model.sampling import shown
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
-from skinwave.models.full import assembled, meshed
+from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.reduction import (
     BAND,
@@ -161,14 +161,6 @@ def _prepared_anew(
     }
     cache.store(name, asdict(effort), **asdict(reduced.poles), **arrays)
     return Prepared(probes=probes, read=model.outputs, body=replace(reduced, effort=effort))
-
-
-def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
-    """Cost of an offline stage with its time, memory and mesh, of elements of h in metre."""
-    return replace(
-        effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
-        mesh=cache.digest(build.mesh.points, build.mesh.tets),
-    )  # fmt: skip
 
 
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
