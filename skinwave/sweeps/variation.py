@@ -16,6 +16,7 @@ import tomli_w
 from fem.materials import PRESETS
 from meshes import reading
 from simple_model.choices import choose, meant
+from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, loads, read
 from skinwave.scene_keys import MATERIAL, SECTIONS, renamed, written
@@ -66,7 +67,7 @@ def parse(text: str) -> Variation:
     key = _known(key.strip())
     if not equals or not right.strip():
         raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
-    numbers = [_number(part) for part in right.split(":")]
+    numbers = [number_in(part) for part in right.split(":")]
     if len(numbers) == 1 or None in numbers:
         return Variation(key=key, values=tuple(map(_value, _split(right))))
     if len(numbers) > 3 or not all(math.isfinite(x) for x in numbers if x is not None):
@@ -181,19 +182,12 @@ def _known(key: str) -> str:
     return key
 
 
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
 def _value(text: str) -> Any:
     """A value as the scene file would have it; a word needs no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (tomllib.TOMLDecodeError, RecursionError):
-        number = _number(text)
+        number = number_in(text)
         return text.strip() if number is None else number
 
 
