@@ -66,8 +66,11 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
     K, M = operators.K, operators.M
     for shift, factor in _inverses(operators, solver):
         inverse = LinearOperator(K.shape, factor.solve, dtype=np.float64)
+        start = np.random.default_rng(0).standard_normal(K.shape[0])  # the same in each run
         try:
-            squares, shapes = eigsh(K, n, M=M, sigma=-shift, OPinv=inverse, maxiter=MOST_RESTARTS)
+            squares, shapes = eigsh(
+                K, n, M=M, sigma=-shift, OPinv=inverse, maxiter=MOST_RESTARTS, v0=start
+            )
         except ArpackNoConvergence:
             continue
         order = np.argsort(squares)

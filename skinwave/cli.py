@@ -18,14 +18,8 @@ from skinwave.streams import CLOSED, explained, flushed, reader_gone
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
-UNCACHED = (
-    "cache",
-    "convert",
-    "doctor",
-    "plot",
-    "same",
-    "tradeoff",
-)  # which compute nothing, or always anew
+# Commands that compute nothing, or always anew.
+UNCACHED = ("cache", "convert", "doctor", "plot", "same", "tradeoff")
 
 
 @flushed

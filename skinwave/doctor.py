@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 import fem
 from meshes import cache
-from skinwave.effort import THREADS, versions
+from skinwave.effort import THREADS, usable_cores, versions
 from skinwave.pictures.renderer import renderer
 
 DRAWING = ("matplotlib", "pyvista", "vtk", "pillow")
@@ -57,12 +57,8 @@ def _version(name: str) -> str:
 
 def _threads() -> str:
     """How many threads may be used, and what limits them."""
-    if hasattr(os, "sched_getaffinity"):
-        usable = len(os.sched_getaffinity(0))
-    else:
-        usable = os.cpu_count() or 1
     limits = ", ".join(f"{name}={os.environ[name]}" for name in THREADS if name in os.environ)
-    return f"{usable} processors" + (f", limited by {limits}" if limits else "")
+    return f"{usable_cores()} processors" + (f", limited by {limits}" if limits else "")
 
 
 def _optional(module: str, name: str, lost: str) -> Finding:

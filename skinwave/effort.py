@@ -65,13 +65,18 @@ def _versions() -> tuple[tuple[str, str], ...]:
     return (*found.items(), ("os", platform.platform()))
 
 
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    counted = getattr(os, "sched_getaffinity", None)
+    return len(counted(0)) if counted else os.cpu_count() or 1
+
+
 def threads() -> dict[str, str]:
     """How many threads linear algebra takes, by the environment variables that say so.
 
     Sums in another order round otherwise; as many threads give the same digits again.
     """
-    counted = getattr(os, "sched_getaffinity", None)
-    usable = os.environ.get(THREADS[0]) or str(len(counted(0)) if counted else os.cpu_count() or 1)
+    usable = os.environ.get(THREADS[0]) or str(usable_cores())
     return {name: os.environ.get(name) or usable for name in THREADS}
 
 

@@ -1,19 +1,17 @@
 """Whether what a JSON file of a result holds is of the kinds that are read from it."""
 
 from dataclasses import fields
-from math import isfinite
 from typing import Any
 
 from simple_model import Effort
+from skinwave.numbers import is_finite_number
 
 CASE = {
     "title": str, "source": str, "value": float, "reference": float, "error": float, "bar": float,
     "passed": bool,
 }  # fmt: skip
 TRUST = {"command?": str, "model?": str, "misfit?": float, "cases?": [CASE]}
-PLAN = {
-    "rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str]
-}  # fmt: skip
+PLAN = {"rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str]}
 EFFORT = {
     f"{field.name}?": {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}.get(
         field.name, str if isinstance(field.default, str) else float
@@ -41,7 +39,7 @@ def fitting(value: Any, pattern: Any, where: str) -> Any:
         for k, item in enumerate(_of(value, list, where)):
             fitting(item, pattern[0], f"{where}[{k}]")
     elif pattern is float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
+        if not is_finite_number(value):
             raise ValueError(f"{where} is no finite number; make the result anew")
     else:
         _of(value, pattern, where)
@@ -80,10 +78,3 @@ def _of(value: Any, kind: type, where: str) -> Any:
     if not isinstance(value, kind):
         raise ValueError(f"{where} is no {kind.__name__}; make the result anew")
     return value
-
-
-def _is_finite(value: float) -> bool:
-    try:
-        return isfinite(value)
-    except OverflowError:
-        return False

@@ -1,6 +1,9 @@
-"""Numbers as pages, tables and captions print them: by magnitude, to three significant digits."""
+"""Numbers as pages, tables and captions print them: by magnitude, to three significant digits; and
+whether what a file holds is one.
+"""
 
 from math import floor, isfinite, log10
+from typing import Any
 
 FAINTEST = -120.0  # dB: a level below it is round-off
 LARGEST, SMALLEST = 1e6, 1e-4  # written without an exponent between these
@@ -26,3 +29,11 @@ def decibel(value: float, *, signed: bool = False) -> str:
         return "-"
     rounded = round(value, 1) + 0.0  # no -0.0
     return f"{rounded:+.1f}" if signed else f"{rounded:.1f}"
+
+
+def is_finite_number(value: Any) -> bool:
+    """Whether a value is a number that a float can hold, and none of the two truth values."""
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # of a whole number
+        return False

@@ -117,10 +117,7 @@ def output_file(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[IO[bytes]]:
     """A file to write to, which becomes `out` as that of `output_path` does."""
-    with (
-        output_path(out, overwrite=overwrite, inputs=inputs) as aside,
-        open(aside, "wb") as file,
-    ):
+    with output_path(out, overwrite=overwrite, inputs=inputs) as aside, open(aside, "wb") as file:
         yield file
 
 

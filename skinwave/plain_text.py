@@ -27,7 +27,7 @@ def say(text: str, file: TextIO | None = None) -> None:
 
 def cell(value: object) -> object:
     """A value of a CSV row; text that a spreadsheet would compute gets an apostrophe before it."""
-    is_formula = isinstance(value, str) and value.startswith(FORMULA) and not is_number(value)
+    is_formula = isinstance(value, str) and value.startswith(FORMULA) and number_in(value) is None
     return f"'{value}" if is_formula else value
 
 
@@ -47,10 +47,9 @@ def _escape(letter: str) -> str:
     return f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}"
 
 
-def is_number(text: str) -> bool:
-    """Whether a text is what Python reads as a number."""
+def number_in(text: str) -> float | None:
+    """The number that a text is, as Python reads it, if it is one."""
     try:
-        float(text)
+        return float(text)
     except ValueError:
-        return False
-    return True
+        return None

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from meshes import reading
 from skinwave import record
+from skinwave.plain_text import number_in
 
 LINES = "lines.csv"
 LARGEST_CSV = 64_000_000  # bytes
@@ -113,7 +114,7 @@ def _lines(name: str, first: Path, second: Path, rtol: float) -> Iterator[Differ
     largest: dict[str, float] = {}
     for row in (*a, *b):
         for column, cell in row.items():
-            if (value := _number(cell)) is not None:
+            if (value := number_in(cell)) is not None:
                 largest[column] = max(largest.get(column, 0.0), abs(value))
     for k, (one, other) in enumerate(zip(a, b, strict=True)):
         yield from _cells(f"{name}, row {k + 1}", one, other, largest, rtol)
@@ -137,16 +138,9 @@ def _cells(
     rtol: float,
 ) -> Iterator[Difference]:
     for column, cell in one.items():
-        x, y = _number(cell), _number(other[column])
+        x, y = number_in(cell), number_in(other[column])
         if x is None or y is None:
             if cell != other[column]:
                 yield Difference(words=f"{where}, {column} is '{cell}' and '{other[column]}'")
         elif abs(x - y) > rtol * largest[column] + WRITTEN * max(abs(x), abs(y)):
             yield _by(f"{where}, {column}", x, y, largest[column], rtol)
-
-
-def _number(cell: str) -> float | None:
-    try:
-        return float(cell)
-    except ValueError:
-        return None

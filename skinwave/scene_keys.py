@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from math import inf, isfinite, nextafter, pi
 from typing import Any
 
@@ -22,6 +23,11 @@ class SceneKey:
     name: str
     read: Callable[[str, Any], Any]
     write: Callable[[Any], Any]
+
+
+def written(keys: Mapping[str, SceneKey], record: Any) -> dict[str, Any]:
+    """The table of a record, by the keys of a file."""
+    return {key: field.write(getattr(record, field.name)) for key, field in keys.items()}
 
 
 def _number(key: str, value: Any) -> float:
@@ -75,8 +81,12 @@ def _points(key: str, value: Any) -> Points:
     return tuple((x / 1e3, y / 1e3) for x, y in points)
 
 
+def _write_pair(pair: tuple[float, float]) -> list[float]:
+    return [_in_units(x, 1e3) for x in pair]
+
+
 def _write_points(points: Points) -> list[list[float]]:
-    return [[_in_units(x, 1e3) for x in point] for point in points]
+    return [_write_pair(point) for point in points]
 
 
 def _numbers(key: str, value: Any) -> tuple[float, ...]:
@@ -109,10 +119,7 @@ def _inner(cls: type, keys: dict[str, SceneKey]) -> tuple[Callable[..., Any], Ca
             raise ValueError(f"[tacton.{key}] lacks {' and '.join(missing)}; give it")
         return cls(**values)
 
-    def write(record: Any) -> dict[str, Any]:
-        return {key: field.write(getattr(record, field.name)) for key, field in keys.items()}
-
-    return read, write
+    return read, partial(written, keys)
 
 
 def _material(key: str, value: Any) -> str | Material:
@@ -144,7 +151,7 @@ def _write_material(material: str | Material) -> Any:
             "the material has a modulus law of its own, a Python function or a table, which a "
             "scene file cannot hold; give it Prony terms, or simulate it from Python"
         )
-    table = {key: field.write(getattr(material, field.name)) for key, field in MATERIAL.items()}
+    table = written(MATERIAL, material)
     return {key: value for key, value in table.items() if value != []}
 
 
@@ -170,11 +177,6 @@ def _prony(key: str, value: Any) -> tuple[PronyTerm, ...]:
     return tuple(PronyTerm(**values) for values in _tables(f"body.material.{key}", value, PRONY))
 
 
-def _write_prony(terms: tuple[PronyTerm, ...]) -> Any:
-    return [{key: field.write(getattr(term, field.name)) for key, field in PRONY.items()}
-            for term in terms]  # fmt: skip
-
-
 def _tables(key: str, value: Any, keys: dict[str, SceneKey]) -> list[dict[str, Any]]:
     """Values of each of the tables under [[key]], all of whose keys are needed."""
     if not isinstance(value, list):
@@ -190,19 +192,8 @@ def _layers(key: str, value: Any) -> tuple[Layer, ...]:
     return tuple(Layer(**values) for values in _tables(f"body.{key}", value, LAYER))
 
 
-def _write_layers(layers: tuple[Layer, ...]) -> Any:
-    return [
-        {key: field.write(getattr(layer, field.name)) for key, field in LAYER.items()}
-        for layer in layers
-    ]
-
-
 def _relief(key: str, value: Any) -> Relief:
     return Relief(**checked(f"[body.{key}]", as_table(f"body.{key}", value), RELIEF))
-
-
-def _write_relief(relief: Relief) -> Any:
-    return {key: field.write(getattr(relief, field.name)) for key, field in RELIEF.items()}
 
 
 def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
@@ -232,15 +223,15 @@ def _word(name: str) -> SceneKey:
     return SceneKey(name, as_text, str)
 
 
+PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
 MATERIAL = {
     "density_kg_m3": _scaled("density"),
     "shear_modulus_pa": _scaled("shear_modulus"),
     "poisson": _scaled("poisson"),
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
-    "prony": SceneKey("prony", _prony, _write_prony),
+    "prony": SceneKey("prony", _prony, lambda terms: [written(PRONY, term) for term in terms]),
 }
-PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
 MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
     "relaxing_modulus_pa": "modulus_pa",
     "relaxation_time_s": "time_s",
@@ -250,19 +241,14 @@ LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
     "material": SceneKey("material", _material, _write_material),
 }
-PULSES = {
-    "pulses_ms": SceneKey("pulses", _pulses, _write_points),
-    "ramp_ms": _scaled("ramp", 1e3),
-}
+PULSES = {"pulses_ms": SceneKey("pulses", _pulses, _write_points), "ramp_ms": _scaled("ramp", 1e3)}
 SIGNAL = {
     "rate_hz": _scaled("rate"),
     "samples": SceneKey("samples", _numbers, list),
     "role": _word("role"),
 }
 REQUIRED = {"rhythm": 1, "signal": 2}  # how many of the keys, from the first
-PATH = (
-    "shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold",
-)  # fmt: skip
+PATH = ("shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold")
 SECTIONS = {
     "tacton": {
         "amplitude_percent": _scaled("amplitude", 100),
@@ -275,7 +261,7 @@ SECTIONS = {
         "size_mm": _scaled("size", 1e3),
         "speed_m_per_s": _scaled("speed"),
         "sweep": _word("sweep"),
-        "centre_mm": SceneKey("centre", _place, lambda xy: [_in_units(x, 1e3) for x in xy]),
+        "centre_mm": SceneKey("centre", _place, _write_pair),
         "points_mm": SceneKey("points", _points, _write_points),
         "times_s": SceneKey("times", _numbers, list),
         "levels": SceneKey("levels", _numbers, list),
@@ -300,8 +286,8 @@ SECTIONS = {
         "thickness_mm": _scaled("depth", 1e3),
         "base": _word("base"),
         "sides": _word("sides"),
-        "layers": SceneKey("layers", _layers, _write_layers),
-        "relief": SceneKey("relief", _relief, _write_relief),
+        "layers": SceneKey("layers", _layers, lambda layers: [written(LAYER, x) for x in layers]),
+        "relief": SceneKey("relief", _relief, partial(written, RELIEF)),
         "file": _word("file"),
         "unit": _word("unit"),
         "up": _word("up"),
@@ -310,14 +296,10 @@ SECTIONS = {
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
         "tilt_y_deg": _scaled("tilt_y", 180 / pi),
-        "offset_mm": SceneKey(
-            "offset", _pair_in_mm, lambda offset: [_in_units(x, 1e3) for x in offset]
-        ),
+        "offset_mm": SceneKey("offset", _pair_in_mm, _write_pair),
         "lift_mm": _scaled("lift", 1e3),
     },
-    "probes": {
-        "points_mm": SceneKey("probes", _points, _write_points),
-    },
+    "probes": {"points_mm": SceneKey("probes", _points, _write_points)},
 }
 
 

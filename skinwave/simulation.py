@@ -64,9 +64,7 @@ def simulate(
     Diverged
         If a nonlinear model does not converge, or a response violates the energy balance.
     """
-    found = answered(
-        scene, model, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped
-    )  # fmt: skip
+    found = answered(scene, model, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped)
     for sentence in found.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return found
@@ -93,12 +91,8 @@ def answered(
     -------
     Response
     """
-    required = required_plan(
-        scene, model, tolerance, progress, h=h, dt=dt, solver=solver
-    )  # fmt: skip
-    return follow(
-        scene, required, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped
-    )  # fmt: skip
+    required = required_plan(scene, model, tolerance, progress, h=h, dt=dt, solver=solver)
+    return follow(scene, required, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped)
 
 
 def required_plan(

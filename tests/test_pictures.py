@@ -22,6 +22,7 @@ from PIL import Image
 from fem import PRESETS
 from simple_model import MovingPressure, Tacton, Trajectory, published
 from simple_model.flat_body import steady_lines
+from simple_model.tacton import pattern_period
 from skinwave import exports
 from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
@@ -192,7 +193,7 @@ def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
     )  # fmt: skip
     line = lines[np.argmin(np.abs(frequencies - 250))]
     exact = (np.exp(2j * np.pi * 250 * times)[:, None] * line).real
-    assert found == pytest.approx(speeds.surface_speed(body, 250.0), rel=0.05)
+    assert found == pytest.approx(body.of_kind.wave_speed(body, 250.0), rel=0.05)
     assert found == pytest.approx(apparent_speed(distance, times, exact, 250.0), rel=0.05)
     assert scene.tacton.trajectory.speed > 2 * found  # there is a wake
 
@@ -206,8 +207,9 @@ def test_a_running_wave_has_the_speed_that_it_runs_at():
 def test_a_sheet_bends_at_the_speed_of_plates():
     """80 g/m2 paper at 140 Hz."""
     sheet = Body(kind="sheet", material="paper", depth=1e-4, base="free", sides="clamped")
-    assert speeds.surface_speed(sheet, 140.0) == pytest.approx(7.7, abs=0.1)
-    assert speeds.surface_speed(Body(material="forearm"), 200.0) == pytest.approx(3.22, abs=0.03)
+    assert sheet.of_kind.wave_speed(sheet, 140.0) == pytest.approx(7.7, abs=0.1)
+    skin = Body(material="forearm")
+    assert skin.of_kind.wave_speed(skin, 200.0) == pytest.approx(3.22, abs=0.03)
 
 
 def test_a_mach_angle_is_there_only_behind_a_focus_that_is_faster():
@@ -224,12 +226,12 @@ def test_a_load_has_the_period_of_all_its_tones():
 def test_what_is_played_returns_after_the_slowest_beat():
     """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
     beating = circling(190.986, am_frequency=140)
-    span = speeds.shown_period(beating)
+    span = pattern_period(beating.tacton)
     assert span >= 1 / 50.986
     assert speeds.seam(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
     whole = circling(200.0, am_frequency=140)
     assert speeds.shown_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
-    assert speeds.shown_part(whole, 340.0, 12) == (speeds.shown_period(whole), 12)
+    assert speeds.shown_part(whole, 340.0, 12) == (pattern_period(whole.tacton), 12)
     assert speeds.shown_part(circling(200.0), 200.0) == pytest.approx((0.005, speeds.FEWEST))
 
 

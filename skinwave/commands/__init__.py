@@ -23,22 +23,8 @@ from skinwave.commands import (
     web,
 )
 
-COMMANDS = {
-    "run": run,
-    "compare": compare,
-    "tradeoff": tradeoff,
-    "relax": relax,
-    "plan": plan,
-    "sweep": sweep,
-    "plot": plot,
-    "mesh": mesh,
-    "convert": convert,
-    "verify": verify,
-    "report": report,
-    "film": film,
-    "web": web,
-    "rerun": rerun,
-    "same": same,
-    "doctor": doctor,
-    "cache": cache,
-}
+MODULES = (
+    run, compare, tradeoff, relax, plan, sweep, plot, mesh, convert, verify, report, film, web,
+    rerun, same, doctor, cache,
+)  # fmt: skip
+COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

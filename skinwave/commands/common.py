@@ -125,12 +125,7 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
         yield log
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description:<36}", markup=False), BarColumn(), TimeElapsedColumn())
     left = TextColumn("{task.fields[left]}", markup=False)

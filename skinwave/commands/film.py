@@ -4,14 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import (
-    add_mesh,
-    add_reporting,
-    metre,
-    progress_of,
-    summarise,
-    warn,
-)
+from skinwave.commands.common import add_mesh, add_reporting, metre, progress_of, summarise, warn
 
 if TYPE_CHECKING:
     from skinwave.effort import Progress

@@ -56,7 +56,8 @@ def _with_threads(options: argparse.Namespace, threads: dict[str, str]) -> int:
     """The same command in a process with as many threads as the record has."""
     words = [sys.executable, "-P", "-m", "skinwave", *options.typed]
     # In a group of its own: what interrupts or ends this process is handed on to it once.
-    with subprocess.Popen(words, env=os.environ | threads, **_own_group()) as again:
+    group = None if sys.platform == "win32" else 0
+    with subprocess.Popen(words, env=os.environ | threads, process_group=group) as again:
         try:
             return again.wait()
         except KeyboardInterrupt:
@@ -65,10 +66,6 @@ def _with_threads(options: argparse.Namespace, threads: dict[str, str]) -> int:
         except SystemExit:
             again.terminate()
             raise
-
-
-def _own_group() -> dict[str, Any]:
-    return {} if sys.platform == "win32" else {"process_group": 0}
 
 
 def _command_again(

@@ -69,13 +69,13 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
 
 
 def energy_balance(
-    spent: fem.EnergyBalance, stored: float = 0.0, when: str = ""
+    energies: fem.EnergyBalance, stored: float = 0.0, when: str = ""
 ) -> tuple[float, float]:
     """Relative error of the energy balance, if small enough to trust a response.
 
     Parameters
     ----------
-    spent : energies, or powers, of the response
+    energies : of the response, or powers
     stored : in the same unit, energy at its end
     when : where in the response, for the message
 
@@ -88,13 +88,13 @@ def energy_balance(
     Diverged
         If the error is too large.
     """
-    imbalance = fem.imbalance(spent, stored)
+    imbalance = fem.imbalance(energies, stored)
     if not imbalance <= MOST_IMBALANCE:
         raise fem.Diverged(
             f"the energy balance is off by {100 * imbalance:.2g} %{when}, above the limit of "
             f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
         )
-    radiated = spent.radiated / spent.lost if spent.lost > 0 else 0.0
+    radiated = energies.radiated / energies.lost if energies.lost > 0 else 0.0
     return imbalance, radiated
 
 
@@ -120,10 +120,15 @@ def transient_answer(scene: Scene, request: Request) -> Response:
         stepped, energy = marched(
             balanced, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
         )
-    displacement = CubicSpline(np.arange(steps + 1) * dt, stepped)(times)
-    used = fem.available()[0] if solver == "auto" else solver
-    found = _response("fem-transient", scene, times, displacement, clock, ops, steps, used, energy)
-    return discretised(found, build, request.h or default_size(scene.body), dt)
+    effort = Effort(
+        dofs=len(ops.free), steps=steps, energy_imbalance=energy[0], radiated=energy[1], dt=dt,
+        solver=fem.available()[0] if solver == "auto" else solver,
+    )  # fmt: skip
+    return Response(
+        model="fem-transient", times=times, probes=scene.probe_points,
+        displacement=CubicSpline(np.arange(steps + 1) * dt, stepped)(times),
+        effort=spent(effort, clock, build, request.h or default_size(scene.body)),
+    )  # fmt: skip
 
 
 def marched(
@@ -153,12 +158,12 @@ def marched(
         If the energy balance is violated in one of the states that are checked.
     """
     found = []
-    for k, (state, spent) in enumerate(balanced):
+    for k, (state, energies) in enumerate(balanced):
         found.append(read(state.displacement))
         report("march", k / steps)
         if k % CHECKED_EACH == 0 or k == steps:
             when = f" at t = {state.time:g} s, step {k}"
-            energy = energy_balance(spent, stored(state), when)
+            energy = energy_balance(energies, stored(state), when)
     return np.array(found), energy
 
 
@@ -214,11 +219,15 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             total += power
     energy = energy_balance(total)
     below = shown(scene.pressure, frequencies, times)
-    displacement = synthesise(frequencies[below], amplitudes[below], times)
-    count = len(frequencies)
-    used = fem.available(complex_valued=True)[0] if solver == "auto" else solver
-    found = _response("fem-harmonic", scene, times, displacement, clock, ops, count, used, energy)
-    return discretised(found, build, request.h or default_size(scene.body))
+    effort = Effort(
+        dofs=len(ops.free), steps=len(frequencies), energy_imbalance=energy[0], radiated=energy[1],
+        solver=fem.available(complex_valued=True)[0] if solver == "auto" else solver,
+    )  # fmt: skip
+    return Response(
+        model="fem-harmonic", times=times, probes=scene.probe_points,
+        displacement=synthesise(frequencies[below], amplitudes[below], times),
+        effort=spent(effort, clock, build, request.h or default_size(scene.body)),
+    )  # fmt: skip
 
 
 def _line(
@@ -236,49 +245,21 @@ def _line(
     return S @ u[0], fem.mean_power(ops.C, ops.R, *line, ops.branches)
 
 
-def discretised(response: Response, build: Build, h: float, dt: float = 0.0) -> Response:
-    """Response with its discretisation named in its effort.
+def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
+    """Cost of a response with its time, memory and mesh.
 
     Parameters
     ----------
-    response : Response
+    effort : Effort, so far
+    clock : its times
     build : Build
     h : metre, element size
-    dt : s, time step; 0 without one
 
     Returns
     -------
-    Response
+    Effort
     """
-    mesh = cache.digest(build.mesh.points, build.mesh.tets)
-    return replace(response, effort=replace(response.effort, h=h, dt=dt, mesh=mesh))
-
-
-def _response(
-    model: str,
-    scene: Scene,
-    times: Floats,
-    displacement: Floats,
-    clock: Clock,
-    operators: fem.Operators,
-    steps: int,
-    solver: str,
-    energy: tuple[float, float],
-) -> Response:
-    effort = Effort(
-        seconds=clock.seconds,
-        dofs=len(operators.free),
-        steps=steps,
-        peak_memory=peak_memory(),
-        solver=solver,
-        energy_imbalance=energy[0],
-        radiated=energy[1],
-        versions=versions(),
-    )
-    return Response(
-        model=model,
-        times=times,
-        probes=scene.probe_points,
-        displacement=displacement,
-        effort=effort,
-    )
+    return replace(
+        effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
+        mesh=cache.digest(build.mesh.points, build.mesh.tets),
+    )  # fmt: skip

@@ -14,7 +14,7 @@ from simple_model.sampling import shown
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
-from skinwave.models.full import assembled, meshed
+from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.reduction import (
     BAND,
@@ -173,26 +173,6 @@ def _prepared_anew(
     return Prepared(probes=probes, read=model.outputs, body=replace(reduced, effort=effort))
 
 
-def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
-    """Cost of an offline stage with its time, memory and mesh.
-
-    Parameters
-    ----------
-    effort : Effort, of the reduction
-    clock : its times
-    build : Build
-    h : metre, element size
-
-    Returns
-    -------
-    Effort
-    """
-    return replace(
-        effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
-        mesh=cache.digest(build.mesh.points, build.mesh.tets),
-    )  # fmt: skip
-
-
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
     """Mirror images of the probes in the part that is modelled."""
     kept = probes.copy()
@@ -239,11 +219,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         peak_memory=peak_memory(),
     )
     return Response(
-        model="fem",
-        times=times,
-        probes=prepared.probes,
-        displacement=displacement,
-        effort=effort,
+        model="fem", times=times, probes=prepared.probes, displacement=displacement, effort=effort
     )
 
 

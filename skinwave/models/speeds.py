@@ -1,4 +1,4 @@
-"""Phase speed of surface waves, the Mach angle of a faster focus, and the period of a pattern."""
+"""Mach angle of a focus that is faster than waves, and the period of a pattern."""
 
 from dataclasses import replace
 from math import asin, ceil
@@ -8,22 +8,10 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.tacton import pattern_period, repeated
-from skinwave.scene import Body
 
 FEWEST, MOST = 40, 256  # frames of an animation
 EACH = 8  # frames to a period of the fastest line that counts
 SAME = 1e-6  # of a tone: further from a multiple of the common frequency it is none
-
-
-def surface_speed(body: Body, frequency: float) -> float:
-    """Phase speed in m/s of the surface wave of an infinite body at a frequency in Hz.
-
-    Raises
-    ------
-    ValueError
-        If there is no body.
-    """
-    return body.of_kind.wave_speed(body, frequency)
 
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:
@@ -50,20 +38,14 @@ def period(pressure: MovingPressure) -> float | None:
     return whole if turns and seam(pressure.tacton, whole) <= SAME * turns else None
 
 
-def shown_period(pressure: MovingPressure) -> float:
-    """Duration in s of an animation: the period of the whole pattern or, if it has none, the time
-    after which the pattern nearly repeats.
-    """
-    return pattern_period(pressure.tacton)
-
-
 def shown_part(
     pressure: MovingPressure, fastest: float, frames: int | None = None, most: int = MOST
 ) -> tuple[float, int]:
     """Duration and number of frames of an animation: `EACH` frames to a period of its fastest line.
 
-    A pattern that takes more than `most` frames is shown in part, as long as these last, with the
-    smallest jump where it repeats.
+    It is the period of the whole pattern, or the time after which that nearly repeats. A pattern
+    that takes more than `most` frames is shown in part, as long as these last, with the smallest
+    jump where it repeats.
 
     Parameters
     ----------
@@ -76,7 +58,7 @@ def shown_part(
     -------
     duration in s, and number of frames
     """
-    span, tacton = shown_period(pressure), pressure.tacton
+    span, tacton = pattern_period(pressure.tacton), pressure.tacton
     needed = ceil(EACH * fastest * span * (1 - SAME))
     if needed > (most := max(most, frames or 0)):
         longest = min(tacton.duration, most / EACH / fastest)

@@ -30,9 +30,9 @@ from simple_model.load_spectrum import (
 from simple_model.sampling import resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
-from skinwave.effort import Clock, peak_memory, versions
+from skinwave.effort import Clock
 from skinwave.models import Request
-from skinwave.models.full import TRANSIENT_RATE, discretised, marched, step_count
+from skinwave.models.full import TRANSIENT_RATE, marched, spent, step_count
 from skinwave.models.loads import surface_load
 from skinwave.scene import Body, Scene
 
@@ -136,8 +136,8 @@ def full_answer(scene: Scene, request: Request) -> Response:
     P, points = surface_load(made)
     S = fem.probe_operator(made.mesh, scene.probe_points)
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    found = _about_rest(
-        "fem-nonlinear-transient", scene, request, clock,
+    return _about_rest(
+        "fem-nonlinear-transient", scene, request, clock, made, size,
         body=body,
         mean=P @ mean_pressure(scene.pressure, points),
         force=lambda t: P @ scene.pressure(points, t, over=dt),
@@ -145,7 +145,6 @@ def full_answer(scene: Scene, request: Request) -> Response:
         dt=dt,
         effort=Effort(dofs=len(body.operators.free)),
     )  # fmt: skip
-    return discretised(found, made, size, dt)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -172,8 +171,8 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
         return (np.exp(2j * pi * hz * t) @ forces).real
 
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    found = _about_rest(
-        "fem-nonlinear", scene, request, clock,
+    return _about_rest(
+        "fem-nonlinear", scene, request, clock, sheet.made, size,
         body=sheet.modes.elastic,
         mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
@@ -183,7 +182,6 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
             dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
         ),
     )  # fmt: skip
-    return discretised(found, sheet.made, size, dt)
 
 
 @lru_cache(maxsize=1)
@@ -209,7 +207,7 @@ def mode_count(body: Body) -> int:
 
 
 def _about_rest(
-    model: str, scene: Scene, request: Request, clock: Clock, *,
+    model: str, scene: Scene, request: Request, clock: Clock, made: Build, h: float, *,
     body: fem.Elastic, mean: Floats, force: Callable[[float], Floats],
     read: Callable[[Floats], Floats], dt: float, effort: Effort,
 ) -> Response:  # fmt: skip
@@ -228,14 +226,12 @@ def _about_rest(
             nonlinear.with_energy_balance(body, islice(states, steps + 1), kept), steps, read,
             lambda state: nonlinear.total_energy(body, state) - at_start, report,
         )  # fmt: skip
+    effort = replace(
+        effort, steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
+        energy_imbalance=imbalance, dt=dt,
+    )  # fmt: skip
     return Response(
-        model=model,
-        times=times,
-        probes=scene.probe_points,
+        model=model, times=times, probes=scene.probe_points,
         displacement=CubicSpline(np.arange(steps + 1) * dt, stepped)(times),
-        effort=replace(
-            effort, seconds=clock.seconds, steps=steps, peak_memory=peak_memory(),
-            solver=fem.available()[0] if solver == "auto" else solver,
-            energy_imbalance=imbalance, versions=versions(),
-        ),
+        effort=spent(effort, clock, made, h),
     )  # fmt: skip

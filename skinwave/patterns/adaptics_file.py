@@ -6,9 +6,11 @@ and 0.1.0-alpha.3: millisecond, millimetre, Hz.
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from math import cos, isfinite, radians, sin
+from dataclasses import dataclass, replace
+from math import cos, radians, sin
 from typing import Any
+
+from skinwave.numbers import is_finite_number
 
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
@@ -151,7 +153,8 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
     )
     if frames[0][0] < 0:
         raise ValueError(f"a keyframe is at {1e3 * frames[0][0]:g} ms, before the start; move it")
-    places, brushes, intensities = _Builder(), _Builder(), _Builder()
+    places: list[tuple[float, Any, bool]] = []  # time, value, whether it is a step
+    brushes, intensities = places.copy(), places.copy()
     duration = frames[-1][0]
     for time, _, frame in frames:
         kind = frame.get("type")
@@ -162,48 +165,37 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
         _refuse_jumps(frame, time)
         if kind == "standard":
             at, step = _with_transition(frame, "coords")
-            places.add(time, tuple(_finite(at.get(a), f"coords {a}") for a in "xyz"), step)
-        elif places.times:
-            places.add(time, places.values[-1], places.steps[-1])
+            places.append((time, tuple(_finite(at.get(a), f"coords {a}") for a in "xyz"), step))
+        elif places:
+            places.append((time, *places[-1][1:]))
         if kind == "stop":
             duration = time
             break
         if frame.get("brush") is not None:
             inner, step = _with_transition(frame, "brush")
-            brushes.add(time, _brush(inner, number), step)
+            brushes.append((time, _brush(inner, number), step))
         if frame.get("intensity") is not None:
             inner, step = _with_transition(frame, "intensity")
-            intensities.add(time, _intensity(inner, number), step)
-    placed = _transformed(places.values, _get(transform, "geometric_transforms", dict, {}), number)
+            intensities.append((time, _intensity(inner, number), step))
+    moved = _get(transform, "geometric_transforms", dict, {})
+    placed = _transformed([place for _, place, _ in places], moved, number)
     notes = [f"parameter '{name}' at its default, {value:g}" for name, value in number.used.items()]
     if speed != 1:
         notes.append(f"played at {speed:g} times the speed, brushes drawn at their own")
     return Animation(
         name=str(table.get("name", ""))[:80],
-        places=Track(times=tuple(places.times), values=placed, steps=tuple(places.steps)),
-        brushes=brushes.track(),
-        intensities=intensities.track(),
+        places=replace(_track(places), values=placed),
+        brushes=_track(brushes),
+        intensities=_track(intensities),
         duration=duration,
         factor=number(transform.get("intensity_factor", 1.0), "intensity_factor"),
         notes=tuple(notes),
     )
 
 
-class _Builder:
-    """A track that grows."""
-
-    def __init__(self) -> None:
-        self.times: list[float] = []
-        self.values: list[Any] = []
-        self.steps: list[bool] = []
-
-    def add(self, time: float, value: Any, step: bool) -> None:
-        self.times.append(time)
-        self.values.append(value)
-        self.steps.append(step)
-
-    def track(self) -> Track:
-        return Track(times=tuple(self.times), values=tuple(self.values), steps=tuple(self.steps))
+def _track(entries: list[tuple[float, Any, bool]]) -> Track:
+    times, values, steps = zip(*entries, strict=True) if entries else ((), (), ())
+    return Track(times=times, values=values, steps=steps)
 
 
 def _refuse_jumps(frame: Mapping[str, Any], time: float) -> None:
@@ -278,13 +270,6 @@ def _object(value: Any, what: str) -> Mapping[str, Any]:
 
 
 def _finite(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
+    if not is_finite_number(value):
         raise ValueError(f"{what} = {json.dumps(value)[:40]} must be a finite number")
     return float(value)
-
-
-def _is_finite(value: float) -> bool:
-    try:
-        return isfinite(value)
-    except OverflowError:
-        return False

@@ -17,7 +17,7 @@ from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
 from simple_model.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
-from skinwave.plain_text import csv_table, is_number
+from skinwave.plain_text import csv_table, number_in
 from skinwave.scene import Scene
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
@@ -35,7 +35,7 @@ def read(content: bytes, options: Options) -> Pattern:
         If it is none: the line, what is wrong with it and the cure, in one sentence.
     """
     rows = _rows(content)
-    tidy = not is_number(rows[0][1][0])
+    tidy = number_in(rows[0][1][0]) is None
     table = _tidy(rows) if tidy else _bare(rows, options.rate)
     notes: list[str] = []
     points, counts = np.unique(table["point"], return_counts=True)
@@ -49,8 +49,8 @@ def read(content: bytes, options: Options) -> Pattern:
     times = table["t_s"] - table["t_s"][0, 0]
     if np.ptp(times, axis=0).max() > 1e-9:
         raise ValueError("points have different times; give each the same")
-    if (np.diff(times[0]) < 0).any():
-        raise ValueError(f"times fall after t_s = {_before_fall(table['t_s'][0]):g}; sort them")
+    if (falling := np.diff(times[0]) < 0).any():
+        raise ValueError(f"times fall after t_s = {table['t_s'][0][falling.argmax()]:g}; sort them")
     if not ((table["intensity"] >= 0) & (table["intensity"] <= 1)).all():
         raise ValueError("intensity must lie in 0..1, the sound pressure over that at full drive")
     if len(points) > 1:
@@ -79,9 +79,7 @@ def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fals
         duration = times[-1] + (times[-1] - times[-2]) if count > 1 else 1.0
         centre = (float(places[0, 0, 0]), float(places[0, 0, 1]))
         return Tacton(
-            amplitude=float(levels[0, 0]),
-            duration=duration,
-            trajectory=Trajectory(centre=centre),
+            amplitude=float(levels[0, 0]), duration=duration, trajectory=Trajectory(centre=centre)
         )
     if count < 2:
         times, places, levels = np.array([0.0, 1.0]), *(
@@ -199,12 +197,8 @@ def _numbers(line: int, cells: list[str], count: int) -> list[float]:
     try:
         values = [float(cell) for cell in cells]
     except ValueError:
-        wrong = next(cell for cell in cells if not is_number(cell))
+        wrong = next(cell for cell in cells if number_in(cell) is None)
         raise ValueError(f"line {line} has '{wrong[:40]}' where a number belongs") from None
     if not all(map(isfinite, values)):
         raise ValueError(f"line {line} has a number that is not finite; leave the line out")
     return values
-
-
-def _before_fall(times: Floats) -> float:
-    return float(times[int(np.argmax(np.diff(times) < 0))])

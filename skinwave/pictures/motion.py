@@ -13,9 +13,9 @@ from simple_model.load_spectrum import path_samples
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
 from skinwave.models import reduction
-from skinwave.models.full import assembled, meshed
+from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.loads import surface_load
-from skinwave.models.prepared import sample_times, spent
+from skinwave.models.prepared import sample_times
 from skinwave.scene import Scene
 from skinwave.simulation import check_options
 

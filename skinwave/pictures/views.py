@@ -20,7 +20,7 @@ from simple_model.load_spectrum import pressure_lines
 from simple_model.response import UNITS
 from skinwave.fitting import effort_of, fitting
 from skinwave.models.reduction import oscillating
-from skinwave.models.speeds import repeated, shown_part, strongest_tone, surface_speed
+from skinwave.models.speeds import repeated, shown_part, strongest_tone
 from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
@@ -141,7 +141,7 @@ def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | N
     def trace(places: Floats, t: Floats) -> Floats:
         return vibration(moved, t) @ (fem.probe_operator(mesh, places) @ moved.basis).T
 
-    speed = surface_speed(scene.body, tone or TYPICAL)
+    speed = scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL)
     reach = np.array([scene.body.width, scene.body.height]) / 2
     return View(
         body=body, model="fem", unit="m", scene=scene, points=mesh.points, tets=mesh.tets,

@@ -88,10 +88,7 @@ def told(
 
 
 def coarser_body(
-    scene: Scene,
-    h: float | None = None,
-    tolerance: float = 0.05,
-    solver: str = "auto",
+    scene: Scene, h: float | None = None, tolerance: float = 0.05, solver: str = "auto"
 ) -> Coarser:
     """Coarser mesh that `assessed` compares with.
 

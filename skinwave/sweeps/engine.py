@@ -3,7 +3,7 @@
 Nothing that loads numpy is imported here: a worker process sets its threads before that.
 """
 
-import os
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -12,6 +12,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
+from skinwave.effort import usable_cores
 from skinwave.processes import as_worker, guarded, pool
 
 LOCAL = ("processes", "threads")
@@ -53,7 +54,7 @@ def workers(scheduler: str, asked: int | None = None) -> int:
     if asked is not None and asked < 1:
         raise ValueError(f"--workers = {asked} is below 1; give one at least")
     if scheduler in LOCAL:
-        return asked or _cores()
+        return asked or usable_cores()
     with _client(scheduler) as client:
         return max(1, sum(client.nthreads().values()))
 
@@ -95,16 +96,11 @@ def mapped_on(address: str) -> Iterator[Callable[..., Iterable[Any]]]:
         def mapped(work: Callable[..., Any], *items: Iterable[Any]) -> Iterator[Any]:
             # What the function holds, such as a body's matrices, goes to each worker once.
             sent = client.scatter(work, broadcast=True)
-            futures = [
-                client.submit(_call, sent, *each, pure=False) for each in zip(*items, strict=True)
-            ]
+            calls = zip(*items, strict=True)
+            futures = [client.submit(operator.call, sent, *each, pure=False) for each in calls]
             return (future.result() for future in futures)
 
         yield mapped
-
-
-def _call(work: Callable[..., Any], *arguments: Any) -> Any:
-    return work(*arguments)
 
 
 def _run_here(
@@ -137,10 +133,7 @@ def _threads(count: int) -> Iterator[Executor]:
 
 
 def _run_on_cluster(
-    work: Callable[[Any], Any],
-    items: Sequence[Any],
-    address: str,
-    done: Callable[[int, Any], None],
+    work: Callable[[Any], Any], items: Sequence[Any], address: str, done: Callable[[int, Any], None]
 ) -> None:
     from distributed import KilledWorker, as_completed
 
@@ -165,8 +158,3 @@ def _client(address: str) -> Iterator[Any]:
         ) from None
     with client:
         yield client
-
-
-def _cores() -> int:
-    counted = getattr(os, "sched_getaffinity", None)
-    return len(counted(0)) if counted else os.cpu_count() or 1

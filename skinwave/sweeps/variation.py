@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from fem.materials import PRESETS
 from meshes import reading
 from simple_model.choices import choose, meant
+from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, loads, read
-from skinwave.scene_keys import MATERIAL, SECTIONS, renamed
+from skinwave.scene_keys import MATERIAL, SECTIONS, renamed, written
 
 DESIGNS = ("factorial", "zip", "lhs")
 MOST_RUNS = 100_000
@@ -65,7 +67,7 @@ def parse(text: str) -> Variation:
     key = _known(key.strip())
     if not equals or not right.strip():
         raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
-    numbers = [_number(part) for part in right.split(":")]
+    numbers = [number_in(part) for part in right.split(":")]
     if len(numbers) == 1 or None in numbers:
         return Variation(key=key, values=tuple(map(_value, _split(right))))
     if len(numbers) > 3 or not all(math.isfinite(x) for x in numbers if x is not None):
@@ -180,19 +182,12 @@ def _known(key: str) -> str:
     return key
 
 
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
 def _value(text: str) -> Any:
     """A value as the scene file would have it; a word needs no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (tomllib.TOMLDecodeError, RecursionError):
-        number = _number(text)
+        number = number_in(text)
         return text.strip() if number is None else number
 
 
@@ -251,20 +246,13 @@ def _with(node: Any, complete: Any, path: Sequence[str], value: Any) -> Any:
         k = int(head)
         return [*node[:k], _with(node[k], None, rest, value), *node[k + 1 :]]
     if isinstance(node, str):  # a preset's name stands for its table
-        choose("material", node, _presets())
-        solid = solid_of(node)
-        node = {key: field.write(getattr(solid, field.name)) for key, field in MATERIAL.items()}
+        choose("material", node, list(PRESETS))
+        node = written(MATERIAL, solid_of(node))
     if not isinstance(node, dict):
         raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
     before = complete.get(head) if isinstance(complete, dict) else None
     inner = node.get(head, before if rest and before is not None else {})
     return node | {head: _with(inner, before, rest, value)}
-
-
-def _presets() -> Sequence[str]:
-    from fem.materials import PRESETS
-
-    return list(PRESETS)
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:

@@ -4,7 +4,7 @@ Values are in the units that a page shows. Ranges are those of Lim, Seifi and Pa
 section 2.2, where they give one: amplitude, ratio, duration, shape and size.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -42,9 +42,7 @@ NUMBERS = {
     "am": Number(label="AM frequency", unit="Hz", low=0, high=500, step=1, start=140),
     "am2": Number(label="Second AM frequency", unit="Hz", low=0, high=500, step=1, start=0),
     "envelope": Number(label="Envelope frequency", unit="Hz", low=0, high=100, step=0.5, start=0),
-    "duration": Number(
-        label="Duration", unit="s", low=0.1, high=10, step=0.1, start=1, least=0.01
-    ),
+    "duration": Number(label="Duration", unit="s", low=0.1, high=10, step=0.1, start=1, least=0.01),
     "size": Number(label="Size", unit="mm", low=0, high=60, step=0.5, start=20),
     "speed": Number(label="Drawing speed", unit="m/s", low=0, high=40, step=0.1, start=12),
     "drawn": Number(label="Drawing frequency", unit="Hz", low=1, high=500, step=1, start=100),
@@ -53,7 +51,7 @@ NUMBERS = {
     "ramp": Number(label="Ramp", unit="ms", low=0, high=100, step=1, start=0),
     "x": Number(label="Point x", unit="mm", low=-50, high=50, step=0.1, start=10),
     "y": Number(label="Point y", unit="mm", low=-50, high=50, step=0.1, start=0),
-}  # fmt: skip
+}
 RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
 OWN_BODY = "from the scene"
 CHOICES: dict[str, tuple[str, ...]] = {
@@ -189,17 +187,7 @@ def from_query(query: str, own: bool = False) -> tuple[Values, tuple[str, ...]]:
     """Values of an address, and a sentence for everything in it that was left out; such as a
     scene's body where there is not one of its `own`.
     """
-    values, refused = dict(STARTS), []
-    for key, given in parse_qsl(query):
-        try:
-            if key not in KEYS:
-                raise ValueError("is not known here")
-            if given == OWN_BODY and not own:
-                raise ValueError("the scene that it came from is not open; open it again")
-            values[key] = checked(key, given)
-        except ValueError as error:
-            refused.append(f"left out of the address: {key}: {error}")
-    return values, tuple(refused)
+    return _in_range(parse_qsl(query), "address", own)
 
 
 def values_in(query: str) -> Values:
@@ -218,33 +206,37 @@ def in_range(values: Mapping[str, Any]) -> tuple[Values, tuple[str, ...]]:
     """A scene's values, each out of its control's range as it is in `STARTS`; a sentence for each
     of those.
     """
-    found, refused = dict(STARTS), []
-    for key, given in values.items():
+    return _in_range(values.items(), "scene", own=True)
+
+
+def _in_range(
+    pairs: Iterable[tuple[str, Any]], place: str, own: bool
+) -> tuple[Values, tuple[str, ...]]:
+    values, refused = dict(STARTS), []
+    for key, given in pairs:
         try:
-            found[key] = checked(key, given)
+            if key not in KEYS:
+                raise ValueError("is not known here")
+            if given == OWN_BODY and not own:
+                raise ValueError("the scene that it came from is not open; open it again")
+            values[key] = checked(key, given)
         except ValueError as error:
-            refused.append(f"left out of the scene: {key}: {error}")
-    return found, tuple(refused)
+            refused.append(f"left out of the {place}: {key}: {error}")
+    return values, tuple(refused)
 
 
 def presets() -> dict[str, Values]:
     """The paper's 15 Tactons by name: what each changes."""
+    unused = ("am2", "ratio", "envelope", "foci", "pulses", "phases", "paths", "ramp")
     return {
-        name: {
+        name: {key: STARTS[key] for key in unused}
+        | {
             "amplitude": 100.0 * tacton.amplitude,
             "am": tacton.am_frequency,
-            "am2": 0.0,
-            "ratio": "1:0",
-            "envelope": 0.0,
             "duration": tacton.duration,
             "shape": "circle" if tacton.trajectory.size else "point",
             "size": 1e3 * tacton.trajectory.size,
             "speed": tacton.trajectory.speed,
-            "foci": 1,
-            "pulses": "",
-            "phases": "",
-            "paths": "",
-            "ramp": 0.0,
         }
         for name, tacton in tactons()
     }

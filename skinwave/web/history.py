@@ -30,18 +30,17 @@ class History:
 
     def undo(self) -> Values | None:
         """The values before, or None at the beginning."""
-        if not self._past:
-            return None
-        self._future.append(self._now)
-        self._now, self._last = self._past.pop(), (frozenset(), 0.0)
-        return dict(self._now)
+        return self._step(self._past, self._future)
 
     def redo(self) -> Values | None:
         """The values that were undone last, or None."""
-        if not self._future:
+        return self._step(self._future, self._past)
+
+    def _step(self, source: list[Values], other: list[Values]) -> Values | None:
+        if not source:
             return None
-        self._past.append(self._now)
-        self._now, self._last = self._future.pop(), (frozenset(), 0.0)
+        other.append(self._now)
+        self._now, self._last = source.pop(), (frozenset(), 0.0)
         return dict(self._now)
 
     @property

@@ -111,7 +111,7 @@ def spectrum_plot(curves: Curves, highest: float = 600.0) -> PlotlyFigure:
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
-    data.append(_pressure_curve(highest) if waves is None else _threshold_curve(highest))
+    data.append(_threshold_curve(highest, of_waves=waves is not None))
     named = waves if waves is not None and not curves.stale else curves.kernel
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
@@ -150,19 +150,13 @@ def waves_name(answer: Answer, stale: bool = False) -> str:
     return f"waves ({answer.response.model}), µm" + (" — being computed" if stale else "")
 
 
-def _threshold_curve(highest: float) -> dict[str, Any]:
+def _threshold_curve(highest: float, *, of_waves: bool) -> dict[str, Any]:
+    """Detection threshold of displacement or, without waves, of the kernel's pressure."""
     f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
+    name = f"threshold (±{BAND:g} dB)" if of_waves else "threshold on skin, from AM at 200 Hz"
     return {
-        "role": "threshold", "name": f"threshold (±{BAND:g} dB)", "dash": "dash", "axis": "y2",
-        "x": numbers(f), "y": numbers(1e6 * threshold(f)),
-    }  # fmt: skip
-
-
-def _pressure_curve(highest: float) -> dict[str, Any]:
-    f = np.geomspace(LOWEST, min(HIGHEST, highest), 80)
-    return {
-        "role": "threshold", "name": "threshold on skin, from AM at 200 Hz", "dash": "dash",
-        "axis": "y", "x": numbers(f), "y": numbers(pressure_threshold(f)),
+        "role": "threshold", "name": name, "dash": "dash", "axis": "y2" if of_waves else "y",
+        "x": numbers(f), "y": numbers(1e6 * threshold(f) if of_waves else pressure_threshold(f)),
     }  # fmt: skip
 
 

@@ -45,10 +45,7 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     )
     body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
     pressure = MovingPressure(
-        tacton=tacton,
-        focus=values["profile"],
-        drive=values["drive"],
-        height=values["height"] / 1e3,
+        tacton=tacton, focus=values["profile"], drive=values["drive"], height=values["height"] / 1e3
     )
     return Scene(
         name="skinwave web", pressure=pressure, body=body,
@@ -89,8 +86,7 @@ def values_of(scene: Scene) -> Values:
     even, own = evenly(len(tacton.foci)), paths_in(tacton)
     beyond = {
         "a path of its own points": path.shape not in SHAPES and not own,
-        "a path that is moved or swept one way": any(path.centre)
-        or path.sweep != "there_and_back",
+        "a path that is moved or swept one way": any(path.centre) or path.sweep != "there_and_back",
         "a sampled signal": tacton.signal is not None,
         "a superposition that is none of the five": ratio is None,
         f"a peak_pressure_pa of {pressure.peak_pressure:g}": pressure.peak_pressure
@@ -99,7 +95,7 @@ def values_of(scene: Scene) -> Values:
         and pressure.depth_of_modulation != MovingPressure.depth_of_modulation,
         f"drive law '{pressure.law}'": pressure.drive not in CHOICES["drive"],
         f"profile = {pressure.focus_name} of the focus": pressure.focus not in CHOICES["profile"],
-    }  # fmt: skip
+    }
     if said := [what for what, holds in beyond.items() if holds]:
         raise ValueError(f"{' and '.join(said)} cannot be set here; use skinwave run")
     rhythm, (x, y) = tacton.rhythm, scene.probes[0]
