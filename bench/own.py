@@ -82,7 +82,7 @@ def models() -> None:
         plain = np.ones((len(times), probes))
         exponential = _best(lambda: np.exp(plain))  # noqa: B023
         for focus in ("gaussian", "main_lobe"):
-            pressure = replace(published, focus=focus)
+            pressure = replace(published, profile=focus)
             kernel = _best(lambda: point_kernel(pressure, points, times))  # noqa: B023
             print(
                 f"point kernel, {focus}, {seconds} s at {rate / 1e3:g} kHz, {probes} probes: "

@@ -308,8 +308,10 @@ def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpli
 
 def _check(pressure: MovingPressure) -> None:
     check_lines(pressure)
-    if pressure.focus != "gaussian":
-        raise ValueError(f"focus '{pressure.focus_name}' has no flat-body solution; use 'gaussian'")
+    if pressure.profile != "gaussian":
+        raise ValueError(
+            f"focus '{pressure.profile_name}' has no flat-body solution; use 'gaussian'"
+        )
 
 
 def _lift(compliance: Compliance, r: Floats, w: Complex, width: float) -> float:

@@ -161,7 +161,7 @@ def lobe_width(height: float) -> float:
 
 
 def focal_spot(
-    offsets: ArrayLike, height: float = NOMINAL_HEIGHT, focus: str | FocalSpot = "main_lobe"
+    offsets: ArrayLike, height: float = NOMINAL_HEIGHT, profile: str | FocalSpot = "main_lobe"
 ) -> Floats:
     """Focal spot S: intensity relative to the focus.
 
@@ -169,7 +169,7 @@ def focal_spot(
     ----------
     offsets : (..., 2) float, metre from the focus
     height : metre, of the focus above the array
-    focus : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; or "array",
+    profile : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; or "array",
         the field of the array with its side lobes, as far as 60 mm along each axis; or a function
         of the offsets
 
@@ -178,43 +178,43 @@ def focal_spot(
     (...) float, without unit
     """
     offsets = np.asarray(offsets, np.float64)
-    if not isinstance(focus, str):
-        return np.asarray(focus(offsets))
-    if focus == "array":
+    if not isinstance(profile, str):
+        return np.asarray(profile(offsets))
+    if profile == "array":
         return _array_spot(height)(np.abs(offsets).clip(max=60e-3))
-    scaled = (offsets / _scale(height, focus)) ** 2
-    return _round_spot(np.asarray(scaled[..., 0] + scaled[..., 1]), focus)
+    scaled = (offsets / _scale(height, profile)) ** 2
+    return _round_spot(np.asarray(scaled[..., 0] + scaled[..., 1]), profile)
 
 
-def moved_spot(points: Floats, centres: Floats, height: float, focus: str | FocalSpot) -> Floats:
+def moved_spot(points: Floats, centres: Floats, height: float, profile: str | FocalSpot) -> Floats:
     """Focal spot S for many positions of the focus.
 
     Parameters
     ----------
     points : (n, 2) float, metre
     centres : (..., 2) float, metre, positions of the focus
-    height, focus : as for `focal_spot`
+    height, profile : as for `focal_spot`
 
     Returns
     -------
     (..., n) float, without unit
     """
-    if focus == "array" or not isinstance(focus, str):
-        return focal_spot(points - centres[..., None, :], height, focus)
+    if profile == "array" or not isinstance(profile, str):
+        return focal_spot(points - centres[..., None, :], height, profile)
     # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way.
-    x, c = points / _scale(height, focus), centres / _scale(height, focus)
+    x, c = points / _scale(height, profile), centres / _scale(height, profile)
     left = np.stack([*np.moveaxis(-2 * c, -1, 0), (c**2).sum(axis=-1), np.ones(c.shape[:-1])], -1)
-    return _round_spot(left @ np.stack([*x.T, np.ones(len(x)), (x**2).sum(axis=1)]), focus)
+    return _round_spot(left @ np.stack([*x.T, np.ones(len(x)), (x**2).sum(axis=1)]), profile)
 
 
-def _scale(height: float, focus: str) -> float:
+def _scale(height: float, profile: str) -> float:
     """Length in metre in which an axisymmetric focal spot is exp(-D^2) or (sin D / D)^2."""
-    return np.sqrt(2) * spot_width(height) if focus == "gaussian" else lobe_width(height) / np.pi
+    return np.sqrt(2) * spot_width(height) if profile == "gaussian" else lobe_width(height) / np.pi
 
 
-def _round_spot(squared: Floats, focus: str) -> Floats:
+def _round_spot(squared: Floats, profile: str) -> Floats:
     """Axisymmetric focal spot at squared distances (...), which it overwrites."""
-    if focus == "gaussian":
+    if profile == "gaussian":
         return np.exp(np.negative(squared, out=squared), out=squared)
     angle = np.sqrt(np.maximum(squared, 1e-18, out=squared), out=squared)  # 1 to the last digit
     sinc = np.sin(angle)
@@ -227,11 +227,11 @@ def spot_width(height: float) -> float:
     return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
 
 
-def spot_detail(height: float, focus: str | FocalSpot) -> float:
+def spot_detail(height: float, profile: str | FocalSpot) -> float:
     """Length in metre that samples of a focal spot along its path must resolve: the standard
     deviation of the Gaussian, or the spacing of a map that is finer.
     """
-    spacing = focus.spacing if isinstance(focus, PressureMap) else np.inf
+    spacing = profile.spacing if isinstance(profile, PressureMap) else np.inf
     return min(spot_width(height), spacing)
 
 
@@ -245,9 +245,9 @@ def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 
-def spot_reach(height: float, focus: str | FocalSpot) -> float:
+def spot_reach(height: float, profile: str | FocalSpot) -> float:
     """Radius in metre beyond which a focal spot is below 1e-7; infinite unless Gaussian."""
-    return 5.7 * spot_width(height) if focus == "gaussian" else np.inf
+    return 5.7 * spot_width(height) if profile == "gaussian" else np.inf
 
 
 @cache

@@ -130,7 +130,7 @@ def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tup
         As `pressure.check_lines` does.
     """
     lines = load_lines(pressure)
-    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.focus)
+    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     forces = []
     for part in np.array_split(knots, len(knots) // 64 + 1):
         low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
@@ -212,7 +212,7 @@ def _knot_phases(pressure: MovingPressure) -> Floats:
     path = pressure.tacton.trajectory
     if path.is_static:
         return np.zeros(1)
-    width = spot_detail(pressure.height, pressure.focus)
+    width = spot_detail(pressure.height, pressure.profile)
     if path.shape == "recorded":
         enough, whole = _recorded_knots(pressure.tacton, width)
     else:

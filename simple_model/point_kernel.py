@@ -22,7 +22,7 @@ from simple_model.trajectory import Floats
 
 def published(pressure: MovingPressure) -> MovingPressure:
     """The same Tacton and height under the paper's load: linear drive, main lobe, no mean."""
-    return replace(pressure, drive=PUBLISHED, focus="main_lobe")
+    return replace(pressure, drive=PUBLISHED, profile="main_lobe")
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:

@@ -39,7 +39,7 @@ class MovingPressure:
     Parameters
     ----------
     tacton : Tacton
-    focus : "gaussian", "main_lobe" or "array", the shape of the focal spot; a PressureMap; or any
+    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; a PressureMap; or any
         function of offsets (..., 2) in metre, with details no finer than the Gaussian's
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
     depth_of_modulation : float, 0..1; the linear law has none
@@ -54,15 +54,15 @@ class MovingPressure:
     """
 
     tacton: Tacton
-    focus: str | FocalSpot = "gaussian"
+    profile: str | FocalSpot = "gaussian"
     drive: str | DriveLaw = "pressure_squared"
     depth_of_modulation: float = 1.0
     peak_pressure: float = 50.0
     height: float = NOMINAL_HEIGHT
 
     def __post_init__(self) -> None:
-        if not callable(self.focus):
-            choose("focus", self.focus, FOCI)
+        if not callable(self.profile):
+            choose("profile", self.profile, FOCI)
         if not isinstance(self.drive, DriveLaw):
             choose("drive", self.drive, DRIVES)
         if not 0 <= self.depth_of_modulation <= 1:
@@ -92,9 +92,9 @@ class MovingPressure:
         return self.drive if isinstance(self.drive, DriveLaw) else DRIVES[self.drive]
 
     @property
-    def focus_name(self) -> str:
+    def profile_name(self) -> str:
         """Name of the focal spot, "own" if it has none."""
-        return self.focus if isinstance(self.focus, str) else "own"
+        return self.profile if isinstance(self.profile, str) else "own"
 
     def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s.
@@ -144,7 +144,7 @@ class MovingPressure:
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
         """Focal spot (..., n) at points (n, 2 or 3), relative, the focus at centres (..., 2)."""
         points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
-        spot = moved_spot(points[:, :2], centre, self.height, self.focus)
+        spot = moved_spot(points[:, :2], centre, self.height, self.profile)
         if points.shape[1] == 3 and points[:, 2].any():
             spot *= along_axis(points[:, 2], self.height)
         return spot

@@ -54,7 +54,7 @@ def _highest_order(pressure: MovingPressure) -> int:
 
 def highest_passing(pressure: MovingPressure) -> float:
     """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place."""
-    return PASSED * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.focus)
+    return PASSED * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
 
 
 def reached(pressure: MovingPressure) -> float:

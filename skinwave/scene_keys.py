@@ -164,13 +164,13 @@ def _write_drive(drive: str | DriveLaw) -> str:
     return str(drive)
 
 
-def _write_profile(focus: str | FocalSpot) -> str:
-    if not isinstance(focus, str):
+def _write_profile(profile: str | FocalSpot) -> str:
+    if not isinstance(profile, str):
         raise ValueError(
             "the focus profile is a map or a Python function, which a scene file cannot hold; take "
             f"one of {', '.join(FOCI)}, or simulate it from Python"
         )
-    return focus
+    return profile
 
 
 def _prony(key: str, value: Any) -> tuple[PronyTerm, ...]:
@@ -276,7 +276,7 @@ SECTIONS = {
         "drive": SceneKey("drive", as_text, _write_drive),
         "depth_of_modulation": _scaled("depth_of_modulation"),
         "peak_pressure_pa": _scaled("peak_pressure"),
-        "profile": SceneKey("focus", as_text, _write_profile),
+        "profile": SceneKey("profile", as_text, _write_profile),
     },
     "body": {
         "kind": _word("kind"),

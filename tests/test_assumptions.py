@@ -95,7 +95,7 @@ def test_the_step_of_propagation_changes_propagation_alone(own):
 def test_each_step_of_the_load_changes_one_thing(own):
     loads = [relaxed(own, droppable(own)[:k])[0].pressure for k in range(3)]
     assert loads[1] == replace(loads[0], drive="pressure_squared")
-    assert loads[2] == replace(loads[1], focus="gaussian")
+    assert loads[2] == replace(loads[1], profile="gaussian")
     # With and without propagation the load is the same, whatever else is dropped.
     for name in droppable(own):
         kept = [n for n in droppable(own) if n != name]
@@ -106,7 +106,7 @@ def test_each_step_of_the_load_changes_one_thing(own):
 def test_a_profile_that_no_integral_has_is_answered_by_elements():
     names = [name for name in droppable(SKIN)[:3] if name != "sinc^2 profile"]
     scene, model = relaxed(SKIN, names)
-    assert (scene.pressure.focus, scene.body.sides, model) == ("main_lobe", "absorbing", "fem")
+    assert (scene.pressure.profile, scene.body.sides, model) == ("main_lobe", "absorbing", "fem")
     assert not can_be_alone("sinc^2 profile", droppable(SKIN), SKIN)  # the array's field has none
 
 
@@ -131,7 +131,7 @@ def test_all_dropped_is_the_richest():
     scene, model = relaxed(SKIN, droppable(SKIN))
     assert model == "fem"
     assert scene.body.kind == "palm"
-    assert (scene.pressure.drive, scene.pressure.focus) == ("pressure_squared", "array")
+    assert (scene.pressure.drive, scene.pressure.profile) == ("pressure_squared", "array")
     assert scene.tacton.trajectory.hold
     assert len(scene.body.layers) == 1
     sheet, model = relaxed(PAPER, droppable(PAPER))

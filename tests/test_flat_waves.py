@@ -98,7 +98,7 @@ def test_waves_arrive_when_they_can():
 
 
 def test_flat_bodies_take_a_gaussian_focus_only():
-    load = MovingPressure(tacton=Tacton(), focus="array")
+    load = MovingPressure(tacton=Tacton(), profile="array")
     with pytest.raises(ValueError, match="use 'gaussian'"):
         flat_body(PAPER, load, [[0.0, 0.0]], np.arange(100) / 1e4)
 

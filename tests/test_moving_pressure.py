@@ -127,7 +127,7 @@ def test_total_force_survives_the_quadrature_of_a_mesh(focus):
     fine = np.linspace(-0.05, 0.05, 1001)
     grid = np.stack(np.meshgrid(fine, fine), axis=-1).reshape(-1, 2)
     load = MovingPressure(
-        tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.03, speed=18)), focus=focus
+        tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.03, speed=18)), profile=focus
     )
     for t in (0.0, 0.0007, 0.0031):
         force = (P @ load(points, t)).reshape(-1, 3).sum(axis=0)
@@ -159,7 +159,7 @@ class Foreign:
     """Pushes alike everywhere."""
 
     tacton = Tacton(am_frequency=140, duration=0.01)
-    focus, height = "gaussian", 0.2
+    profile, height = "gaussian", 0.2
 
     def __call__(self, points, t, over=0.0):
         t = np.asarray(t)

@@ -190,7 +190,7 @@ def measured(path, spacing=1.0):
 
 def test_a_measured_map_is_the_focal_spot(tmp_path):
     found = measured(tmp_path / "map.csv", 0.5)
-    load = MovingPressure(tacton=Tacton(trajectory=CIRCLE), focus=found)
+    load = MovingPressure(tacton=Tacton(trajectory=CIRCLE), profile=found)
     offsets = np.random.default_rng(1).uniform(-12e-3, 12e-3, (200, 2))
     expected = focal_spot(offsets) * (1 + 10 * offsets[:, 0])
     spots = load.spot(offsets + [0.003, 0.001], [0.003, 0.001])
@@ -202,21 +202,21 @@ def test_models_take_a_measured_map(tmp_path):
     """The steady state of elements is that of the built-in profile that was measured."""
     line = np.linspace(-0.03, 0.03, 121)
     grid = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
-    spot = PressureMap(x=line, y=line, pressure=focal_spot(grid, focus="gaussian"))
+    spot = PressureMap(x=line, y=line, pressure=focal_spot(grid, profile="gaussian"))
     still = Tacton(am_frequency=140, duration=0.03)
     found, expected = (
-        compute(scene(tacton=still, focus=focus), "fem-harmonic", h=0.008).displacement
+        compute(scene(tacton=still, profile=focus), "fem-harmonic", h=0.008).displacement
         for focus in (spot, "gaussian")
     )
     assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()
     with pytest.raises(ValueError, match="focus 'own' has no flat-body solution"):
-        compute(scene(focus=spot), "flat-body")
+        compute(scene(profile=spot), "flat-body")
     with pytest.raises(ValueError, match="focus profile is a map or a Python function, which"):
-        dumps(scene(focus=spot))
+        dumps(scene(profile=spot))
 
 
 def test_any_function_is_a_focal_spot():
-    load = scene(focus=lambda offsets: np.exp(-((offsets / 0.004) ** 2).sum(axis=-1))).pressure
+    load = scene(profile=lambda offsets: np.exp(-((offsets / 0.004) ** 2).sum(axis=-1))).pressure
     assert load([[0.005, 0.0]], [0.0])[0, 0] == load.gain([0.0])[0]
 
 
@@ -224,7 +224,7 @@ def test_a_map_without_mirror_symmetry_is_meshed_whole(tmp_path):
     extent = importlib.import_module("skinwave.planning.extent")
     still = scene(tacton=Tacton())
     assert extent.symmetry(still) == "xy"
-    own = replace(still.pressure, focus=measured(tmp_path / "map.csv"))
+    own = replace(still.pressure, profile=measured(tmp_path / "map.csv"))
     assert extent.symmetry(replace(still, pressure=own)) == ""
 
 

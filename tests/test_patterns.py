@@ -222,13 +222,14 @@ CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
 
 @pytest.mark.parametrize("hold", [False, True])
 def test_a_circle_in_csv_at_40_khz_has_the_lines_it_had(tmp_path, hold):
-    scene = flat(Tacton(trajectory=CIRCLE), focus="main_lobe")
+    scene = flat(Tacton(trajectory=CIRCLE), profile="main_lobe")
     back, _ = imported(tmp_path, exported(scene, ".csv", rate=40_000), ".csv", hold=hold)
     times = np.arange(48_000) / 48_000  # between the samples
     wanted = CIRCLE.drawing_frequency * np.arange(5)
     before, after = (
         lines(
-            point_kernel(MovingPressure(tacton=s.tacton, focus="main_lobe"), PROBES, times), wanted
+            point_kernel(MovingPressure(tacton=s.tacton, profile="main_lobe"), PROBES, times),
+            wanted,
         )
         for s in (scene, back)
     )

@@ -89,7 +89,7 @@ def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
 
 @pytest.mark.parametrize("drive", ["linear", "pressure_squared"])
 def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene, drive):
-    own = replace(scene.pressure, drive=drive, focus="array")
+    own = replace(scene.pressure, drive=drive, profile="array")
     shown = album.shown_scenes(replace(scene, pressure=own, body=Body(depth=0.02)))
     assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
     assert shown["point-kernel"].pressure == shown["slab"].pressure == own

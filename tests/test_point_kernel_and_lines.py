@@ -21,7 +21,7 @@ PROBES = [[0.0, 0.0], [0.005, 0.0], [0.010, 0.0], [0.015, 0.0], [0.020, 0.0]]
 
 def kernel(am=0.0, size=0.0, speed=0.0, drive="linear", probes=PROBES):
     tacton = Tacton(am_frequency=am, trajectory=Trajectory(shape="circle", size=size, speed=speed))
-    load = MovingPressure(tacton=tacton, focus="main_lobe", drive=drive, peak_pressure=1.0)
+    load = MovingPressure(tacton=tacton, profile="main_lobe", drive=drive, peak_pressure=1.0)
     return load, point_kernel(load, probes, TIMES)
 
 

@@ -77,7 +77,7 @@ def test_both_kernels_and_a_body_are_compared_under_two_loads():
     assert list(columns) == ["point-kernel-published", "point-kernel", "skin-slab"]
     published, same, body = columns.values()
     assert same.pressure == body.pressure == scene.pressure
-    assert (published.pressure.drive, published.pressure.focus) == ("linear", "main_lobe")
+    assert (published.pressure.drive, published.pressure.profile) == ("linear", "main_lobe")
     without = own_scenes(with_body(scene, BODIES["none"]), "one")["one"]
     assert {its.pressure for name, its in without.items() if "published" not in name} == {
         scene.pressure

@@ -122,7 +122,7 @@ every_tacton = (
 pressures = st.builds(
     MovingPressure,
     tacton=tactons,
-    focus=st.sampled_from(FOCI),
+    profile=st.sampled_from(FOCI),
     drive=st.sampled_from(sorted(DRIVES)),
     depth_of_modulation=numbers(0, 1),
     peak_pressure=st.just(0.0) | numbers(1e-3, 1e3),

@@ -38,8 +38,8 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if pressure.focus != "gaussian":  # of the same width; only to find which lines matter
-            pressure = replace(pressure, focus="gaussian")
+        if pressure.profile != "gaussian":  # of the same width; only to find which lines matter
+            pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(
                 compliance(body), pressure, scene.probe_points, threshold=tolerance / 100
@@ -79,7 +79,7 @@ def is_laterally_infinite(body: Body) -> bool:
 
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
-    return is_plain_layer(scene.body) and scene.pressure.focus == "gaussian"
+    return is_plain_layer(scene.body) and scene.pressure.profile == "gaussian"
 
 
 def reflection_and_transient(scene: Scene) -> tuple[float, float]:
@@ -147,7 +147,7 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
         return 1.0
     foci = np.array([path, *_mirrored(path, half)])
     distances = np.linalg.norm(scene.probe_points[:, None] - foci[:, None], axis=-1)  # (5, p, k)
-    lines = load_lines(replace(scene.pressure, focus="gaussian"), 1e-2)
+    lines = load_lines(replace(scene.pressure, profile="gaussian"), 1e-2)
     kept = lines.frequencies <= max(highest, 1.0)
     frequencies, which = np.unique(lines.frequencies[kept], return_inverse=True)
     strength = np.bincount(which, lines.strengths[kept] ** 2)

@@ -25,7 +25,7 @@ def symmetry(scene: Scene) -> str:
     """Symmetry axes: across their middle planes the load is its own mirror image at all times."""
     if not scene.body.of_kind.is_symmetric or scene.body.placement != FLAT:
         return ""
-    if not isinstance(scene.pressure.focus, str):  # which may have no symmetry
+    if not isinstance(scene.pressure.profile, str):  # which may have no symmetry
         return ""
     path = scene.tacton.trajectory
     path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline

@@ -285,8 +285,10 @@ def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, 
 
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
-    if scene.pressure.focus != "gaussian":
-        return f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.focus_name}'"
+    if scene.pressure.profile != "gaussian":
+        return (
+            f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.profile_name}'"
+        )
     if not body.of_kind.compliance:
         return f"a body of kind '{body.kind}' has no wavenumber integral"
     if len(body.strata) > 1:

@@ -114,9 +114,9 @@ def relaxed(
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
     own = beyond_published(scene.pressure.drive, MovingPressure.drive)
-    focus = "array" if "main lobe only" in dropped else spot
+    profile = "array" if "main lobe only" in dropped else spot
     drive = own if "linear drive" in dropped else PUBLISHED
-    pressure = replace(scene.pressure, focus=focus, drive=drive)
+    pressure = replace(scene.pressure, profile=profile, drive=drive)
     if "continuous path" in dropped:
         path = held(scene.tacton.trajectory, update_rate, points)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
@@ -125,7 +125,7 @@ def relaxed(
         return replace(scene, pressure=pressure, body=BODIES["none"]), kernel
     body = _body(scene, dropped)
     # Wavenumber integrals are those of a Gaussian in a homogeneous, flat and infinite body.
-    elements = pressure.focus != "gaussian" or not ELEMENTS.isdisjoint(dropped)
+    elements = pressure.profile != "gaussian" or not ELEMENTS.isdisjoint(dropped)
     model = "fem" if elements else "flat-body"
     if elements and body.of_kind.is_layer and "laterally-infinite" not in dropped:
         body = replace(body, sides="absorbing")

@@ -24,7 +24,7 @@ UNCERTAIN = (
 
 def spot_of(pressure: MovingPressure) -> str:
     """The focal spot, in words."""
-    return SPOTS.get(pressure.focus_name, "a focal spot of its own")
+    return SPOTS.get(pressure.profile_name, "a focal spot of its own")
 
 
 def modelled(runs: Iterable[Run]) -> list[str]:

@@ -84,7 +84,7 @@ def beside_published(kernel: Run, published: Run) -> Markup:
     header = ["component", "frequency, Hz", "as published, dB re its strongest"]
     folded = table([*header, "same load, dB re its strongest"], rows)
     drives = " against ".join(
-        f"{r.scene.pressure.drive}, {r.scene.pressure.focus_name}" for r in (kernel, published)
+        f"{r.scene.pressure.drive}, {r.scene.pressure.profile_name}" for r in (kernel, published)
     )
     return Markup(
         "<details><summary>Kernel as published beside the same load: what the drive law and the "
@@ -122,7 +122,8 @@ def _driven(kernel: Run, published: Run) -> str:
         )
     said = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
     return (
-        f"Drive law and focus ({drive}, {kernel.scene.pressure.focus_name}), not propagation, add "
+        f"Drive law and focus ({drive}, {kernel.scene.pressure.profile_name}), not propagation, "
+        "add "
         f"the component{'s' * (len(names) > 1)} {said}: the kernel has "
         f"{'them' if len(names) > 1 else 'it'} under the same load, and not as published."
     )

@@ -67,7 +67,7 @@ STARTS = {
     "ratio": "1:0",
     "shape": "circle",
     "drive": MovingPressure.drive,
-    "profile": MovingPressure.focus,
+    "profile": MovingPressure.profile,
     "body": "skin-slab",
     "sharing": "simultaneous",
     "pulses": "",

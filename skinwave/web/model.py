@@ -161,7 +161,7 @@ def kernel_map(pressure: MovingPressure) -> AreaMap:
     # Of paths of their own only every n-th harmonic is left, of which `harmonics_of` knows.
     n, at_all = tacton.n_paths, at_any_speed(path)
     found = replace(found, harmonics=found.harmonics // n)
-    f, amplitudes = found.gather(harmonics_of(at_all, n, pressure.height, pressure.focus))
+    f, amplitudes = found.gather(harmonics_of(at_all, n, pressure.height, pressure.profile))
     f, amplitudes = f[f > 1e-6], np.abs(amplitudes[f > 1e-6])
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
@@ -197,13 +197,13 @@ def drawn_paths(tacton: Tacton) -> tuple[Floats, ...]:
 
 @lru_cache(maxsize=2)  # up to 13 MB each
 def harmonics_of(
-    path: Trajectory, n_paths: int, height: float, focus: str
+    path: Trajectory, n_paths: int, height: float, profile: str
 ) -> NDArray[np.complex128]:
     """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places; of several
     paths that are joined every n_paths-th, which is the mean of all.
     """
     tacton = Tacton(trajectory=path, foci=evenly(n_paths))
-    pressure = MovingPressure(tacton=tacton, height=height, focus=focus)
+    pressure = MovingPressure(tacton=tacton, height=height, profile=profile)
     spots = pressure.spot(places(), path_samples(pressure))
     mean = spots.reshape(n_paths, -1, SIDE**2).mean(axis=0)
     return path_fourier(mean.T).T

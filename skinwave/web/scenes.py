@@ -45,7 +45,10 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     )
     body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
     pressure = MovingPressure(
-        tacton=tacton, focus=values["profile"], drive=values["drive"], height=values["height"] / 1e3
+        tacton=tacton,
+        profile=values["profile"],
+        drive=values["drive"],
+        height=values["height"] / 1e3,
     )
     return Scene(
         name="skinwave web", pressure=pressure, body=body,
@@ -94,7 +97,8 @@ def values_of(scene: Scene) -> Values:
         f"a depth_of_modulation of {pressure.depth_of_modulation:g}": pressure.law.uses_depth
         and pressure.depth_of_modulation != MovingPressure.depth_of_modulation,
         f"drive law '{pressure.law}'": pressure.drive not in CHOICES["drive"],
-        f"profile = {pressure.focus_name} of the focus": pressure.focus not in CHOICES["profile"],
+        f"profile = {pressure.profile_name} of the focus": pressure.profile
+        not in CHOICES["profile"],
     }
     if said := [what for what, holds in beyond.items() if holds]:
         raise ValueError(f"{' and '.join(said)} cannot be set here; use skinwave run")
@@ -114,7 +118,7 @@ def values_of(scene: Scene) -> Values:
         ),
         "height": 1e3 * scene.pressure.height,
         "drive": scene.pressure.drive,
-        "profile": scene.pressure.focus,
+        "profile": scene.pressure.profile,
         "body": known.get(scene.body, OWN_BODY),
         "foci": len(tacton.foci),
         "sharing": tacton.sharing,

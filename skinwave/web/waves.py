@@ -109,7 +109,7 @@ class BodyResponses:
             return warned_of(scene, flat_answer(table, scene, moving))
         tacton = scene.tacton
         places_only = at_any_speed(tacton.trajectory), tacton.n_paths
-        key = (scene.body, places_only, scene.pressure.height, scene.pressure.focus)
+        key = (scene.body, places_only, scene.pressure.height, scene.pressure.profile)
         body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
         return warned_of(scene, reduced_answer(body, scene, moving))
 
@@ -144,9 +144,9 @@ def gaussian_only(pressure: MovingPressure) -> None:
     ValueError
         If the focus is another.
     """
-    if pressure.focus != "gaussian":
+    if pressure.profile != "gaussian":
         raise ValueError(
-            f"focus profile '{pressure.focus_name}' has no wavenumber integral on a slab; choose "
+            f"focus profile '{pressure.profile_name}' has no wavenumber integral on a slab; choose "
             "'gaussian', which has the same half width and force"
         )
 
