@@ -42,13 +42,9 @@ MESH = ["--h", "8", "--quiet"]
 @pytest.fixture(scope="module", autouse=True)
 def static_deflection():
     """The modules from outside; what they register is gone afterwards, for all other tests."""
-    registries = (KINDS, BODIES, models._MODELS)
-    before = [dict(registry) for registry in registries]
     import_module("cylinder")
     yield import_module("static_deflection")
-    for registry, records in zip(registries, before, strict=True):
-        registry.clear()
-        registry.update(records)
+    del KINDS["cylinder"], BODIES["silicone-cylinder"], models._MODELS["static-deflection"]
     os.environ.pop(extensions.VARIABLE)
     for name in ("cylinder", "static_deflection"):
         del sys.modules[name]
