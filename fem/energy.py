@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.assembly import Operators
-from fem.maxwell import Branch
+from fem.maxwell import Branch, with_internal
 from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
@@ -75,7 +75,7 @@ def with_energy_balance(
         viscous = dt * float(velocity @ (C @ velocity)) - out
         relaxed = 0.0
         both = zip(before.stretch, state.stretch, strict=True)
-        for branch, (old, new) in zip(operators.branches, both, strict=True):
+        for branch, (old, new) in zip(with_internal(operators.branches), both, strict=True):
             mean = (old + new)[free] / 2
             relaxed += dt / branch.time * float(mean @ (branch.K @ mean))
         return EnergyBalance(dissipated=viscous + relaxed, radiated=out)

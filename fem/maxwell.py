@@ -52,17 +52,6 @@ class DispersiveBranch:
     K: Any
     modulus: Callable[[Any], Any]
 
-    @property
-    def time(self) -> float:
-        """No relaxation time: refuses models that integrate internal variables.
-
-        Raises
-        ------
-        ValueError
-            Always.
-        """
-        raise ValueError(NO_INTERNAL)
-
     def share(self, s: Any) -> Any:
         """Factor of K in what is added to K, at complex frequencies s in rad/s."""
         return self.modulus(np.real_if_close(-1j * s)) - 1
@@ -101,7 +90,7 @@ def branch_force(branches: Sequence[Branch], stretch: Floats) -> Any:
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
 
 
-def factors(branch: Branch) -> tuple[Floats, float]:
+def factors(branch: MaxwellBranch) -> tuple[Floats, float]:
     """Low-rank factor L (n, k) of a branch, K = L L^T, as many columns as K has rank; and its time
     in s.
 

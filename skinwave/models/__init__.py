@@ -73,8 +73,6 @@ class Model:
     is_stepped : bool, whether its error depends on a time step
     is_nonlinear : bool, whether it has large deflections
     fits_damping : bool, whether a loss factor becomes Rayleigh damping
-    has_internal_variables : bool, whether it integrates those of Maxwell branches, which a modulus
-        law of a user's own has not
     """
 
     name: str
@@ -96,7 +94,6 @@ class Model:
     is_stepped: bool = False
     is_nonlinear: bool = False
     fits_damping: bool = False
-    has_internal_variables: bool = False
 
 
 _MODELS: dict[str, Model] = {}

@@ -4,6 +4,7 @@ from functools import partial
 
 from skinwave.bodies.body import Body
 from skinwave.models import Model, register
+from skinwave.models.laws import without_own_law
 from skinwave.models.linear_elements import vacuum_only
 from skinwave.models.stretching import (
     expected_error,
@@ -22,9 +23,15 @@ def _error(scene: Scene, h: float | None) -> float:
     return expected_error(scene.body, h)
 
 
+def _refuse_of_reduced(body: Body) -> None:
+    sheet_only(body, "fem-nonlinear")
+    without_own_law("fem-nonlinear", body)
+
+
 def _refuse_of_full(body: Body) -> None:
     sheet_only(body, "fem-nonlinear-transient")
     vacuum_only("fem-nonlinear-transient", body)
+    without_own_law("fem-nonlinear-transient", body)
 
 
 REDUCED = register(
@@ -34,11 +41,10 @@ REDUCED = register(
         words="a sheet that stretches as it bends, in its modes, about its rest under the mean "
         "pressure",
         solve=reduced_answer,
-        refuse=lambda body: sheet_only(body, "fem-nonlinear"),
+        refuse=_refuse_of_reduced,
         error=_error,
         default_size=partial(stretching_size, reduced=True),
         is_nonlinear=True,
-        has_internal_variables=True,
     )
 )
 FULL = register(
@@ -51,6 +57,5 @@ FULL = register(
         error=_error,
         default_size=partial(stretching_size, reduced=False),
         is_nonlinear=True,
-        has_internal_variables=True,
     )
 )

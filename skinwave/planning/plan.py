@@ -10,7 +10,7 @@ from skinwave.effort import Progress
 from skinwave.models import Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
-from skinwave.models.laws import frequency_only, has_own_law
+from skinwave.models.laws import has_own_law
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import (
@@ -151,7 +151,6 @@ def _own_law(scene: Scene, asked: Model | None, h: float | None) -> Plan:
     by reduced-order models, which it has none of, and so the error of elements is not known.
     """
     model = asked or (HARMONIC if has_wavenumber_solution(scene) else named("fem-harmonic"))
-    frequency_only(scene.body, model)
     row = PlanRow(
         what="model", value=model.name, reason="the material has a modulus law of its own"
     )
