@@ -72,11 +72,12 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
 
 def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
     """Sentences on the effect of propagation, if a body's response follows the kernel's, on that of
-    the drive law, and on the line with the highest sensation level at the selected point.
+    drive law and focus, and on the line with the highest sensation level at the selected point.
     """
     new = added_names(scene.pressure)[:NAMED]
     said = f"adds {', '.join(new)}, which the published load lacks" if new else "adds no component"
-    drive = f"The drive law ({scene.pressure.drive}), not propagation, {said}."
+    load = f"{scene.pressure.drive}, {scene.pressure.profile_name}"
+    drive = f"The load (drive law and focus: {load}), not propagation, {said}."
     kernel, waves = answers[0], answers[-1]
     if waves is kernel or not np.nansum(waves.map.rms):
         return [drive]
