@@ -1,0 +1,54 @@
+"""Stack of flat isotropic layers: what wavenumber integrals and dispersion curves are asked of."""
+
+from dataclasses import dataclass
+from math import inf
+
+from simple_model.choices import choose
+from simple_model.material import Material
+
+BASES = ("clamped", "free")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stack:
+    """Laterally infinite layers from the surface downwards, each bonded to the next.
+
+    Parameters
+    ----------
+    materials : of each layer
+    thicknesses : metre, of each layer, above 0; the last may be inf, a half-space
+    base : what is below the last layer unless it is a half-space: "clamped", a rigid base, or
+        "free", nothing
+
+    Raises
+    ------
+    ValueError
+        If there is no layer, their numbers differ, a thickness is out of range, or the base is
+        another.
+    """
+
+    materials: tuple[Material, ...]
+    thicknesses: tuple[float, ...]
+    base: str = "clamped"
+
+    def __post_init__(self) -> None:
+        if not self.materials or len(self.materials) != len(self.thicknesses):
+            raise ValueError(
+                f"a stack has {len(self.materials)} materials and {len(self.thicknesses)} "
+                "thicknesses; give as many of each, one or more, from the surface downwards"
+            )
+        if not all(0 < thickness < inf for thickness in self.thicknesses[:-1]):
+            raise ValueError("layers above the last must have a finite thickness above 0")
+        if not self.thicknesses[-1] > 0:
+            raise ValueError(f"thickness = {self.thicknesses[-1]} m of a layer must be above 0")
+        choose("base", self.base, BASES)
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of all layers, metre; inf with a half-space below."""
+        return sum(self.thicknesses)
+
+    @property
+    def is_half_space(self) -> bool:
+        """Whether the last layer is a half-space."""
+        return self.thicknesses[-1] == inf
