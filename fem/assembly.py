@@ -137,7 +137,10 @@ def _volume_operators(
         [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
     ).T
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
-    D = {m: projected_divergence(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
+    D = {
+        m: projected_divergence(elements_of(mesh, region == m))
+        for m in np.flatnonzero(lam > direct)
+    }
     projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
 
     def stiffness(share: Floats) -> sparse.csr_array:
@@ -194,7 +197,7 @@ def direct_part(lam: Floats, mu: Floats) -> Floats:
     return np.where(lam > LOCKING_FREE * mu, UNPROJECTED * mu, lam)
 
 
-def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
+def elements_of(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
     """Some of the elements (m,) of a mesh, among all its nodes."""
     return replace(mesh, tets=mesh.tets[chosen], region=mesh.region[chosen], facets={})
 
@@ -248,7 +251,7 @@ def _mass(mesh: TetMesh, pattern: SparsityPattern, rho: Floats) -> sparse.csr_ar
 def _drag(mesh: TetMesh, pattern: SparsityPattern, rate: Floats) -> sparse.csr_array:
     """Mass-proportional damping matrix of a rate (m,) in kg/m3/s that is 0 in most elements."""
     layer = np.flatnonzero(rate)
-    R = _mass(_part(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
+    R = _mass(elements_of(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
     R.eliminate_zeros()
     return R
 

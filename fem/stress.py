@@ -1,0 +1,165 @@
+"""Strain and stress at points of a body, as linear operators of its displacement.
+
+Strain is recovered by least squares from the quadrature points of the elements about a point, where
+the gradient of a quadratic displacement is most accurate: the superconvergent patch recovery of
+Zienkiewicz and Zhu, Int J Numer Methods Eng 33:1331 (1992), with a patch for each point instead of
+each node. Polynomials of second degree are fitted there, within one material, across which strain
+may jump.
+
+Where a solid is nearly incompressible, div u itself oscillates from element to element and is not
+what the stiffness acts on: the dilatation is taken from the macroelement projection and what is
+left beside it (`pressure_projection`), in the proportions that they have in K. Stress by Hooke's
+law, lam tr(e) I + 2 mu e, then has the pressure of the discrete equations.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from fem.assembly import by_region, direct_part, elements_of
+from fem.elements import shape_functions, tetrahedron_rule
+from fem.geometry import gradients, shape_nodes
+from fem.interior import locate
+from fem.materials import Material
+from fem.pressure_projection import dilatation_operator
+from meshes import TetMesh
+from meshes.tetmesh import Floats, Ints
+from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke
+
+TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
+POINTS = 4  # quadrature points of an element, of the rule for degree 2
+LOCAL = 2.0  # weight exp(-(LOCAL d)^2) at d patch widths from the point, which halves the error
+# Symmetric gradient: e_c = sum_ij SYMMETRIC[c, i, j] u_j,i
+SYMMETRIC = np.array([[[(i, j) in (c, c[::-1]) for j in range(3)] for i in range(3)]
+                      for c in TENSOR]) / np.array([1, 1, 1, 2, 2, 2])[:, None, None]  # fmt: skip
+
+
+def strain_operator(
+    mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
+) -> sparse.csr_array:
+    """Strain operator: the strain tensor at points of a body is this times its displacement.
+
+    Parameters
+    ----------
+    mesh : TetMesh, of ten-node tetrahedra
+    material : one Material, or region number -> Material
+    points : (p, 3) float, metre, in the body or on its surface
+
+    Returns
+    -------
+    (6 p, 3 n) sparse, 1/m; components xx, yy, zz, xy, xz, yz of the tensor, fastest
+
+    Raises
+    ------
+    ValueError
+        If a point is outside the body, or elements have four nodes, whose strain is constant.
+    """
+    if mesh.order == 1:
+        raise ValueError("strain is recovered from ten-node tetrahedra; mesh with order 2")
+    points = np.atleast_2d(np.asarray(points, np.float64))
+    materials, region = by_region(mesh, material)
+    owner, _ = locate(mesh, points)
+    rows = sparse.csr_array((6 * len(points), mesh.n_dofs))
+    for r in np.unique(region[owner]):
+        here, own = np.flatnonzero(region[owner] == r), np.flatnonzero(region == r)
+        part = elements_of(mesh, own)
+        patches = [_patch(part, np.searchsorted(own, owner[p]), points[p]) for p in here]
+        used = np.unique(np.concatenate(patches))
+        fit = _fit(part, patches, used, points[here])
+        into = sparse.csr_array(
+            (np.ones(len(here)), (here, np.arange(len(here)))), shape=(len(points), len(here))
+        )
+        tensor = sparse.eye_array(6)
+        sampled = _sampled_strain(part, used, materials[r])
+        rows = rows + sparse.kron(into @ fit, tensor, format="csr") @ sampled
+    return rows
+
+
+def stress_operator(
+    mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
+) -> sparse.csr_array:
+    """Stress operator: the Cauchy stress of the moduli at rest, tension positive, is this times the
+    displacement. In motion it relaxes as the modulus does: sigma(w) = mu(w) / mu sigma.
+
+    Parameters
+    ----------
+    mesh, material, points : as for `strain_operator`, with its errors
+
+    Returns
+    -------
+    (6 p, 3 n) sparse, Pa/m; components xx, yy, zz, xy, xz, yz, fastest
+    """
+    solids = materials_at(mesh, material, points)
+    moduli = sparse.block_diag([hooke(solid) for solid in solids], format="csr")
+    return moduli @ strain_operator(mesh, material, points)
+
+
+def materials_at(
+    mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
+) -> tuple[Material, ...]:
+    """Material at each of the points (p, 3) in metre; raises what `locate` does."""
+    materials, region = by_region(mesh, material)
+    return tuple(materials[r] for r in region[locate(mesh, points)[0]])
+
+
+def _patch(mesh: TetMesh, owner: int, point: Floats) -> Ints:
+    """Elements (k,) that share a corner with those that a point (3,) touches."""
+    around = np.isin(mesh.tets[:, :4], mesh.tets[owner, :4]).any(axis=1)
+    near = np.flatnonzero(around)
+    corners = mesh.points[mesh.tets[near, :4]]
+    edges = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
+    inner = np.linalg.solve(edges, (point - corners[:, 0])[:, :, None])[:, :, 0]
+    least = np.minimum(inner.min(axis=1), 1 - inner.sum(axis=1))
+    touching = near[least > -TOUCHING]
+    core = touching if len(touching) else np.array([owner])
+    return np.flatnonzero(np.isin(mesh.tets[:, :4], mesh.tets[core, :4]).any(axis=1))
+
+
+def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> sparse.csr_array:
+    """Weights (p, 4 k) of the samples in the used elements (k,): the value at each point of the
+    polynomial that fits the samples in its patch best.
+    """
+    nodes = mesh.points[mesh.tets[used]]
+    N = shape_functions(tetrahedron_rule(2)[0], nodes.shape[1])
+    places = np.einsum("qa,eai->eqi", N, nodes)
+    values, columns = [], []
+    for patch, point in zip(patches, points, strict=True):
+        chosen = np.searchsorted(used, patch)
+        away = (places[chosen] - point).reshape(-1, 3)
+        away = away / np.abs(away).max(axis=0)
+        root = np.exp(-(LOCAL**2) / 2 * (away**2).sum(axis=1))  # of the weight
+        values.append(np.linalg.pinv(_polynomials(away) * root[:, None])[0] * root)
+        columns.append((POINTS * chosen[:, None] + np.arange(POINTS)).ravel())
+    starts = np.cumsum([0, *map(len, values)])
+    shape = (len(points), POINTS * len(used))
+    return sparse.csr_array((np.concatenate(values), np.concatenate(columns), starts), shape=shape)
+
+
+def _polynomials(x: Floats) -> Floats:
+    """Monomials (k, 10) up to the second degree at places (k, 3)."""
+    i, j = np.array(TENSOR).T
+    return np.hstack([np.ones((len(x), 1)), x, x[:, i] * x[:, j]])
+
+
+def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr_array:
+    """Strain (24 k, 3 n) at the quadrature points of some elements (k,) of one material, with the
+    dilatation that its stiffness acts on.
+    """
+    part = elements_of(mesh, used)
+    slopes, _ = gradients(shape_nodes(part), part.tets.shape[1], 2, 0)
+    values = np.einsum("cij,eqia->eqcaj", SYMMETRIC, slopes)
+    columns = 3 * part.tets[:, None, None, :, None] + np.arange(3)
+    rows = np.arange(values[..., 0, 0].size).reshape(*values.shape[:3], 1, 1)
+    places = np.broadcast_to(rows, values.shape), np.broadcast_to(columns, values.shape)
+    shape = (values[..., 0, 0].size, mesh.n_dofs)
+    strain = sparse.csr_array((values.ravel(), tuple(x.ravel() for x in places)), shape=shape)
+    lam, mu = np.array(material.first_lame), np.array(material.shear_modulus)
+    if not (direct := direct_part(lam, mu)) < lam:
+        return strain
+    share = float(1 - direct / lam)
+    samples = sparse.eye_array(POINTS * len(used))
+    whole = sparse.kron(samples, np.eye(6) - share * MEAN, format="csr") @ strain
+    projected = dilatation_operator(mesh, used)
+    return whole + sparse.kron(samples, share / 3 * DIAGONAL[:, None], format="csr") @ projected
