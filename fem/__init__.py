@@ -32,8 +32,8 @@ from fem.boundary import Support
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
-from fem.linear_solver import Factor, available, factorise
 from fem.interior import displacement_operator, locate
+from fem.linear_solver import Factor, available, factorise
 from fem.load_and_probe import (
     facet_normals,
     facet_points,

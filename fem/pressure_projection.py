@@ -45,7 +45,7 @@ def dilatation_operator(mesh: TetMesh, elements: Ints) -> sparse.csr_array:
 
 
 def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
-    """Matrix D of `projected_divergence`, by the macroelements (e,) and their functions (e, q, v)."""
+    """Matrix D of `projected_divergence`, by macroelements (e,) and functions (e, q, v)."""
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
     starts = 10 * np.arange(len(cluster) + 1, dtype=np.int32)
