@@ -48,7 +48,7 @@ from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
-from fem.stress import materials_at, strain_operator, stress_operator
+from fem.stress import materials_at, relaxation, relaxed, strain_operator, stress_operator
 from fem.transient import Diverged, State, at_rest, transient
 from simple_model.material import PRESETS, Material, PronyTerm, from_young, tabulated
 
@@ -97,6 +97,8 @@ __all__ = [
     "pressure_force",
     "probe_operator",
     "reduce",
+    "relaxation",
+    "relaxed",
     "static",
     "stored",
     "strain_operator",

@@ -13,16 +13,20 @@ law, lam tr(e) I + 2 mu e, then has the pressure of the discrete equations.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
-from fem.assembly import by_region, direct_part, elements_of
+from fem.assembly import LOSS_BAND, by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
-from fem.materials import Material
+from fem.materials import Material, rayleigh_damping
+from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
@@ -94,6 +98,44 @@ def stress_operator(
     solids = materials_at(mesh, material, points)
     moduli = sparse.block_diag([hooke(solid) for solid in solids], format="csr")
     return moduli @ strain_operator(mesh, material, points)
+
+
+def relaxation(material: Material, s: Any) -> Any:
+    """Complex modulus of the assembled equations over that at rest, at complex frequencies s in
+    rad/s: a loss factor is in them as the viscosity of Rayleigh's damping. A branch that is as fast
+    as s, which moves no displacement, counts as 0.
+    """
+    mu = material.shear_modulus
+    if material.law is not None:
+        return material.complex_modulus(np.real_if_close(-1j * np.asarray(s))) / mu
+    lag = material.viscosity / mu + rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        branches = material.relaxing_modulus(-1j * np.asarray(s)) / mu
+    return 1 + s * lag + np.where(np.isfinite(branches), branches, 0.0)
+
+
+def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
+    """Stress (t, ...) from rest in steps of dt in s, of the stress at rest's moduli (t, ...): the
+    `relaxation` in time, with rates by a cubic spline and branches exact for linear pieces.
+
+    Raises
+    ------
+    ValueError
+        If the material has a modulus law of its own.
+    """
+    if material.law is not None:
+        raise ValueError(NO_INTERNAL)
+    mu = material.shear_modulus
+    lag = material.viscosity / mu + rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
+    found = stress
+    if lag:
+        rate = CubicSpline(np.arange(len(stress)) * dt, stress).derivative()
+        found = found + lag * rate(np.arange(len(stress)) * dt)
+    for term in material.prony:  # d' = u' - d / tau
+        kept = np.exp(-dt / term.time)
+        gain = term.modulus / mu * (1 - kept) * term.time / dt
+        found = found + lfilter([gain, -gain], [1.0, -kept], stress, axis=0)
+    return found
 
 
 def materials_at(

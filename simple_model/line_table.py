@@ -191,7 +191,7 @@ def _peaks(response: Response, fit: _Fit, highest: float, settle: float) -> list
     for k in chosen[:MOST_SEEN]:
         bins = k + _offset(amplitude[k - 1 : k + 2, int(np.argmax(level[k]))])
         turns = bins / len(fit.rest)
-        free = response.of.of_body and _decays(fit.rest[begun:], turns)
+        free = response.record.of_body and _decays(fit.rest[begun:], turns)
         kind = FREE if free else UNNAMED
         found.append(Unnamed(frequency=turns / dt, amplitudes=amplitude[k], kind=kind))
     return found

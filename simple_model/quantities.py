@@ -38,7 +38,7 @@ class Quantity:
 
     Parameters
     ----------
-    name, symbol, words : str, in scenes and files; in formulas; in sentences
+    name, symbol, words : str, in scenes and files; in formulas, as TeX; in sentences
     unit : str, SI
     shown, per_unit : str and float, the unit on axes and in tables, and what 1 in SI is in it
     column : str, of lines.csv
@@ -68,8 +68,8 @@ class Quantity:
         return bool(self.field)
 
     @property
-    def on_surface(self) -> bool:
-        """Whether a model of the surface alone has it: its normal motion."""
+    def is_normal(self) -> bool:
+        """Whether it is of the motion normal to the surface alone."""
         return self.field == NORMAL
 
     def factor(self, s: Any, modulus: Any = 1.0) -> Any:
@@ -150,28 +150,28 @@ for _k, _axis in enumerate("xyz"):
 for _k, _pair in enumerate(COMPONENTS):
     register(
         Quantity(
-            name=f"strain_{_pair}", symbol=f"ε_{_pair}", words=f"strain {_pair}", unit="1",
+            name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}", words=f"strain {_pair}", unit="1",
             shown="µm/m", per_unit=1e6, column=f"strain_{_pair}_um_m", field=STRAIN,
             rows=_chosen(_identity(6), _k),
         )
     )  # fmt: skip
     register(
         Quantity(
-            name=f"stress_{_pair}", symbol=f"σ_{_pair}", words=f"stress {_pair}", unit="Pa",
+            name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}", words=f"stress {_pair}", unit="Pa",
             shown="Pa", column=f"stress_{_pair}_pa", field=STRAIN, rows=_chosen(hooke, _k),
             relaxes=True,
         )
     )  # fmt: skip
 LARGEST_SHEAR = register(
     Quantity(
-        name="largest_shear_strain", symbol="γ_max", words="largest shear strain", unit="1",
+        name="largest_shear_strain", symbol=r"\gamma_{max}", words="largest shear strain", unit="1",
         shown="µm/m", per_unit=1e6, column="largest_shear_strain_um_m", field=STRAIN,
         rows=_identity(6), invariant=largest_shear,
     )
 )  # fmt: skip
 VON_MISES = register(
     Quantity(
-        name="von_mises_stress", symbol="σ_vM", words="von Mises stress", unit="Pa", shown="Pa",
+        name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress", unit="Pa", shown="Pa",
         column="von_mises_stress_pa", field=STRAIN, rows=hooke, relaxes=True, invariant=von_mises,
     )
 )  # fmt: skip

@@ -95,14 +95,14 @@ class Response:
         _check_spacing(self.times)
 
     @property
-    def of(self) -> Quantity:
+    def record(self) -> Quantity:
         """The record of its quantity."""
         return quantity(self.quantity)
 
     @property
     def unit(self) -> str:
         """The unit of its values, SI."""
-        return self.of.unit
+        return self.record.unit
 
     @property
     def displacement(self) -> Floats:
@@ -113,7 +113,7 @@ class Response:
         ValueError
             If they are of another quantity.
         """
-        if self.of not in (DISPLACEMENT, PRESSURE):
+        if self.record not in (DISPLACEMENT, PRESSURE):
             raise ValueError(f"this response is of {self.quantity}; take its `values`")
         return self.values
 

@@ -69,7 +69,7 @@ def compare(
         raise ValueError("the responses have different probes; compare them at the same ones")
     if reference.times.shape != candidate.times.shape:
         raise ValueError("the responses have different times; compare them at the same ones")
-    x, y = reference.displacement, candidate.displacement
+    x, y = reference.values, candidate.values
     fits = reference.unit == candidate.unit
     scale = 1.0 if fits else float((x * y).sum() / max((y * y).sum(), np.finfo(float).tiny))
     norm = np.linalg.norm(x, axis=0)
@@ -168,7 +168,7 @@ def _vertex(y: Floats) -> tuple[float, float]:
 
 def _moving(response: Response, settle: float = SETTLE) -> Floats:
     """The response (t, p) about its mean, after the transient in its first part."""
-    kept = response.displacement[int(settle * len(response.times)) :]
+    kept = response.values[int(settle * len(response.times)) :]
     return np.asarray(kept - kept.mean(axis=0))
 
 

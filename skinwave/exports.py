@@ -16,18 +16,19 @@ from skinwave.plain_text import csv_table
 
 FIELD_FRAMES = 8  # of a period, written for ParaView
 FULL_SCALE = 32767
+IN_NAMES = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # of files
 
 
 def write_probes(stem: Path, response: Response) -> None:
     """`stem`.csv, a column a probe with its unit and place in the header, and `stem`.npz with
-    `t` s, `probes` m and `displacement` (t, p) in m or, of the point kernel, `pressure` in Pa.
+    `t` s, `probes` m and, by the name of its quantity, the values (t, p) in its unit.
     """
-    kind = "pressure" if response.unit == "Pa" else "displacement"
+    kind = response.quantity
     places = [f"({1e3 * x:g}, {1e3 * y:g}) mm" for x, y in response.probes]
     header = ["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)]
-    table = waveform_table(header, [response.times, *response.displacement.T])
+    table = waveform_table(header, [response.times, *response.values.T])
     stem.with_suffix(".csv").write_bytes(table)
-    arrays = {"t": response.times, "probes": response.probes, kind: response.displacement}
+    arrays = {"t": response.times, "probes": response.probes, kind: response.values}
     np.savez(stem.with_suffix(".npz"), **arrays)  # type: ignore[arg-type]
 
 
@@ -39,7 +40,7 @@ def waveform_table(header: Iterable[str], columns: Sequence[Floats]) -> bytes:
 
 def sampled(response: Response, probe: int) -> tuple[NDArray[np.int16], float]:
     """A probe's waveform about its mean in 16 bit, and what of it is the largest that they hold."""
-    motion = response.displacement[:, probe] - response.displacement[:, probe].mean()
+    motion = response.values[:, probe] - response.values[:, probe].mean()
     largest = float(np.abs(motion).max())
     return np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16), largest
 
@@ -52,7 +53,8 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     from scipy.io import wavfile
 
     samples, largest = sampled(response, probe)
-    unit, per = ("Pa", 1.0) if response.unit == "Pa" else ("um", 1e6)
+    per = response.record.per_unit
+    unit = response.record.shown.translate(IN_NAMES)
     x, y = 1e3 * response.probes[probe]
     path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{per * largest:.4g}_{unit}.wav"
     wavfile.write(path, round(1 / step(response.times)), samples)

@@ -169,8 +169,8 @@ def test_phase_delay_is_unwrapped_outwards_and_absent_where_nothing_moves():
     fall = np.exp(-probes[:, 0] / 0.03)
     kernel = np.sin(2 * pi * 200 * t)[:, None] * np.ones(9)
     waves = fall * np.sin(2 * pi * 200 * (t[:, None] - 1e-3 - probes[:, 0] / 5))
-    a = Response(model="point-kernel", times=t, probes=probes, displacement=kernel, unit="Pa")
-    b = Response(model="fem", times=t, probes=probes, displacement=1e-6 * waves)
+    a = Response(model="point-kernel", times=t, probes=probes, values=kernel, quantity="pressure")
+    b = Response(model="fem", times=t, probes=probes, values=1e-6 * waves)
     delay = compare(a, b, (200.0, 300.0)).phase_delay
     heard = fall > 0.1
     assert delay[0, heard] == pytest.approx(1e-3 + probes[heard, 0] / 5, abs=1e-6)
@@ -186,7 +186,7 @@ def test_harmonics_are_judged_in_the_plural():
         wave = np.sin(2 * pi * 140 * t) + 0.2 * np.sin(2 * pi * 280 * t)
         wave += third * np.sin(2 * pi * 420 * t)
         motion = 1e-6 * wave[:, None] * np.ones(5)
-        response = Response(model="fem", times=t, probes=scene.probe_points, displacement=motion)
+        response = Response(model="fem", times=t, probes=scene.probe_points, values=motion)
         run = Run(tacton="am", body="slab", scene=scene, response=response)
         return next(v for v in evaluate([run]) if v.claim == "M1")
 
@@ -251,5 +251,5 @@ def _run(scene, model, name="one"):
 def _response(t, wave, unit):
     motion = wave[:, None] * np.array([1.0, 0.5])
     return Response(
-        model="fem", times=t, probes=np.array([[0, 0], [0.01, 0]]), displacement=motion, unit=unit
+        model="fem", times=t, probes=np.array([[0, 0], [0.01, 0]]), values=motion, quantity=quantity
     )

@@ -35,7 +35,7 @@ def _refuse_of_transient(body: Body) -> None:
 def _reduced(scene: Scene, request: Request) -> Response:
     prepared = prepare(
         scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
-        tolerance=reduction_tolerance(request.tolerance),
+        tolerance=reduction_tolerance(request.tolerance), reading=scene.reading,
     )  # fmt: skip
     return answer(prepared, scene, request.report)
 
@@ -49,6 +49,7 @@ FEM = register(
         refuse=partial(without_own_law, "fem"),
         error=None,
         default_size=default_size,
+        reads=lambda scene: True,
         colour="#0072B2",
         is_reduced=True,
         fits_damping=True,
@@ -63,6 +64,7 @@ HARMONIC = register(
         refuse=partial(vacuum_only, "fem-harmonic"),
         error=None,
         default_size=default_size,
+        reads=lambda scene: True,
         colour="#CC79A7",
         is_steady=True,
     )
@@ -76,6 +78,7 @@ TRANSIENT = register(
         refuse=_refuse_of_transient,
         error=None,
         default_size=default_size,
+        reads=lambda scene: True,
         colour="#D55E00",
         is_stepped=True,
         fits_damping=True,

@@ -238,7 +238,9 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     started = time.perf_counter()
     if named(candidate.model).is_reduced:
         discretisation = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
-        prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **discretisation)  # type: ignore[arg-type]
+        prepared = prepare(
+            scene.body, scene.probe_points, h=candidate.h, reading=scene.reading, **discretisation
+        )  # type: ignore[arg-type]
         response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
         return response, ready - started, time.perf_counter() - ready, peak_memory()

@@ -156,7 +156,7 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     pressure, times = scene.pressure, sample_times(scene)
     response = Response(
         model="flat-body", times=times, probes=scene.probe_points,
-        displacement=flat_motion(table, pressure, scene.probe_points[0], times)[:, None],
+        values=flat_motion(table, pressure, scene.probe_points[0], times)[:, None],
     )  # fmt: skip
     f, w = path_amplitudes(_steady(pressure))
     away = np.linalg.norm(places()[:, None] - path_samples(pressure), axis=2)
@@ -281,7 +281,7 @@ def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
     times, motion = sample_times(scene), respond(body.body, scene.pressure)
     response = Response(
         model="fem", times=times, probes=scene.probe_points, effort=body.body.effort,
-        displacement=from_rest(read_at(motion, _probe(body, scene.probe_points)), times),
+        values=from_rest(read_at(motion, _probe(body, scene.probe_points)), times),
     )  # fmt: skip
     if scene.tacton.rhythm:
         motion = respond(body.body, _steady(scene.pressure))
