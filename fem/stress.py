@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter
 
 from fem.assembly import LOSS_BAND, by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
@@ -123,6 +122,8 @@ def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
     ValueError
         If the material has a modulus law of its own.
     """
+    from scipy.signal import lfilter  # which takes long to import
+
     if material.law is not None:
         raise ValueError(NO_INTERNAL)
     mu = material.shear_modulus

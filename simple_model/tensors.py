@@ -10,7 +10,7 @@ from simple_model.material import Material
 from simple_model.trajectory import Floats
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
-TENSOR = tuple(("xyz".index(i), "xyz".index(j)) for i, j in COMPONENTS)
+TENSOR = tuple(("xyz".index(pair[0]), "xyz".index(pair[1])) for pair in COMPONENTS)
 DIAGONAL = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 MEAN = np.outer(DIAGONAL, DIAGONAL) / 3  # e -> tr(e) / 3 of the diagonal
 TWICE = 2 - DIAGONAL  # how often a component counts in the product of two tensors

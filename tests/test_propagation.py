@@ -156,7 +156,9 @@ def test_delay_and_gain_are_removed_from_a_periodic_signal():
     t = np.arange(10_000) / 1e4
     wave = np.sin(2 * pi * 140 * t) + 0.4 * np.sin(2 * pi * 280 * t + 1)
     later = 3e-6 * (np.sin(2 * pi * 140 * (t - 1.23e-3)) + 0.4 * np.sin(2 * pi * 280 * (t - 1.23e-3) + 1))  # noqa: E501  # fmt: skip
-    found = compare(_response(t, wave, "Pa"), _response(t, 5e-6 + later, "m"), (140.0, 280.0))
+    found = compare(
+        _response(t, wave, "pressure"), _response(t, 5e-6 + later, "displacement"), (140.0, 280.0)
+    )
     assert found.delay == pytest.approx([1.23e-3] * 2, abs=2e-5)
     assert found.shape_misfit.max() < 0.02
     assert found.phase_delay == pytest.approx(np.full((2, 2), 1.23e-3), abs=1e-6)
@@ -248,7 +250,7 @@ def _run(scene, model, name="one"):
     return Run(tacton=name, body=body, scene=scene, response=compute(scene, model))
 
 
-def _response(t, wave, unit):
+def _response(t, wave, quantity):
     motion = wave[:, None] * np.array([1.0, 0.5])
     return Response(
         model="fem", times=t, probes=np.array([[0, 0], [0.01, 0]]), values=motion, quantity=quantity

@@ -246,7 +246,7 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
     energy = energy_balance(total)
-    amplitudes *= line_factor(asked, 2j * np.pi * frequencies, solids, S.shape[0])
+    amplitudes = amplitudes * line_factor(asked, 2j * np.pi * frequencies, solids, S.shape[0])
     below = shown(scene.pressure, frequencies, times)
     effort = Effort(
         dofs=len(ops.free), steps=len(frequencies), energy_imbalance=energy[0], radiated=energy[1],

@@ -1,5 +1,7 @@
 """Load and probes of a meshed body under a moving pressure."""
 
+from typing import Any
+
 import numpy as np
 from scipy import sparse
 
@@ -84,9 +86,7 @@ def probe_rows(
     return (rows @ displacement_operator(mesh, points)).tocsr(), solids
 
 
-def line_factor(
-    asked: Quantity, s: fem.Complex, solids: tuple[Material, ...], outputs: int
-) -> fem.Complex:
+def line_factor(asked: Quantity, s: Any, solids: tuple[Material, ...], outputs: int) -> fem.Complex:
     """Factor (f, p c) of the components of a quantity at complex frequencies s (f,) in rad/s.
 
     Parameters

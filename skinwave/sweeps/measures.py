@@ -42,13 +42,14 @@ def columns(cases: Iterable[DesignPoint]) -> dict[str, str]:
     for case in cases:
         for key, value in case.keys.items():
             found.setdefault(key, "text" if isinstance(value, str) else "number")
-        for name in _columned(case.scene) if case.scene else ():
+        if case.scene is None:
+            continue
+        others = _others(case.scene)
+        of_probes |= {f"{what}_{unit}": "numbers" for unit in others for what in ("peak", "rms")}
+        for name in _columned(case.scene):
             of_lines[f"{name}_hz"] = "number"
             of_lines |= {f"{name}_{unit}": "numbers" for unit in ("um", "db", "kernel_pa", "ratio")}
-            of_lines |= dict.fromkeys((f"{name}_{unit}" for unit in _others(case.scene)), "numbers")
-        if case.scene:
-            of_probes |= {f"{what}_{unit}": "numbers" for unit in _others(case.scene)
-                          for what in ("peak", "rms")}  # fmt: skip
+            of_lines |= dict.fromkeys((f"{name}_{unit}" for unit in others), "numbers")
     return (
         found
         | dict.fromkeys(NUMBERS, "number")
