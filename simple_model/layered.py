@@ -22,7 +22,7 @@ Z = K11 - K12 (K22 + Z)^-1 K21, and from the surface down u <- -(K22 + Z)^-1 K21
 
 from collections.abc import Callable, Sequence
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,9 +32,9 @@ from simple_model.material import Complex, Floats, Material
 NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
 BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
 Transfer = Callable[[Complex, Complex], Complex]
-Pair = tuple[Complex, Complex]  # horizontal and vertical
-Symmetric = tuple[Complex, Complex, Complex]  # a, b, c of [[a, b], [b, c]]
-FREE: Symmetric = (np.zeros(()), np.zeros(()), np.zeros(()))
+Pair = tuple[Any, Any]  # horizontal and vertical
+Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
+FREE: Symmetric = (np.zeros(1, np.complex128),) * 3
 
 
 class Layer(NamedTuple):
@@ -47,9 +47,19 @@ class Layer(NamedTuple):
     across: tuple[Complex, Complex, Complex]
 
 
+class Impedances(NamedTuple):
+    """Impedance Z in Pa/m of a whole stack; its layers from the top, and the impedance of all that
+    is below each of these: None below a half-space and of a rigid base.
+    """
+
+    surface: Symmetric
+    layers: list[Layer]
+    below: list[Symmetric | None]
+
+
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
     """Displacement (f, k) in m/Pa of the surface into the stack per pressure."""
-    a, b, c = _impedances(stack, k, w)[0][1]
+    a, b, c = _impedances(stack, k, w).surface
     return np.asarray(a / (a * c - b * b))
 
 
@@ -151,24 +161,22 @@ def _cut(stack: Stack, depths: Sequence[float]) -> tuple[Stack, list[int]]:
     return fine, [int(np.abs(planes - depth).argmin()) for depth in depths]
 
 
-def _impedances(
-    stack: Stack, k: Complex, w: Complex
-) -> list[tuple[Layer | None, Symmetric | None]]:
-    """Each layer from the top, and the impedance Z in Pa/m of all from there down; last, those of
-    the base: None if it is rigid or there is none.
-    """
-    below = FREE if stack.base == "free" and not stack.is_half_space else None
-    found: list[tuple[Layer | None, Symmetric | None]] = [(None, below)]
-    for material, thickness in zip(stack.materials[::-1], stack.thicknesses[::-1], strict=True):
-        layer = layer_stiffness(material, thickness, k, w)
-        below = layer.top if below is None else _condensed(layer, below)
-        found.append((layer, below))
-    return found[::-1]
+def _impedances(stack: Stack, k: Complex, w: Complex) -> Impedances:
+    layers = [
+        layer_stiffness(material, thickness, k, w)
+        for material, thickness in zip(stack.materials, stack.thicknesses, strict=True)
+    ]
+    below: list[Symmetric | None] = [None if stack.is_fixed else FREE]
+    for layer in layers[:0:-1]:
+        below.append(_condensed(layer, below[-1]))
+    return Impedances(_condensed(layers[0], below[-1]), layers, below[::-1])
 
 
-def _condensed(layer: Layer, below: Symmetric) -> Symmetric:
+def _condensed(layer: Layer, below: Symmetric | None) -> Symmetric:
     """Z = K11 - K12 (K22 + Z)^-1 K21."""
     a, b, c = layer.top
+    if below is None:
+        return layer.top
     d, e, g = layer.across
     x, y = _followed(layer, below, (d, e)), _followed(layer, below, (-e, g))
     return a - d * x[0] - e * x[1], b + e * x[0] - g * x[1], c + e * y[0] - g * y[1]
@@ -182,22 +190,20 @@ def _followed(layer: Layer, below: Symmetric, force: Pair) -> Pair:
     return (c * force[0] - b * force[1]) * over, (a * force[1] - b * force[0]) * over
 
 
-def _downwards(
-    known: list[tuple[Layer | None, Symmetric | None]],
-) -> list[tuple[Pair, Pair]]:
+def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
     """Displacement in m/Pa of each interface, and forces in Pa/Pa on what is below it."""
-    a, b, c = known[0][1]
+    a, b, c = known.surface
     over = 1 / (a * c - b * b)
     u, f = (-b * over, a * over), (0 * over, 1 + 0 * over)
     found = [(u, f)]
-    for (layer, _), (_, below) in zip(known[:-1], known[1:], strict=True):
+    for layer, below in zip(known.layers, known.below, strict=True):
         d, e, g = layer.across
         f = (e * u[1] - d * u[0], -e * u[0] - g * u[1])
         if below is None:
-            u = 0 * f[0], 0 * f[1]
+            u = (0 * f[0], 0 * f[1])
         else:
             u, (a, b, c) = _followed(layer, below, f), below
-            f = a * u[0] + b * u[1], b * u[0] + c * u[1]
+            f = (a * u[0] + b * u[1], b * u[0] + c * u[1])
         found.append((u, f))
     return found
 
@@ -241,7 +247,11 @@ def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex
         mu * (2 * k - ks2 / (2 * k)) - over * q * spss / (2 * k),
         over * ((1 - lp2 / 2) * ss / k2 - cross),
     )
-    across = over * (sines - kappa * sp * es / k2), over * cosines / k, -over * (sines + ss * ep / k2)
+    across = (
+        over * (sines - kappa * sp * es / k2),
+        over * cosines / k,
+        -over * (sines + ss * ep / k2),
+    )
     return Layer(top, across)
 
 

@@ -7,10 +7,11 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Trajectory
-from simple_model.flat_body import flat_body, point_response, steady_lines, steady_state
+from simple_model.flat_body import flat_body, steady_lines, steady_state
 from simple_model.focus import spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
+from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance, is_plain_layer
 from skinwave.scene import Body, Scene
 
