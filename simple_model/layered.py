@@ -31,6 +31,9 @@ from simple_model.material import Complex, Floats, Material
 
 NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
 BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
+WEAKEST = (
+    0.1  # of the mean decay in a stack, that of a mode which is mostly in a layer without loss
+)
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
@@ -58,9 +61,11 @@ class Impedances(NamedTuple):
 
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
-    """Displacement (f, k) in m/Pa of the surface into the stack per pressure."""
+    """Displacement (f, k) in m/Pa of the surface into the stack per pressure; of a free one about
+    its mean, which has no bound: 0 at w = 0.
+    """
     a, b, c = _impedances(stack, k, w).surface
-    return np.asarray(a / (a * c - b * b))
+    return _about_mean(stack, w, a / (a * c - b * b))
 
 
 def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
@@ -74,7 +79,7 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
     Returns
     -------
     Function of k (k,) in 1/m and w (f, 1) in rad/s to (4, d, f, k): U and W in m/Pa, N and T in
-    Pa/Pa, of the field of a surface pressure J0(kr) exp(i w t).
+    Pa/Pa, of the field of a surface pressure J0(kr) exp(i w t); of a free stack 0 at w = 0.
 
     Raises
     ------
@@ -90,11 +95,12 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
     fine, planes = _cut(stack, depths)
 
     def answer(k: Complex, w: Complex) -> Complex:
-        found = _downwards(_impedances(fine, k, w))
-        u, f = ([found[plane][part] for plane in planes] for part in (0, 1))
+        each = _downwards(_impedances(fine, k, w))
+        u, f = ([each[plane][part] for plane in planes] for part in (0, 1))
         parts = [*zip(*u, strict=True), [-v for _, v in f], [-h for h, _ in f]]
         shape = np.broadcast_shapes(k.shape, w.shape)
-        return np.array([[np.broadcast_to(x, shape) for x in part] for part in parts])
+        found = np.array([[np.broadcast_to(x, shape) for x in part] for part in parts])
+        return _about_mean(stack, w, found)
 
     return answer
 
@@ -105,7 +111,8 @@ def clearance(stack: Stack, w: Complex) -> float:
     Backward waves occur from somewhat below the second resonance. As their energy travels no faster
     than shear waves, they decay no more slowly than the least of these (Tolstoy and Usdin, J Acoust
     Soc Am 29:37 (1957), of one layer; of several a mode's loss and speed are both means over its
-    energy). Evanescent waves have their poles above 1 / thickness.
+    energy). Evanescent waves have their poles above 1 / thickness, but for the bending of a free
+    stack, where the two poles k^4 = m w^2 / D that only decay go to 0 with w.
 
     The sum of all 1 / w_n^2 is the compliance down to the base of each part times its mass; of one
     layer that is H^2 / 2 c^2, and (2 H / pi c)^2 of it are the first resonance's.
@@ -117,7 +124,28 @@ def clearance(stack: Stack, w: Complex) -> float:
     total = sum(thickness for _, thickness in finite)
     turns = np.maximum(_resonance(finite, w, _shear) / 9, _resonance(finite, w, _compression))
     decay = _decay(stack, w)[turns > (BACKWARD * np.pi / 2) ** 2 / 2]
-    return float(decay.min(initial=1 / total))
+    lowest = 1 / total if stack.is_fixed else min(1 / total, _bending(stack, w))
+    return float(decay.min(initial=lowest))
+
+
+def _about_mean(stack: Stack, w: Complex, values: Complex) -> Complex:
+    return np.asarray(values if stack.is_fixed else np.where(w == 0, 0, values))
+
+
+def _bending(stack: Stack, w: Complex) -> float:
+    """Height in 1/m of the least pole of a free stack's bending that only decays.
+
+    By classical lamination theory, about the neutral plane (Jones, Mechanics of Composite Materials
+    (1999), chapter 4).
+    """
+    h = np.array(stack.thicknesses)
+    stiff = np.array([2 * _shear(m, w) / (1 - m.poisson) for m in stack.materials]) * h[:, None]
+    z = (np.cumsum(h) - h / 2)[:, None]
+    z = z - (stiff * z).sum(axis=0) / stiff.sum(axis=0)
+    bending = (stiff * (z**2 + h[:, None] ** 2 / 12)).sum(axis=0)
+    mass = sum(m.density * t for m, t in zip(stack.materials, stack.thicknesses, strict=True))
+    k = (mass * w**2 / bending + 0j) ** 0.25 * np.array([1, 1j, -1, -1j])[:, None]
+    return float(k.imag[(k.real > 0) & (k.imag > 0.1 * np.abs(k))].min(initial=inf))
 
 
 def _shear(material: Material, w: Complex) -> Complex:
@@ -142,9 +170,15 @@ def _resonance(
 
 
 def _decay(stack: Stack, w: Complex) -> Floats:
-    """Least decay (f,) in 1/m of shear waves in a stack."""
+    """Least decay (f,) in 1/m of shear waves in a stack; where a layer has none, `WEAKEST` of the
+    mean over its thickness.
+    """
     waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
-    return np.asarray(np.min(np.abs(np.imag(waves)), axis=0))
+    decay = np.abs(np.imag(waves))
+    finite = [thickness for thickness in stack.thicknesses if isfinite(thickness)]
+    share = np.minimum(stack.thicknesses, sum(finite))  # a half-space counts as all above it
+    share = share / share.sum()
+    return np.where((decay > 0).all(axis=0), decay.min(axis=0), WEAKEST * (share @ decay))
 
 
 def _cut(stack: Stack, depths: Sequence[float]) -> tuple[Stack, list[int]]:
