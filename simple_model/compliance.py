@@ -36,7 +36,9 @@ AIR_DENSITY = 1.2  # kg/m3
 
 
 def layered(stack: Stack) -> Compliance:
-    """Stack of layers, by their stiffness matrices."""
+    """Stack of layers, by their stiffness matrices; a half-space alone by its closed form."""
+    if stack.thicknesses == (inf,):
+        return half_space(stack.materials[0])
     return Compliance(partial(surface_compliance, stack), partial(clearance, stack))
 
 
