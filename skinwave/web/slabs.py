@@ -16,8 +16,8 @@ from scipy.special import jv
 import fem
 from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
-from simple_model.flat_body import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from simple_model.focus import spot_width
+from simple_model.wavenumber_integral import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from skinwave.bodies.analytic import compliance
 from skinwave.effort import Progress
 from skinwave.scene import Body
