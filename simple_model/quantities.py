@@ -77,7 +77,7 @@ class Quantity:
 
         `modulus` is the complex modulus there over that at rest.
         """
-        return s**self.rate * (modulus if self.relaxes else 1.0)
+        return np.asarray(s) ** self.rate * (modulus if self.relaxes else 1.0)
 
     def waveforms(self, components: Floats, probes: int) -> Floats:
         """Values (t, p) of components (t, p c), those of a probe next to each other."""
@@ -151,15 +151,15 @@ for _k, _pair in enumerate(COMPONENTS):
     register(
         Quantity(
             name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}",
-            words=f"strain {_pair}", unit="1", shown="µm/m", per_unit=1e6, column=f"strain_{_pair}_um_m",
-            field=STRAIN, rows=_chosen(_identity(6), _k),
+            words=f"strain {_pair}", unit="1", shown="µm/m", per_unit=1e6,
+            column=f"strain_{_pair}_um_m", field=STRAIN, rows=_chosen(_identity(6), _k),
         )
     )  # fmt: skip
     register(
         Quantity(
             name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}",
-            words=f"stress {_pair}", unit="Pa", shown="Pa", column=f"stress_{_pair}_pa", field=STRAIN, rows=_chosen(hooke, _k),
-            relaxes=True,
+            words=f"stress {_pair}", unit="Pa", shown="Pa", column=f"stress_{_pair}_pa",
+            field=STRAIN, rows=_chosen(hooke, _k), relaxes=True,
         )
     )  # fmt: skip
 LARGEST_SHEAR = register(
@@ -172,7 +172,8 @@ LARGEST_SHEAR = register(
 VON_MISES = register(
     Quantity(
         name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress",
-        unit="Pa", shown="Pa", column="von_mises_stress_pa", field=STRAIN, rows=hooke, relaxes=True, invariant=von_mises,
+        unit="Pa", shown="Pa", column="von_mises_stress_pa", field=STRAIN, rows=hooke, relaxes=True,
+        invariant=von_mises,
     )
 )  # fmt: skip
 ENERGY_DENSITY = register(
