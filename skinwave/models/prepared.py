@@ -97,7 +97,8 @@ def prepare(
     (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
     outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
-    name = _entry_name(body, build, probes, solver, tolerance, reading)
+    own = None if reading.is_plain else outputs
+    name = _entry_name(body, build, probes, solver, tolerance, outputs=own)
     with clock("read from cache"):
         entry = cache.load(name)
     size, report = h or default_size(body), progress or silent
@@ -111,7 +112,13 @@ def prepare(
 
 
 def _entry_name(
-    body: Body, build: Build, probes: Floats, solver: str, tolerance: float, reading: Reading
+    body: Body,
+    build: Build,
+    probes: Floats,
+    solver: str,
+    tolerance: float,
+    *,
+    outputs: sparse.csr_array | None,
 ) -> str:
     """Cache key of everything that a reduced body depends on."""
     mesh = build.mesh
@@ -119,7 +126,7 @@ def _entry_name(
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     rests = tuple(vars(build.support).values()) if build.support else ()
     used = fem.available()[0] if solver == "auto" else solver
-    read = () if reading.is_plain else (reading.quantity, np.array(reading.depths))
+    read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
         build.fixed, build.absorbing, build.drag, *rests, probes, BAND, tolerance, used, versions(),
