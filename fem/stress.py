@@ -3,7 +3,7 @@
 Strain is recovered by least squares from the quadrature points of the elements about a point, where
 the gradient of a quadratic displacement is most accurate: the superconvergent patch recovery of
 Zienkiewicz and Zhu, Int J Numer Methods Eng 33:1331 (1992), with a patch for each point instead of
-each node. Polynomials of second degree are fitted there, within one material, across which strain
+each node. Polynomials of third degree are fitted there, within one material, across which strain
 may jump.
 
 Where a solid is nearly incompressible, div u itself oscillates from element to element and is not
@@ -13,6 +13,7 @@ law, lam tr(e) I + 2 mu e, then has the pressure of the discrete equations.
 """
 
 from collections.abc import Mapping
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,9 @@ from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
-LOCAL = 3.0  # weight exp(-LOCAL d^2) of a sample at d elements from the point: best of 1 to 6
+LOCAL = 1.0  # weight exp(-LOCAL d^2) of a sample at d elements from the point: best of 0.7 to 5
+DEGREES = (3, 2, 1, 0)  # of polynomials: the highest that the samples determine, twice over
+INDEPENDENT = 1e-8  # of the largest singular value
 # Symmetric gradient: e_c = sum_ij SYMMETRIC[c, i, j] u_j,i
 SYMMETRIC = np.array([[[(i, j) in (c, c[::-1]) for j in range(3)] for i in range(3)]
                       for c in TENSOR]) / np.array([1, 1, 1, 2, 2, 2])[:, None, None]  # fmt: skip
@@ -173,17 +176,30 @@ def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> spar
         size = np.ptp(mesh.points[mesh.tets[patch, :4]], axis=1).mean(axis=0)
         away = (places[chosen] - point).reshape(-1, 3) / size
         root = np.exp(-LOCAL / 2 * (away**2).sum(axis=1))  # of the weight
-        values.append(np.linalg.pinv(_polynomials(away) * root[:, None])[0] * root)
+        values.append(_weights(away, root))
         columns.append((POINTS * chosen[:, None] + np.arange(POINTS)).ravel())
     starts = np.cumsum([0, *map(len, values)])
     shape = (len(points), POINTS * len(used))
     return sparse.csr_array((np.concatenate(values), np.concatenate(columns), starts), shape=shape)
 
 
-def _polynomials(x: Floats) -> Floats:
-    """Monomials (k, 10) up to the second degree at places (k, 3)."""
-    i, j = np.array(TENSOR).T
-    return np.hstack([np.ones((len(x), 1)), x, x[:, i] * x[:, j]])
+def _weights(x: Floats, root: Floats) -> Floats:
+    """Weights (k,) of samples at places x (k, 3) about the point, in elements, in the value at the
+    point of the polynomial that fits them best; `root` (k,) of the weights of the fit.
+    """
+    for degree in DEGREES:
+        fitted = root[:, None] * _polynomials(x, degree)
+        left, sizes, right = np.linalg.svd(fitted, full_matrices=False)
+        enough = len(x) >= 2 * len(sizes) and sizes[-1] > INDEPENDENT * sizes[0]
+        if enough or degree == DEGREES[-1]:
+            break
+    return np.asarray((right[:, 0] / sizes) @ left.T * root)
+
+
+def _polynomials(x: Floats, degree: int) -> Floats:
+    """Monomials (k, n) up to a degree at places (k, 3)."""
+    powers = (c for d in range(degree + 1) for c in combinations_with_replacement(range(3), d))
+    return np.column_stack([np.prod(x[:, list(power)], axis=1) for power in powers])
 
 
 def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr_array:
