@@ -257,34 +257,34 @@ def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex
     Layer, of arrays (f, k)
     """
     mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
-    k2, ks2 = k * k, material.density * w**2 / mu
+    k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k
     p, s = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)
-    ps, both = p * s, p + s
+    over_p, over_s, over_sum = 1 / p, 1 / s, 1 / (p + s)
     # Of exp(-p H) and exp(-s H), what they lack of 1, which is next to nothing in a thin layer.
     lp, ls = _lacking(p, thickness), _lacking(s, thickness)
     ep, es = 1 - lp, 1 - ls
-    lp2, ls2 = lp * (1 + ep), ls * (1 + es)
-    mean = (ep + es) / 2
-    apart = _difference_quotient(ep, es, mean, (1 - kappa) * ks2 / both, thickness)
+    lp2, ls2, lacking = lp * (1 + ep), ls * (1 + es), lp + ls * ep
+    mean, slope = (ep + es) / 2, (1 - kappa) * over_sum  # slope = (p - s) / k_s^2
+    apart = _difference_quotient(ep, es, mean, slope * ks2, thickness)
     # Times exp(-(p + s) H) each: S_p S_s, D / k_s^4, (C_p S_s - C_s S_p) / k_s^2, (S_p - S_s) /
-    # k_s^2 and (C_p - C_s) / k_s^2.
-    sp, ss = lp2 / (2 * p), ls2 / (2 * s)
-    q, turn, half = 1 + kappa - kappa * ks2 / k2, (1 - kappa) * apart / both, (1 - kappa) / (2 * ps)
-    spss = sp * ss
-    over = mu / ((q * k2 / (k2 + ps)) ** 2 * spss / k2 - turn * turn)
-    lacking = lp + ls - lp * ls
-    cross = half * ((lp2 + ls2 - lp2 * ls2) / (2 * both) - apart * mean)
-    sines = half * ((1 - lacking / 2) * apart - lacking * mean / both)
-    cosines = lacking * turn / 2
+    # k_s^2 and (C_p - C_s) / k_s^2; S_p and S_s times k^-2.
+    sp, ss = lp2 * over_p / 2, ls2 * over_s / 2
+    spss, turn, half = sp * ss, slope * apart, (1 - kappa) / 2 * over_p * over_s
+    q = 1 + kappa - (kappa * ks2) * over_k**2
+    d = (q * k / (k2 + p * s)) ** 2 * spss - turn * turn
+    over = mu / d
+    cross = half * ((lp2 + ls2 * (1 - lp2)) * over_sum / 2 - apart * mean)
+    sines = half * ((1 - lacking / 2) * apart - lacking * mean * over_sum)
+    sp, ss = sp * over_k**2, ss * over_k**2
     top = (
-        over * (cross + kappa * (1 - ls2 / 2) * sp / k2),
-        mu * (2 * k - ks2 / (2 * k)) - over * q * spss / (2 * k),
-        over * ((1 - lp2 / 2) * ss / k2 - cross),
+        over * (cross + kappa * (1 - ls2 / 2) * sp),
+        2 * mu * k - mu * ks2 * over_k / 2 - over * q * spss * (over_k / 2),
+        over * ((1 - lp2 / 2) * ss - cross),
     )
     across = (
-        over * (sines - kappa * sp * es / k2),
-        over * cosines / k,
-        -over * (sines + ss * ep / k2),
+        over * (sines - kappa * sp * es),
+        over * lacking * turn * (over_k / 2),
+        -over * (sines + ss * ep),
     )
     return Layer(top, across)
 
@@ -303,6 +303,10 @@ def _difference_quotient(
     if not isfinite(thickness):
         return np.zeros_like(mean)
     x2 = (apart * (thickness / 2)) ** 2
-    nearly = np.abs(x2) < NEARLY**2
+    nearly = np.abs(x2.real) + np.abs(x2.imag) < NEARLY**2
+    if not nearly.any():
+        return np.asarray((es - ep) / apart)
     series = 1 - x2 * (1 / 3 - x2 * (2 / 15 - x2 * (17 / 315 - x2 * (62 / 2835))))
-    return np.where(nearly, mean * thickness * series, (es - ep) / np.where(nearly, 1, apart))
+    found = thickness * mean * series
+    np.divide(es - ep, apart, out=found, where=~nearly)
+    return np.asarray(found)

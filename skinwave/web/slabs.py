@@ -17,7 +17,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
 from simple_model.focus import spot_width
-from simple_model.wavenumber_integral import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
+from simple_model.wavenumber_integral import AT_ONCE, INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from skinwave.bodies.analytic import compliance
 from skinwave.effort import Progress
 from skinwave.scene import Body
@@ -108,7 +108,9 @@ def _on_grid(answer: Compliance, frequencies: Floats, n: int) -> Wavenumbers:
     along = (middle[:, None] + half[:, None] * nodes).ravel()
     ramp = np.tanh(along / lift)
     k = along + 1j * lift * ramp
+    parts = max(1, len(w) * n // AT_ONCE)
     return Wavenumbers(
-        frequencies=frequencies, along=along, k=k, G=answer(k, w[:, None]),
+        frequencies=frequencies, along=along, k=k,
+        G=np.concatenate([answer(k, some) for some in np.array_split(w[:, None], parts)]),
         weights=(half[:, None] * weights).ravel() * (1 + 1j * (1 - ramp**2)),
     )  # fmt: skip
