@@ -29,6 +29,7 @@ import numpy as np
 from simple_model.layers import Stack
 from simple_model.material import Complex, Floats, Material
 
+THIN = 0.3  # thickness times wavenumber below which differences of exponentials lose digits
 NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
 BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
 WEAKEST = (
@@ -291,7 +292,13 @@ def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex
 
 def _lacking(p: Complex, thickness: float) -> Complex:
     """1 - exp(-p H)."""
-    return np.asarray(-np.expm1(-thickness * p)) if isfinite(thickness) else np.ones_like(p)
+    if not isfinite(thickness):
+        return np.ones_like(p)
+    x = -thickness * p
+    lacking = 1 - np.exp(x)
+    thin = np.abs(x.real) + np.abs(x.imag) < THIN
+    lacking[thin] = -np.expm1(x[thin])  # which takes twice as long
+    return np.asarray(lacking)
 
 
 def _difference_quotient(
