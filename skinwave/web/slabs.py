@@ -56,8 +56,8 @@ class Wavenumbers:
 
 
 def is_tabulated(body: Body) -> bool:
-    """Whether a body has a table: a wavenumber integral at real frequencies down to rest, which a
-    free slab that the pressure pushes ever further has not.
+    """Whether a body has a table: a wavenumber integral at real frequencies down to rest, where a
+    free slab has a rigid-body drift.
     """
     return has_exact_waves(body) and stack(body).is_fixed
 
