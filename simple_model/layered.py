@@ -62,8 +62,18 @@ class Impedances(NamedTuple):
 
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
-    """Displacement (f, k) in m/Pa of the surface into the stack per pressure; of a free one about
-    its mean, which has no bound: 0 at w = 0.
+    """Displacement of the surface into the stack per pressure; of a free stack, which has no bound
+    at rest, about its mean: 0 at w = 0.
+
+    Parameters
+    ----------
+    stack : Stack
+    k : (k,) complex, 1/m, with a real part above 0
+    w : (f, 1) rad/s, with an imaginary part <= 0
+
+    Returns
+    -------
+    (f, k) complex, m/Pa
     """
     a, b, c = _impedances(stack, k, w).surface
     return _about_mean(stack, w, a / (a * c - b * b))
