@@ -1,0 +1,85 @@
+"""Prony series that stand in for modulus laws: how far off a response is by them."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fem.materials import Material
+from simple_model import MovingPressure
+from simple_model.flat_body import steady_lines
+from simple_model.load_spectrum import load_lines
+from skinwave.bodies.analytic import compliance
+from skinwave.models import named
+from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
+from skinwave.planning.extent import PlanRow
+from skinwave.planning.sensitivity import sensitivity
+from skinwave.planning.warnings import over_tolerance
+from skinwave.scene import Scene
+
+if TYPE_CHECKING:
+    from skinwave.planning.plan import Plan
+
+
+def with_series(found: "Plan", scene: Scene, tolerance: float) -> "Plan":
+    """Plan whose error counts the Prony series that its model takes for modulus laws, with a reason
+    for each.
+
+    Parameters
+    ----------
+    found : Plan, without them
+    scene : Scene, with the body that is modelled
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    Plan
+    """
+    model = named(found.model)
+    if not model.takes_series(scene.body):
+        return found
+    allowed = series_tolerance(tolerance)
+    worst = max(_deviation(solid, scene.pressure, allowed) for solid in own_laws(scene.body))
+    if model.is_infinite:
+        error = _moved(scene, allowed, worst)
+    else:
+        # A modulus that is off by d shifts natural frequencies by d / 2; at rest motion goes by d.
+        error = worst * max(1.0, sensitivity(scene).value / 2)
+    rows = tuple(
+        PlanRow(
+            what="modulus law",
+            value=solid.series(allowed).words,
+            reason=f"{found.model} needs a law with internal variables; at the load's lines the "
+            f"series is {100 * worst:.2g} % off, and the motion of the probes by "
+            f"{100 * error:.2g} %",
+        )
+        for solid in own_laws(scene.body)
+    )
+    said = over_tolerance(
+        f"the {rows[0].value},", error, tolerance,
+        "flat-body-harmonic or fem-harmonic, which take the law itself, are",
+    )  # fmt: skip
+    return replace(
+        found, error=found.error + error, rows=(*found.rows, *rows),
+        warnings=(*found.warnings, *said),
+    )  # fmt: skip
+
+
+def _deviation(solid: Material, pressure: MovingPressure, allowed: float) -> float:
+    """Largest relative deviation of a series from its law in its band and at the load's lines."""
+    series, f = solid.series(allowed), load_lines(pressure, STRONG).frequencies
+    w = 2 * np.pi * f[f >= series.band[0]]
+    law = solid.complex_modulus(w)
+    return max(series.error, float((np.abs(series(w) - law) / np.abs(law)).max(initial=0.0)))
+
+
+def _moved(scene: Scene, allowed: float, otherwise: float) -> float:
+    """Relative change of the probes' steady motion by the series, in an infinite body."""
+    if scene.tacton.trajectory.shape == "recorded":
+        return otherwise
+    own, series = (
+        steady_lines(compliance(body), scene.pressure, scene.probe_points, threshold=STRONG / 10)[1]
+        for body in (scene.body, relaxing(scene.body, allowed))
+    )
+    size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+    return float((np.linalg.norm(series - own, axis=0) / size).max())
