@@ -85,6 +85,7 @@ __all__ = [
     "mean_power",
     "modes",
     "nonlinear",
+    "of_law",
     "on_surface",
     "poles",
     "pressure_force",

@@ -277,9 +277,9 @@ PRESETS: Mapping[str, Material] = {
         poisson=0.4999,
         prony=(PronyTerm(modulus=10e3, time=0.5e-3),),
     ),
-    # Silicone of skin replicas, Ecoflex 00-30: density by its maker's data sheet; the law that Lanoy
-    # et al., PNAS 117 (2020), doi 10.1073/pnas.2010812117, use for it. The constants are second-hand
-    # and were not checked against that paper: they are a plausible silicone, not a measured one.
+    # Silicone of skin replicas, Ecoflex 00-30: density by its maker's data sheet, the law that of
+    # Lanoy et al., PNAS 117 (2020), doi 10.1073/pnas.2010812117. The constants are second-hand and
+    # were not checked against that paper: a plausible silicone, not a measured one.
     "ecoflex": of_law(
         density=1070,
         poisson=0.4999,

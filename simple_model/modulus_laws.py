@@ -6,7 +6,6 @@ needed. Powers are principal values: at w with imaginary part <= 0, i w has a re
 crosses no branch cut.
 """
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -26,6 +25,8 @@ from simple_model.prony import (
 )
 
 COLUMNS = ("frequency_hz", "storage_pa", "loss_pa")
+MOST_ROWS, FITTED_ROWS = 10_000, 300  # of a table, and about how many of them are fitted
+LOWEST, HIGHEST = 1e-3, 1e6  # Hz, of a table
 TABLE_TOLERANCE = 0.005  # relative deviation of the series of a table, if its noise is less
 
 
@@ -106,7 +107,9 @@ class FractionalZener:
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "FractionalZener":
         """The law with all its moduli, or what relaxes of them, multiplied by a factor."""
         rest = modulus * self.shear_modulus
-        return replace(self, shear_modulus=rest, fast_modulus=rest + modulus * loss * self._relaxing)
+        return replace(
+            self, shear_modulus=rest, fast_modulus=rest + modulus * loss * self._relaxing
+        )
 
     @property
     def _relaxing(self) -> float:
@@ -154,12 +157,12 @@ class ModulusTable:
 
     def __post_init__(self) -> None:
         f, mu = self._arrays
-        rising = len(f) and np.isfinite(f).all() and f[0] >= 0 and (np.diff(f) > 0).all()
-        if f.shape != mu.shape or f.ndim != 1 or not rising or f[-1] == 0:
+        if f.shape != mu.shape or f.ndim != 1 or not (f > 0).any() or len(f) > MOST_ROWS:
             raise ValueError(
                 f"a table of complex moduli has {len(f)} frequencies and {len(mu)} moduli; give as "
-                "many of each, one or more above 0 Hz, with frequencies in Hz that rise"
+                f"many of each, at least one above 0 Hz, and at most {MOST_ROWS}"
             )
+        _check_frequencies(f)
         check_passive(f, mu)
         if f[0] == 0 and mu[0].imag:
             raise ValueError(
@@ -203,15 +206,30 @@ class ModulusTable:
         return replace(self, moduli=moduli)
 
 
+def _check_frequencies(f: Floats) -> None:
+    for k, x in enumerate(f):
+        if not (LOWEST <= x <= HIGHEST or (x == 0 and k == 0)):
+            raise ValueError(
+                f"a table of complex moduli has the frequency {x:g} Hz, which is outside "
+                f"{LOWEST:g}..{HIGHEST:g} Hz; only the first may be 0"
+            )
+        if k and x <= f[k - 1]:
+            raise ValueError(
+                f"a table of complex moduli has {x:g} Hz after {f[k - 1]:g} Hz; give each "
+                "frequency once, rising"
+            )
+
+
 @lru_cache(maxsize=64)
 def _series(table: ModulusTable) -> PronySeries:
     f = np.array(table.frequencies)
     measured = f[f > 0]
+    fitted = measured[:: max(1, len(f) // FITTED_ROWS)]
     return fit_prony(
         table.between,
         band=(float(measured[0]), float(measured[-1])),
         rest=table.moduli[0].real if f[0] == 0 else None,
-        frequencies=tuple(measured.tolist()),
+        frequencies=tuple(fitted.tolist()),
         tolerance=TABLE_TOLERANCE,
     )
 
@@ -246,7 +264,7 @@ def modulus_table(text: str) -> ModulusTable:
         If a column is missing, an entry is no number, or as `ModulusTable` does.
     """
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    header, *rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
+    header, *rows = [[cell.strip() for cell in line.split(",")] for line in lines] or [[]]
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(
             f"the table of complex moduli lacks the column {missing[0]}; its first line must name "

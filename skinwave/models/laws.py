@@ -12,7 +12,7 @@ from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 
-SERIES_SHARE = 0.2  # of a waveform's tolerance: relative error that a series may have
+SERIES_SHARE = 0.1  # of a waveform's tolerance: relative error that a series may have
 STRONG = 1e-2  # of the strongest line of a load: lines that a table must reach
 
 

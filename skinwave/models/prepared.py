@@ -29,7 +29,7 @@ from skinwave.models.reduction import (
 from skinwave.scene import SAMPLE_RATE, Body, Scene
 
 REDUCTION_TOLERANCE = 1e-3
-SERIES_ERROR = 10  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
+SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = 2  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points")

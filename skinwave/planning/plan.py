@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.sampling import resolving_step
-from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
 from skinwave.models import Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
