@@ -60,6 +60,11 @@ class FractionalKelvinVoigt:
         """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
         return self.shear_modulus * (1 + _power(omega, self.time, self.exponent))
 
+    @property
+    def words(self) -> str:
+        """The law in a few words."""
+        return f"fractional Kelvin-Voigt of exponent {self.exponent:g}, time {1e3 * self.time:g} ms"
+
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "FractionalKelvinVoigt":
         """The law with its modulus multiplied by a factor, and its springpot by another too."""
         time = self.time * loss ** (1 / self.exponent)
@@ -103,6 +108,14 @@ class FractionalZener:
         """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
         turned = _power(omega, self.time, self.exponent)
         return self.shear_modulus + self._relaxing * turned / (1 + turned)
+
+    @property
+    def words(self) -> str:
+        """The law in a few words."""
+        return (
+            f"fractional Zener of exponent {self.exponent:g}, time {1e3 * self.time:g} ms and "
+            f"{self.fast_modulus / 1e3:.4g} kPa in fast motion"
+        )
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "FractionalZener":
         """The law with all its moduli, or what relaxes of them, multiplied by a factor."""
@@ -179,6 +192,12 @@ class ModulusTable:
     def series(self) -> PronySeries:
         """Prony series over all of the table."""
         return _series(self)
+
+    @property
+    def words(self) -> str:
+        """The table in a few words."""
+        f = self.frequencies
+        return f"{len(f)} measured complex moduli between {f[0]:g} and {f[-1]:g} Hz"
 
     @property
     def shear_modulus(self) -> float:
