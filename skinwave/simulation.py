@@ -190,7 +190,8 @@ def compute(
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     known.refuse(scene.body)
-    check_laws(scene.body, scene.pressure)
+    if known.needs_body:
+        check_laws(scene.body, scene.pressure)
     request = Request(
         times=sample_times(scene), tolerance=tolerance, report=progress or silent,
         h=h, dt=dt, solver=solver, mapped=mapped,
