@@ -83,7 +83,7 @@ def told(
     same = coarse.effort.dofs == response.effort.dofs
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
     _, error = convergence(body, (other, size), (found, fine), tolerance, same=same)
-    error += series_error(scene, response.model, tolerance)
+    error += series_error(scene, response.model, tolerance, coarse)
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)

@@ -12,6 +12,7 @@ from simple_model.load_spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models import named
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
+from skinwave.models.prepared import Prepared
 from skinwave.planning.extent import PlanRow
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import over_tolerance
@@ -39,7 +40,7 @@ def with_series(found: "Plan", scene: Scene, tolerance: float) -> "Plan":
     if not solids or not named(found.model).takes_series(scene.body):
         return found
     allowed = series_tolerance(tolerance)
-    error = series_error(scene, found.model, tolerance)
+    error = series_error(scene, found.model, tolerance, found.prepared)
     rows = tuple(
         PlanRow(
             what="modulus law",
@@ -59,7 +60,9 @@ def with_series(found: "Plan", scene: Scene, tolerance: float) -> "Plan":
     )  # fmt: skip
 
 
-def series_error(scene: Scene, model: str, tolerance: float) -> float:
+def series_error(
+    scene: Scene, model: str, tolerance: float, prepared: Prepared | None = None
+) -> float:
     """Relative error of the probes' motion by Prony series in place of modulus laws.
 
     Parameters
@@ -67,6 +70,7 @@ def series_error(scene: Scene, model: str, tolerance: float) -> float:
     scene : Scene
     model : name of the model
     tolerance : relative error that is asked for
+    prepared : Prepared, of the body and the probes of the scene on any mesh, if there is one
 
     Returns
     -------
@@ -79,7 +83,7 @@ def series_error(scene: Scene, model: str, tolerance: float) -> float:
     if known.is_infinite:
         return _moved(scene, allowed, worst)
     # A modulus that is off by d shifts natural frequencies by d / 2; at rest motion goes by d.
-    return worst * max(1.0, sensitivity(scene).value / 2)
+    return worst * max(1.0, sensitivity(scene, prepared).value / 2)
 
 
 def _deviation(solid: Material, pressure: MovingPressure, allowed: float) -> float:
