@@ -29,6 +29,7 @@ import numpy as np
 from simple_model.layers import Stack
 from simple_model.material import Complex, Floats, Material
 
+THIN = 0.3  # thickness times wavenumber below which differences of exponentials lose digits
 NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
 BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
 WEAKEST = (
@@ -61,8 +62,18 @@ class Impedances(NamedTuple):
 
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
-    """Displacement (f, k) in m/Pa of the surface into the stack per pressure; of a free one about
-    its mean, which has no bound: 0 at w = 0.
+    """Displacement of the surface into the stack per pressure; of a free stack, which has no bound
+    at rest, about its mean: 0 at w = 0.
+
+    Parameters
+    ----------
+    stack : Stack
+    k : (k,) complex, 1/m, with a real part above 0
+    w : (f, 1) rad/s, with an imaginary part <= 0
+
+    Returns
+    -------
+    (f, k) complex, m/Pa
     """
     a, b, c = _impedances(stack, k, w).surface
     return _about_mean(stack, w, a / (a * c - b * b))
@@ -257,41 +268,47 @@ def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex
     Layer, of arrays (f, k)
     """
     mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
-    k2, ks2 = k * k, material.density * w**2 / mu
+    k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k
     p, s = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)
-    ps, both = p * s, p + s
+    over_p, over_s, over_sum = 1 / p, 1 / s, 1 / (p + s)
     # Of exp(-p H) and exp(-s H), what they lack of 1, which is next to nothing in a thin layer.
     lp, ls = _lacking(p, thickness), _lacking(s, thickness)
     ep, es = 1 - lp, 1 - ls
-    lp2, ls2 = lp * (1 + ep), ls * (1 + es)
-    mean = (ep + es) / 2
-    apart = _difference_quotient(ep, es, mean, (1 - kappa) * ks2 / both, thickness)
+    lp2, ls2, lacking = lp * (1 + ep), ls * (1 + es), lp + ls * ep
+    mean, slope = (ep + es) / 2, (1 - kappa) * over_sum  # slope = (p - s) / k_s^2
+    apart = _difference_quotient(ep, es, mean, slope * ks2, thickness)
     # Times exp(-(p + s) H) each: S_p S_s, D / k_s^4, (C_p S_s - C_s S_p) / k_s^2, (S_p - S_s) /
-    # k_s^2 and (C_p - C_s) / k_s^2.
-    sp, ss = lp2 / (2 * p), ls2 / (2 * s)
-    q, turn, half = 1 + kappa - kappa * ks2 / k2, (1 - kappa) * apart / both, (1 - kappa) / (2 * ps)
-    spss = sp * ss
-    over = mu / ((q * k2 / (k2 + ps)) ** 2 * spss / k2 - turn * turn)
-    lacking = lp + ls - lp * ls
-    cross = half * ((lp2 + ls2 - lp2 * ls2) / (2 * both) - apart * mean)
-    sines = half * ((1 - lacking / 2) * apart - lacking * mean / both)
-    cosines = lacking * turn / 2
+    # k_s^2 and (C_p - C_s) / k_s^2; S_p and S_s times k^-2.
+    sp, ss = lp2 * over_p / 2, ls2 * over_s / 2
+    spss, turn, half = sp * ss, slope * apart, (1 - kappa) / 2 * over_p * over_s
+    q = 1 + kappa - (kappa * ks2) * over_k**2
+    d = (q * k / (k2 + p * s)) ** 2 * spss - turn * turn
+    over = mu / d
+    cross = half * ((lp2 + ls2 * (1 - lp2)) * over_sum / 2 - apart * mean)
+    sines = half * ((1 - lacking / 2) * apart - lacking * mean * over_sum)
+    sp, ss = sp * over_k**2, ss * over_k**2
     top = (
-        over * (cross + kappa * (1 - ls2 / 2) * sp / k2),
-        mu * (2 * k - ks2 / (2 * k)) - over * q * spss / (2 * k),
-        over * ((1 - lp2 / 2) * ss / k2 - cross),
+        over * (cross + kappa * (1 - ls2 / 2) * sp),
+        2 * mu * k - mu * ks2 * over_k / 2 - over * q * spss * (over_k / 2),
+        over * ((1 - lp2 / 2) * ss - cross),
     )
     across = (
-        over * (sines - kappa * sp * es / k2),
-        over * cosines / k,
-        -over * (sines + ss * ep / k2),
+        over * (sines - kappa * sp * es),
+        over * lacking * turn * (over_k / 2),
+        -over * (sines + ss * ep),
     )
     return Layer(top, across)
 
 
 def _lacking(p: Complex, thickness: float) -> Complex:
     """1 - exp(-p H)."""
-    return np.asarray(-np.expm1(-thickness * p)) if isfinite(thickness) else np.ones_like(p)
+    if not isfinite(thickness):
+        return np.ones_like(p)
+    x = -thickness * p
+    lacking = 1 - np.exp(x)
+    thin = np.abs(x.real) + np.abs(x.imag) < THIN
+    lacking[thin] = -np.expm1(x[thin])  # which takes twice as long
+    return np.asarray(lacking)
 
 
 def _difference_quotient(
@@ -303,6 +320,10 @@ def _difference_quotient(
     if not isfinite(thickness):
         return np.zeros_like(mean)
     x2 = (apart * (thickness / 2)) ** 2
-    nearly = np.abs(x2) < NEARLY**2
+    nearly = np.abs(x2.real) + np.abs(x2.imag) < NEARLY**2
+    if not nearly.any():
+        return np.asarray((es - ep) / apart)
     series = 1 - x2 * (1 / 3 - x2 * (2 / 15 - x2 * (17 / 315 - x2 * (62 / 2835))))
-    return np.where(nearly, mean * thickness * series, (es - ep) / np.where(nearly, 1, apart))
+    found = thickness * mean * series
+    np.divide(es - ep, apart, out=found, where=~nearly)
+    return np.asarray(found)

@@ -12,6 +12,7 @@ from simple_model.flat_quantities import from_rest, quantity_field, steady, surf
 from simple_model.wavenumber_integral import Field
 from skinwave.bodies.analytic import exact_waves, stack
 from skinwave.models import Model, Request, register
+from skinwave.models.laws import has_table
 from skinwave.scene import Scene
 
 
@@ -66,6 +67,7 @@ FLAT_BODY = register(
         colour="#009E73",
         reads=lambda scene: True,
         is_infinite=True,
+        takes_series=has_table,
     )
 )
 HARMONIC = register(

@@ -17,6 +17,7 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.models.full import assembled, meshed, spent
+from skinwave.models.laws import relaxing
 from skinwave.models.loads import line_factor, probe_rows, surface_load
 from skinwave.models.reduction import (
     BAND,
@@ -31,6 +32,7 @@ from skinwave.models.reduction import (
 from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
+SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = 2  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points")
@@ -93,7 +95,7 @@ def prepare(
     -------
     `Prepared`
     """
-    clock = Clock()
+    clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
     (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
     outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
