@@ -117,8 +117,18 @@ def relaxation(material: Material, s: Any) -> Any:
 
 
 def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
-    """Stress (t, ...) from rest in steps of dt in s, of the stress at rest's moduli (t, ...): the
-    `relaxation` in time, with rates by a cubic spline and branches exact for linear pieces.
+    """Stress from rest by the `relaxation` in time, with rates by a cubic spline, and branches exact
+    between samples where stress is linear.
+
+    Parameters
+    ----------
+    stress : (t, ...) float, Pa, by the moduli at rest
+    dt : float, s, between samples, the first of which is at rest
+    material : Material
+
+    Returns
+    -------
+    (t, ...) float, Pa
 
     Raises
     ------
@@ -145,7 +155,16 @@ def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
 def materials_at(
     mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
 ) -> tuple[Material, ...]:
-    """Material at each of the points (p, 3) in metre; raises what `locate` does."""
+    """Material at each of some points.
+
+    Parameters
+    ----------
+    mesh, material, points : as for `strain_operator`; raises what `locate` does
+
+    Returns
+    -------
+    p materials
+    """
     materials, region = by_region(mesh, material)
     return tuple(materials[r] for r in region[locate(mesh, points)[0]])
 

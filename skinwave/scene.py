@@ -34,7 +34,7 @@ PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """What probes read: the name of a quantity, and the depth in metre of each; () for all at the
+    """Name of the quantity that probes read, and the depth in metre of each; () for all at the
     surface.
     """
 
@@ -174,7 +174,7 @@ class Scene:
 
     @property
     def reading(self) -> Reading:
-        """What the probes read."""
+        """Quantity of the probes, and their depths."""
         return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
 
 

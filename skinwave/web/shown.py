@@ -38,6 +38,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "body_layers": [],
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
+        "lines_unit": "µm",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -48,7 +49,10 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
     span = plots.span_of(state.span, tacton.duration)
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
-        "spectrum_plot": plots.spectrum_plot(curves, state.highest),
+        "spectrum_plot": plots.spectrum_plot(
+            curves, state.highest, with_threshold=scene.reading.is_plain
+        ),
+        "lines_unit": scene.reading.asked.shown,
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
@@ -152,7 +156,7 @@ def foci(state: Any, scene: Scene) -> None:
 def _map(answer: Answer | None) -> dict[str, Any]:
     if answer is None:
         return {"picture": "", "threshold": "", "ends": []}
-    found, unit = answer.map, answer.response.unit
+    found, unit = answer.map, "m" if answer.response.record.of_body else "Pa"
     return {
         "picture": drawings.picture(found),
         "threshold": drawings.drawn(found.threshold),
