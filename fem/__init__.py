@@ -48,7 +48,14 @@ from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
-from fem.stress import materials_at, relaxation, relaxed, strain_operator, stress_operator
+from fem.stress import (
+    materials_at,
+    nodal_strain,
+    relaxation,
+    relaxed,
+    strain_operator,
+    stress_operator,
+)
 from fem.transient import Diverged, State, at_rest, transient
 from simple_model.material import PRESETS, Material, PronyTerm, from_young, of_law, tabulated
 
@@ -91,6 +98,7 @@ __all__ = [
     "materials_at",
     "mean_power",
     "modes",
+    "nodal_strain",
     "nonlinear",
     "of_law",
     "on_surface",

@@ -22,14 +22,14 @@ from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 from fem.assembly import LOSS_BAND, by_region, direct_part, elements_of
-from fem.elements import shape_functions, tetrahedron_rule
+from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
 from fem.materials import Material, rayleigh_damping
 from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints
+from meshes.tetmesh import EDGES, Floats, Ints
 from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
@@ -102,6 +102,34 @@ def stress_operator(
     return moduli @ strain_operator(mesh, material, points)
 
 
+def nodal_strain(points: Floats, tets: Ints, u: Floats) -> Floats:
+    """Strain at all nodes for pictures: the mean of the elements around each, by their volumes. At
+    the surface and between materials it is less accurate than `strain_operator`.
+
+    Parameters
+    ----------
+    points : (n, 3) float, metre
+    tets : (e, a) int
+    u : (n, 3) float, metre
+
+    Returns
+    -------
+    (n, 6) float; components xx, yy, zz, xy, xz, yz
+    """
+    nodes = tets.shape[1]
+    corners = np.eye(4)
+    at = np.vstack([corners, corners[EDGES].mean(axis=1)])[:nodes]
+    derivatives, places = shape_derivatives(at, nodes), points[tets]
+    tangents = np.einsum("qad,eai->eqdi", derivatives, places)
+    along = np.einsum("qad,eaj->eqdj", derivatives, u[tets])
+    slopes = np.linalg.solve(tangents, along)  # (e, q, i, j), of u_j along i
+    strain = np.einsum("cij,eqij->eqc", SYMMETRIC, slopes)
+    volumes = np.repeat(np.abs(np.linalg.det(tangents[:, 0])), nodes)
+    total = [np.bincount(tets.ravel(), volumes * e.ravel(), len(points))
+             for e in np.moveaxis(strain, -1, 0)]  # fmt: skip
+    return np.stack(total, axis=1) / np.bincount(tets.ravel(), volumes, len(points))[:, None]
+
+
 def relaxation(material: Material, s: Any) -> Any:
     """Complex modulus of the assembled equations over that at rest, at complex frequencies s in
     rad/s: a loss factor is in them as the viscosity of Rayleigh's damping. A branch that is as fast
@@ -117,8 +145,8 @@ def relaxation(material: Material, s: Any) -> Any:
 
 
 def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
-    """Stress from rest by the `relaxation` in time, with rates by a cubic spline, and branches exact
-    between samples where stress is linear.
+    """Stress from rest by the `relaxation` in time, with rates by a cubic spline and branches that
+    are exact where stress is linear between samples.
 
     Parameters
     ----------

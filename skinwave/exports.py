@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.stress import nodal_strain
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import step
@@ -64,8 +65,9 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
 def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
     """`column`.pvd and a file of each of `count` frames through a period; the .pvd.
 
-    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean, the point kernel a
-    surface with `pressure_pa` about its mean.
+    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean and, but for sheets,
+    whose mesh has another thickness, its `strain` (n, 6) in ParaView's order of components, XX, YY,
+    ZZ, XY, YZ, XZ; the point kernel a surface with `pressure_pa` about its mean.
     """
     frames = np.unique(np.arange(count) * len(view.times) // count)
     names, stem = [], folder_name(view.column)  # which was read from a file
@@ -90,6 +92,9 @@ def _grid(view: View, frame: int) -> Any:
     cells = np.insert(view.tets, 0, nodes, axis=1).ravel()
     grid = pv.UnstructuredGrid(cells, np.full(len(view.tets), kinds[nodes]), view.points)
     grid["displacement_m"] = view.motion[frame]
+    if not view.scene.body.of_kind.is_plate:
+        strain = nodal_strain(view.points, view.tets, view.motion[frame])
+        grid["strain"] = strain[:, [0, 1, 2, 3, 5, 4]].astype(np.float32)
     return grid
 
 

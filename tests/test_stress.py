@@ -187,6 +187,14 @@ def test_invariants_are_those_of_the_principal_axes():
     assert ((energy_root(material) @ strain) ** 2).sum() == pytest.approx(energy)
 
 
+def test_strain_at_nodes_is_that_of_a_linear_displacement():
+    mesh = meshes.block((0.02, 0.02, 0.012), 6e-3)
+    slope = np.random.default_rng(3).standard_normal((3, 3))
+    found = fem.nodal_strain(mesh.points, mesh.tets, mesh.points @ slope.T)
+    expected = tensor((slope + slope.T) / 2)
+    np.testing.assert_allclose(found, np.tile(expected, (len(mesh.points), 1)), atol=1e-12)
+
+
 def test_four_nodes_are_refused():
     mesh = meshes.block((1.0, 1.0, 1.0), 0.5, order=1)
     with pytest.raises(ValueError, match="ten-node"):
