@@ -357,6 +357,8 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     frame = int(np.argmin(np.abs(view.times - reader.time_values[3])))
     np.testing.assert_array_equal(grid["displacement_m"], view.motion[frame])
     np.testing.assert_allclose(grid.points, view.points)
+    xx, yy, zz, *_ = grid["strain"].T
+    assert np.abs(xx + yy + zz).mean() < 0.2 * np.abs(zz).mean()  # nearly incompressible
 
 
 FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "sensation-1")
