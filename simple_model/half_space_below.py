@@ -92,12 +92,13 @@ def modes_above_half_space(
     turned = outgoing(k**2, slope) / k  # 1, or -1: then U changes its sign, too
     x = x * np.repeat(np.stack([turned, np.ones_like(k)], axis=-1), len(of.depths), axis=-1)
     k, norm = turned * k, turned * norm
+    ks2 = np.asarray(ks**2, np.complex128)
     reach = np.linspace(0, max(layers.thickness, 2 * np.pi / np.median(ks.real)), SHOWN)
     found = Found(
         squared=k**2, slope=slope, wavenumbers=k,
         residues=2 * k * x[..., len(of.depths)] ** 2 / norm,
         energy_speed=np.full(k.shape, np.inf),
-        shapes=_continued(x, ends, k, *_decay(k, np.asarray(ks**2), below.poisson, MATCHED[0]), reach),
+        shapes=_continued(x, ends, k, *_decay(k, ks2, below.poisson, MATCHED[0]), reach),
     )  # fmt: skip
     kept = {
         name: np.where(genuine.reshape(genuine.shape + (1,) * (v.ndim - 2)), v, np.nan)

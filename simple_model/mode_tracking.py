@@ -37,7 +37,7 @@ class Found:
 
 
 def tracked(found: Found, omega: Floats, most: int) -> Found:
-    """The same roots with one mode in each column, NaN where it is not found.
+    """Roots with one mode in each column, NaN where it is not found.
 
     The square of a wavenumber is smooth in frequency, at a cut-off too, and its derivative is
     known: a root continues another if the trapezoidal rule leads from it to the other, and if their

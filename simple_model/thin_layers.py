@@ -1,7 +1,7 @@
 """Modes of a stack of layers at given frequencies, by the thin-layer method.
 
-A wave u = i U(z) e^{i (w t - k x)}, w = W(z) e^{i (w t - k x)} has strains k U, W' and i (U' - k W).
-Its weak form over the depth z is the complex-symmetric quadratic pencil
+A wave with displacements i U(z) along x and W(z) downwards, times e^{i (w t - k x)}, has strains
+k U, W' and i (U' - k W). Its weak form over the depth z is the symmetric quadratic pencil
 
     (A k^2 + B k + G - w^2 M) (U, W) = 0
 
@@ -27,7 +27,8 @@ from simple_model.material import Complex, Floats
 
 ORDER = 8
 SHIFT = 0.1 + 1.0j  # of the largest squared shear wavenumber
-PER_ELEMENT = 3.0  # shear wavenumber times length, of the longest element
+PER_ELEMENT = 5.0  # shear wavenumber times length, of the longest element
+FEWEST = 2  # elements, of all layers in parts of their thickness
 MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengths over 1/|k_s|
 
 
@@ -57,7 +58,7 @@ def lobatto() -> tuple[Floats, Floats, Floats]:
     """
     top = legendre.Legendre.basis(ORDER)
     x = np.concatenate([[-1.0], np.sort(top.deriv().roots().real), [1.0]])
-    weights = 2 / (ORDER * (ORDER + 1) * top(x) ** 2)
+    weights: Floats = 2 / (ORDER * (ORDER + 1) * np.asarray(top(x), np.float64) ** 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         D = top(x)[:, None] / top(x) / (x[:, None] - x)
     D[np.diag_indices(ORDER + 1)] = 0.0
@@ -74,19 +75,21 @@ def gauss() -> tuple[Floats, Floats, Floats]:
     x, weights = legendre.leggauss(ORDER)
     basis = [legendre.legvander(at, ORDER) for at in (x, 2 * nodes - 1)]
     N = np.linalg.solve(basis[1].T, basis[0].T).T
-    return weights / 2, N, N @ D
+    return np.asarray(weights / 2, np.float64), N, N @ D
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
     """Layer of each element, and the lengths (f, e) of elements in metre at frequencies (f,)."""
     layers, lengths = [], []
+    finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))
     for k, (material, thickness) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):
         shear = np.abs(np.sqrt(material.density / material.complex_modulus(omega)) * omega)
         if np.isinf(thickness):
             layers += [k] * len(MATCHED)
             lengths += [length / shear for length in MATCHED]
         else:
-            count = max(1, ceil(float(shear.max()) * thickness / PER_ELEMENT))
+            waves = float(shear.max()) * thickness / PER_ELEMENT
+            count = ceil(max(waves, FEWEST * thickness / finite - 1e-9))
             layers += [k] * count
             lengths += [np.full(len(omega), thickness / count)] * count
     return layers, np.array(lengths, np.complex128).T
