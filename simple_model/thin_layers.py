@@ -58,7 +58,7 @@ def lobatto() -> tuple[Floats, Floats, Floats]:
     """
     top = legendre.Legendre.basis(ORDER)
     x = np.concatenate([[-1.0], np.sort(top.deriv().roots().real), [1.0]])
-    weights: Floats = 2 / (ORDER * (ORDER + 1) * np.asarray(top(x), np.float64) ** 2)
+    weights = np.array(2 / (ORDER * (ORDER + 1) * top(x) ** 2), np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         D = top(x)[:, None] / top(x) / (x[:, None] - x)
     D[np.diag_indices(ORDER + 1)] = 0.0
@@ -74,8 +74,8 @@ def gauss() -> tuple[Floats, Floats, Floats]:
     nodes, _, D = lobatto()
     x, weights = legendre.leggauss(ORDER)
     basis = [legendre.legvander(at, ORDER) for at in (x, 2 * nodes - 1)]
-    N = np.linalg.solve(basis[1].T, basis[0].T).T
-    return np.asarray(weights / 2, np.float64), N, N @ D
+    N: Floats = np.asarray(np.linalg.solve(basis[1].T, basis[0].T).T, np.float64)
+    return np.asarray(weights / 2), N, N @ D
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:

@@ -2,9 +2,10 @@
 
 A pulse of pressure on a focus at rest moves probes on the x axis. Their transfer function, motion
 over the pulse at each frequency, is transformed along x for a picture. As bodies are few
-wavelengths wide, wavenumbers are better read from a fit: a sum of Hankel functions sum_j a_j H_0^(2)(k_j r) in
-least squares beyond the focal spot, begun by the matrix pencil (Y. Hua and T. K. Sarkar, IEEE Trans
-Acoust Speech Signal Process 38:814 (1990)) and refined by variable projection.
+wavelengths wide, wavenumbers are better read from a fit: a sum of Hankel functions
+sum_j a_j H_0^(2)(k_j r) in least squares beyond the focal spot, begun by the matrix pencil (Y. Hua
+and T. K. Sarkar, IEEE Trans Acoust Speech Signal Process 38:814 (1990)) and refined by variable
+projection.
 """
 
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ FURTHEST = 60e-3  # m
 BEYOND = 1.5  # of the main lobe's radius: where a sum of modes is the motion within 0.1 %
 WAVES = 3  # at most, in a fit
 MISFIT = 0.02  # of the motion, above which a fit says nothing
+LEADS = 0.5  # of the magnitudes of all modes where the fit begins: what the strongest must have
 FAINT = 1e-3  # of the largest singular value: what is no wave of its own
 MOST_PADDED = 1024  # wavenumbers of a spectrum
 
@@ -100,8 +102,8 @@ def transfer_functions(scene: Scene, response: Response, highest: float) -> Line
     found = np.fft.rfft(response.displacement, axis=0)[kept]
     transfer = found / np.fft.rfft(pulse)[kept][:, None]
     distances = np.abs(response.probes[:, 0])
-    f = np.asarray(f[kept], np.float64)
-    return LineOfProbes(frequencies=f, distances=distances, transfer=transfer)
+    kept_f: Floats = np.asarray(f[kept], np.float64)
+    return LineOfProbes(frequencies=kept_f, distances=distances, transfer=transfer)
 
 
 def wavenumber_spectrum(line: LineOfProbes, most: float) -> tuple[Floats, Floats]:
@@ -191,8 +193,8 @@ def _matrix_pencil(signal: Complex, spacing: float) -> Complex:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Matched:
-    """The strongest propagating mode at frequencies (g,) in Hz, its wavenumber (g,) in 1/m, and the
-    nearest one (g,) that was fitted.
+    """The leading mode at frequencies (g,) in Hz, its wavenumber (g,) in 1/m, and the nearest one
+    (g,) that was fitted.
     """
 
     frequencies: Floats
@@ -208,7 +210,8 @@ class Matched:
 def matched_modes(
     curves: DispersionCurves, fitted: FittedWaves, height: float, width: float
 ) -> Matched:
-    """Modes beside fitted waves, at frequencies where a fit leaves less than 2 % of the motion.
+    """Modes beside fitted waves, at frequencies where a fit leaves less than 2 % of the motion and
+    one propagating mode has more than half of the magnitudes of all.
 
     Parameters
     ----------
@@ -222,12 +225,14 @@ def matched_modes(
     Matched
     """
     at = BEYOND * lobe_width(height)
-    size = np.array([np.where(m.is_wave, np.abs(m.amplitude(width, at)), 0) for m in curves.modes])
+    size = np.nan_to_num([np.abs(mode.amplitude(width, at)) for mode in curves.modes])
+    share = size / size.sum(axis=0)
     found = []
     for n, f in enumerate(fitted.frequencies):
-        best = int(np.argmax(size[:, n]))
+        best = int(np.argmax(share[:, n]))
+        leads = share[best, n] > LEADS and curves.modes[best].is_wave[n]
         waves = fitted.wavenumbers[n][np.isfinite(fitted.wavenumbers[n])]
-        if size[best, n] > 0 and fitted.misfit[n] < MISFIT and len(waves):
+        if leads and fitted.misfit[n] < MISFIT:
             k = curves.modes[best].wavenumbers[n]
             found.append((f, k, waves[np.argmin(np.abs(waves - k))]))
     f, k, own = np.array(found, np.complex128).reshape(-1, 3).T

@@ -244,3 +244,135 @@ def test_a_stiff_skin_on_a_softer_half_space_begins_to_leak():
 def test_frequencies_are_checked(f):
     with pytest.raises(ValueError, match="above 0 Hz and ascending"):
         dispersion_curves(Stack(materials=(SOFT,), thicknesses=(0.01,)), f)
+
+
+def scene_of(text):
+    from skinwave.scene_file import loads
+
+    return loads(text)
+
+
+CIRCLE = """
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.5
+shape = "circle"
+size_mm = 20
+speed_m_per_s = 12
+[body]
+"""
+
+
+@pytest.fixture(scope="module")
+def driven():
+    from skinwave.studies.driven_modes import driven_modes
+
+    return driven_modes(scene_of(CIRCLE + 'kind = "slab"'), spacing=24)
+
+
+def test_lines_of_a_load_are_at_their_own_frequencies_on_the_curves(driven):
+    line = driven.lines[0]
+    assert line.name == "f_d"
+    assert line.frequency == pytest.approx(12 / (pi * 0.02))
+    assert driven.curves.frequencies[line.at] == line.frequency
+    (alone,) = [m for m in dispersion_curves(
+        Stack(materials=(PRESETS["palm"],), thicknesses=(0.015,)), [line.frequency]).modes
+        if abs(m.phase_speed[0] / line.phase_speed - 1) < 1e-6]  # fmt: skip
+    assert alone.decay_length[0] == pytest.approx(line.decay_length, rel=1e-6)
+    assert line.mach_angle == pytest.approx(np.degrees(np.arcsin(line.phase_speed / 12)))
+    below = next(line for line in driven.lines if line.name == "f_d-f_AM")  # 51 Hz
+    assert (below.kind, below.mach_angle) == ("evanescent", None)
+
+
+def test_driven_mode_is_the_one_that_carries_most_of_the_motion(driven):
+    """Beyond the focal spot it leaves less of the wavenumber integral than any other wave does."""
+    line = next(line for line in driven.lines if line.name == "2f_d-f_AM")
+    at, k = 0.0232, line.at
+    ((whole,),) = point_response(
+        slab(PRESETS["palm"], 0.015), [at], [2 * pi * line.frequency], WIDTH
+    )
+    parts = {m.name: m.amplitude(WIDTH, at)[k] for m in driven.curves.modes if m.is_wave[k]}
+    left = {name: abs(whole - part) for name, part in parts.items()}
+    assert min(left, key=left.get) == line.mode.name
+    assert len(left) > 1
+
+
+def test_sentences_say_speed_decay_focus_and_cut_off(driven):
+    from skinwave.studies.dispersion_page import sentences
+
+    mode, focus, cut_off = sentences(driven)
+    assert mode.startswith("The strongest line, f_d at 191 Hz, drives most of all mode 2 (prop")
+    assert "5.95 m/s" in mode
+    assert "1/e in 18.4 mm" in mode
+    assert "2.02 times as fast: a Mach angle of 30 degrees" in focus
+    assert cut_off == "Below 84 Hz no wave propagates."
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [('kind = "palm"', "as deep as the middle of the palm, 15 mm"),
+     ('kind = "slab"\nbase = "absorbing"', "taken as a half-space of the lowest material"),
+     ('kind = "slab"\nthickness_mm = inf', "Rayleigh wave"),
+     ('kind = "sheet"', "bending wave"),
+     ('kind = "slab"\n[[body.layers]]\nthickness_mm = 1.5\nmaterial = "dermis"', "mode 1")],
+)  # fmt: skip
+def test_every_kind_of_body_with_a_depth_has_curves(body, said):
+    from skinwave.studies.dispersion_page import sentences, taken_as
+    from skinwave.studies.driven_modes import driven_modes
+
+    found = driven_modes(scene_of(CIRCLE + body), spacing=12)
+    text = " ".join([*sentences(found), *taken_as(found.scene), found.curves.modes[0].name])
+    assert said in text
+    assert all(line.decay_length > 0 for line in found.lines)
+
+
+def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
+    from skinwave.cli import main
+
+    (tmp_path / "scene.toml").write_text(CIRCLE + 'kind = "slab"')
+    out = tmp_path / "out"
+    asked = [str(tmp_path / "scene.toml"), "--modes", "3", "--highest", "300"]
+    assert main(["dispersion", *asked, "-o", str(out)]) == 0
+    assert capsys.readouterr().out.startswith("The strongest line, f_d at 191 Hz, drives")
+    header, first = (out / "dispersion.csv").read_text().splitlines()[:2]
+    assert header.split(",")[:4] == ["mode", "kind", "frequency_hz", "re_k_rad_per_m"]
+    assert first.split(",")[2] == "10"
+    page = (out / "index.html").read_text()
+    assert page.index("The strongest line") < page.index('id="dispersion"') < page.index("<table")
+    arrays = np.load(out / "dispersion.npz")
+    assert arrays["wavenumber_per_m"].shape == (3, len(arrays["frequency_hz"]))
+    assert arrays["frequency_hz"].max() == 300
+
+
+@pytest.mark.parametrize(
+    ("body", "asked", "said"),
+    [('kind = "none"', [], "take a slab of its depth and layers"),
+     ('kind = "slab"', ["--highest", "5"], "must be above 20 Hz"),
+     ('kind = "slab"', ["--highest", "nan"], "must be above 20 Hz"),
+     ('kind = "slab"', ["--modes", "0"], "outside 1..12"),
+     ('kind = "slab"\nsize_x_mm = 45', ["--model", "flat-body"], "too near to see waves")],
+)  # fmt: skip
+def test_command_refuses_in_one_sentence(tmp_path, capsys, body, asked, said):
+    from skinwave.cli import main
+
+    (tmp_path / "scene.toml").write_text(CIRCLE + body)
+    out = str(tmp_path / "out")
+    assert main(["dispersion", str(tmp_path / "scene.toml"), "--quiet", "--out", out, *asked]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_wavenumbers_in_the_motion_are_those_of_the_modes(driven):
+    """By the wavenumber integral from rest; that of finite elements is seen the same way."""
+    from skinwave.effort import silent
+    from skinwave.studies.dispersion_page import observe
+
+    found = observe(driven, "flat-body", silent)
+    f, apart = found.matched.frequencies, found.matched.apart
+    assert len(f) > 25
+    assert apart.max() < 0.03
+    assert np.median(apart) < 0.01
+    # Both modes are seen, each where it leads.
+    assert np.ptp(found.matched.modes.real[(f > 150) & (f < 200)]) > 80

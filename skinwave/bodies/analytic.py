@@ -96,5 +96,14 @@ def stack_of(body: Body) -> Stack:
 
 
 def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of a body's layers."""
+    """Dispersion curves of a body's layers.
+
+    Parameters
+    ----------
+    body, frequencies, most : as for `dispersion`
+
+    Returns
+    -------
+    DispersionCurves
+    """
     return dispersion_curves(stack_of(body), frequencies, most=most)

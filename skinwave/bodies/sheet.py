@@ -63,7 +63,18 @@ def compliance(body: Body) -> Compliance:
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of an infinite sheet: its bending wave and near field."""
+    """Dispersion curves of an infinite sheet: its bending wave and near field.
+
+    Parameters
+    ----------
+    body : Body, a sheet
+    frequencies : (f,) float, Hz
+    most : not asked, as there are two modes
+
+    Returns
+    -------
+    DispersionCurves
+    """
     air_density = AIR_DENSITY if body.air else 0.0
     return sheet_curves(body.solid, body.depth, frequencies, air_density=air_density)
 

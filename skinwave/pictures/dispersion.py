@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter
 
 from meshes.tetmesh import Floats
@@ -21,6 +22,7 @@ PALE = 0.35  # opacity of a curve where its mode is evanescent
 ROWS = 3  # of the names of lines above the panels
 APART = 0.085  # of the axis: names nearer than this are in rows of their own
 MOST_SHAPES = 4
+OUTLINED = [Stroke(linewidth=2.4, foreground="#000000"), Normal()]  # white on any grey
 
 
 def colour(number: int) -> str:
@@ -103,8 +105,24 @@ def wavenumber_figure(
             real = np.abs(np.sqrt(squared).real)
             if wave.any():
                 ax.plot(fine, np.where(wave, real, np.nan), color=colour(n), lw=2, label=mode.name)
-        ax.plot(*ridge, "+", color="#000000", ms=6, mew=1.2, label="ridge of the spectrum")
-        ax.plot(*fitted, "o", mfc="none", color="#A33C00", ms=6, label="one wavenumber fitted")
+        ax.plot(
+            *ridge,
+            "+",
+            color="#FFFFFF",
+            ms=6,
+            mew=1.2,
+            path_effects=OUTLINED,
+            label="ridge of the spectrum",
+        )
+        ax.plot(
+            *fitted,
+            "o",
+            mfc="none",
+            color="#A33C00",
+            ms=7,
+            mew=1.4,
+            label="fitted, where one mode leads",
+        )
         ax.set(xlim=(f[0], f[-1]), ylim=(0, k[-1]), xlabel="frequency, Hz",
                ylabel="wavenumber Re k, rad/m")  # fmt: skip
         ax.set_title(title, fontsize="medium", parse_math=False)
@@ -199,7 +217,7 @@ def _legend(figure: SubFigure, curves: DispersionCurves, focus_speed: float) -> 
 
 
 def _shapes(axes: np.ndarray, curves: DispersionCurves, at: float) -> None:
-    """Displacement over depth of the least evanescent modes, each about its phase at the surface."""
+    """Displacement over depth of the least evanescent modes, in phase with the surface."""
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]
     known.sort(key=lambda n: abs(curves.modes[n].wavenumbers[number].imag))

@@ -1,6 +1,6 @@
 """Dispersion curves of a scene's body, as a page, figures and tables."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -15,7 +15,8 @@ from skinwave.bodies.analytic import dispersion
 from skinwave.effort import Progress
 from skinwave.numbers import significant
 from skinwave.pictures.dispersion import dispersion_figure, wavenumber_figure
-from skinwave.pictures.figures import png
+from skinwave.pictures.figures import REPORT, png
+from skinwave.pictures.styles import Style
 from skinwave.plain_text import csv_table
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
@@ -42,25 +43,25 @@ LINE_COLUMNS = (
     "group_speed_m_per_s", "wavelength_mm", "decay_length_mm", "focus_over_phase_speed",
     "mach_angle_deg",
 )  # fmt: skip
-HIGHEST_OBSERVED = 500.0  # Hz: faster waves do not reach beyond the focal spot
+HIGHEST_OBSERVED = 400.0  # Hz: faster waves do not reach beyond the focal spot
 CAPTION = (
     "Modes of the laterally infinite body: a strong line where energy propagates, a pale one where "
-    "the mode is evanescent (it falls to 1/e within a quarter of its wavelength, or its energy "
-    "moves at less than a twentieth of its phase speed). Dotted: the lines of the load; dashed: the "
-    "speed of the focus. With much loss the group speed is no speed of energy, and may be anything."
+    "the mode is evanescent: it falls to 1/e within a quarter of its wavelength, or its energy "
+    "moves at less than a twentieth of its phase speed. Dotted: the lines of the load; dashed: the "
+    "speed of the focus. With much loss the group speed is no speed of energy."
 )
 EXPLAINED = (
-    "The driven mode is the one that moves the surface most at the edge of the focal spot's main "
-    "lobe, of a focus at rest: the residue of its pole times the transform of the spot at its "
-    "wavenumber; its share is of the sum of all modes' magnitudes there. Where the focus runs "
-    "faster than a wave, waves pile up behind it on a straight path at the Mach angle, sin a = c/v; "
-    "on a path as small as a wavelength no such cone forms."
+    "The driven mode is, of those that propagate if any does, the one that moves the surface most "
+    "at the edge of the focal spot's main lobe, for a focus at rest: by the residue of its pole "
+    "times the transform of the spot at its wavenumber. Its share is of the sum of all modes' "
+    "magnitudes there. Where the focus is faster than a wave, waves pile up behind it at the Mach "
+    "angle, sin a = c/v, on a straight path; on one as small as a wavelength no such cone forms."
 )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Observed:
-    """Motion of a line of probes by a `model`, the waves fitted to it, and the modes beside them."""
+    """Motion of a line of probes by a `model`, the waves fitted to it, and the modes beside it."""
 
     model: str
     line: LineOfProbes
@@ -96,7 +97,7 @@ def observe(
         If the model refuses the body, or that ends too near to the focus.
     """
     scene = pulse_scene(found.scene)
-    response = compute(scene, model, 0.01, progress, h=h, solver=solver)
+    response = compute(scene, model, 0.05, progress, h=h, solver=solver)
     highest = min(float(found.curves.frequencies[-1]), HIGHEST_OBSERVED)
     line = transfer_functions(scene, response, highest)
     height = scene.pressure.height
@@ -107,7 +108,7 @@ def observe(
 
 
 def sentences(found: DrivenModes) -> list[str]:
-    """What is driven, how fast the focus is beside it, and where waves begin."""
+    """Sentences on the driven mode, the speed of the focus beside it, and the cut-off."""
     said = [_driven(found.lines[0]), *_focus(found.lines[0])] if found.lines else [
         "A constant pressure on a focus at rest has no line, and drives no wave."
     ]  # fmt: skip
@@ -118,7 +119,7 @@ def _driven(line: DrivenLine) -> str:
     start = f"The strongest line, {line.name} at {line.frequency:.0f} Hz, drives "
     away = f"falls to 1/e in {significant(1e3 * line.decay_length)} mm"
     if not line.mode.is_wave[line.at]:
-        return f"{start}no propagating wave: its largest motion, {line.mode.name}, {away}."
+        return f"{start}no propagating wave: evanescent motion, {line.mode.name}, {away}."
     wave = f"the {line.mode.name}" if " " in line.mode.name.strip("0123456789 ") else line.mode.name
     return (
         f"{start}most of all {wave} ({line.kind}), which runs at "
@@ -147,7 +148,7 @@ def _cut_on(found: DrivenModes) -> str:
 
 
 def taken_as(scene: Scene) -> list[str]:
-    """What the curves leave out of the scene's body, a sentence each."""
+    """Sentences on what the curves leave out of the scene's body."""
     body, said = scene.body, []
     if not (body.of_kind.is_layer or body.of_kind.is_plate):
         said.append(
@@ -166,35 +167,48 @@ def write(folder: Path, found: DrivenModes, observed: Observed | None) -> None:
     (folder / "dispersion.csv").write_bytes(csv_table(COLUMNS, _mode_rows(found)))
     (folder / "driven-lines.csv").write_bytes(csv_table(LINE_COLUMNS, map(_line_row, found.lines)))
     np.savez(folder / "dispersion.npz", **_arrays(found, observed))  # type: ignore[arg-type]
-    parts = [
-        document.paragraph(" ".join(sentences(found))),
-        *map(document.paragraph, taken_as(found.scene)),
-        *section_parts(found, folder),
-    ]
+
+    def picture(name: str, figure: Figure, caption: str) -> str:
+        drawn = png(figure)
+        (folder / f"{name}.png").write_bytes(drawn)
+        return document.picture(drawn, caption, name)
+
+    parts = page_parts(found, picture)
     if observed is not None:
-        drawn = png(_observed_figure(found, observed))
-        (folder / "wavenumbers.png").write_bytes(drawn)
         parts.append(document.section(
             f"Wavenumbers in the motion computed by {observed.model}",
             document.paragraph(observed_sentence(observed)),
-            document.picture(drawn, OBSERVED_CAPTION, "wavenumbers"),
+            picture("wavenumbers", _observed_figure(found, observed), OBSERVED_CAPTION),
         ))  # fmt: skip
     parts.append(document.section("The scene", document.preformatted(dumps(found.scene))))
     title = f"{found.scene.name}: waves that its body guides"
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
 
 
-def section_parts(found: DrivenModes, folder: Path | None = None) -> list[str]:
-    """Figure and table, for a page of its own or a part of another; the figure is a file, too, if
-    there is a folder.
+def page_parts(
+    found: DrivenModes, picture: Callable[[str, Figure, str], str], style: Style = REPORT
+) -> list[str]:
+    """Sentences, figure and table, for a page of their own or a part of another.
+
+    Parameters
+    ----------
+    found : DrivenModes
+    picture : makes a part of a page of a figure, with its name and caption
+    style : Style
+
+    Returns
+    -------
+    Parts of a page
     """
     lines = {line.name: line.frequency for line in found.lines}
     speed = found.lines[0].focus_speed if found.lines else 0.0
     at = found.lines[0].frequency if found.lines else float(np.median(found.curves.frequencies))
-    drawn = png(dispersion_figure(found.curves, lines, speed, at))
-    if folder is not None:
-        (folder / "dispersion.png").write_bytes(drawn)
-    parts: list[str] = [document.picture(drawn, CAPTION, "dispersion")]
+    figure = dispersion_figure(found.curves, lines, speed, at, style)
+    parts: list[str] = [
+        document.paragraph(" ".join(sentences(found))),
+        *map(document.paragraph, taken_as(found.scene)),
+        picture("dispersion", figure, CAPTION),
+    ]
     if found.lines:
         parts += [document.table(*line_table(found)), document.paragraph(EXPLAINED)]
     return parts
@@ -230,13 +244,13 @@ def observed_sentence(observed: Observed) -> str:
     """How far the fitted wavenumbers agree with the modes."""
     apart = 100 * observed.matched.apart
     if not len(apart):
-        return "No wave propagates at these frequencies."
+        return "At no frequency does one propagating mode lead."
     low, high = observed.matched.frequencies[[0, -1]]
     return (
-        f"The wavenumber fitted to the motion agrees with that of the strongest mode to "
+        f"The wavenumber fitted to the motion agrees with that of the leading mode to "
         f"{significant(float(np.median(apart)), 2)} % (median) and "
         f"{significant(float(apart.max()), 2)} % (largest) from {low:.0f} to {high:.0f} Hz, where "
-        "the mode propagates and the fit leaves less than 2 % of the motion."
+        "one propagating mode leads and the fit leaves less than 2 % of the motion."
     )
 
 

@@ -2,7 +2,8 @@
 
 A line of the load moves the surface, beyond the focal spot, by the sum of all modes at its
 frequency; the driven one is the largest of them at the edge of the spot's main lobe, for a focus at
-rest. On a path each place of the focus is such a source.
+rest, of those that carry energy if there are any. On a path each place of the focus is such a
+source.
 """
 
 from collections.abc import Sequence
@@ -123,7 +124,7 @@ def driven_modes(
     if not (isfinite(highest) and highest > 2 * LOWEST):
         raise ValueError(
             f"highest = {highest:g} Hz of dispersion curves must be above {2 * LOWEST:g} Hz and "
-            f"finite; {HIGHEST:g} Hz has all that is felt"
+            f"finite; {HIGHEST:g} Hz covers what skin perceives"
         )
     found = line_names(scene.pressure, WEAKEST, most=MOST_LINES)
     within = (found.frequencies > LOWEST) & (found.frequencies < highest)
@@ -146,22 +147,26 @@ def _driven(scene: Scene, curves: DispersionCurves, lines: LineNames) -> tuple[D
         at = int(np.argmin(np.abs(curves.frequencies - lines.frequencies[k])))
         if curves.frequencies[at] != lines.frequencies[k]:
             continue  # beyond the band
-        each = np.nan_to_num(amplitudes[:, at])
-        best = int(np.argmax(np.abs(each)))
+        size = np.nan_to_num(np.abs(amplitudes[:, at]))
+        waves = np.array([mode.is_wave[at] for mode in curves.modes])
+        best = int(np.argmax(size + waves * size.sum()))  # a wave first, if there is any
         strength = float(lines.strengths[k])
         found.append(DrivenLine(
             name=lines.names[k], frequency=float(lines.frequencies[k]), strength=strength,
-            mode=curves.modes[best], at=at, amplitude=strength * float(abs(each[best])),
-            share=float(abs(each[best]) / max(np.abs(each).sum(), 1e-300)),
+            mode=curves.modes[best], at=at, amplitude=strength * float(size[best]),
+            share=float(size[best] / max(size.sum(), 1e-300)),
             focus_speed=pressure.tacton.trajectory.speed if is_moving(pressure) else 0.0,
         ))  # fmt: skip
     return tuple(found)
 
 
 def amplitudes_of(modes: Sequence[Mode], pressure: MovingPressure) -> np.ndarray:
-    """Motion (m, f) in m/Pa of each mode at the edge of the main lobe of a focus at rest."""
+    """Motion (m, f) in m/Pa of each mode at the edge of the main lobe of a focus at rest; 0 of one
+    that falls so fast that there the spot itself moves the surface more than what it radiates.
+    """
     width, edge = spot_width(pressure.height), lobe_width(pressure.height)
-    return np.array([mode.amplitude(width, edge) for mode in modes])
+    radiated = [np.abs(mode.wavenumbers.imag) * width**2 < edge for mode in modes]
+    return np.where(radiated, [mode.amplitude(width, edge) for mode in modes], 0.0)
 
 
 def is_moving(pressure: MovingPressure) -> bool:
