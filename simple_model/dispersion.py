@@ -161,7 +161,7 @@ def dispersion_curves(
     Raises
     ------
     ValueError
-        If frequencies are not above 0 and ascending.
+        If frequencies are not above 0 and ascending, or layers are very many wavelengths thick.
     """
     f = checked_frequencies(frequencies)
     omega = 2 * np.pi * f

@@ -28,6 +28,7 @@ from simple_model.material import Complex, Floats
 ORDER = 8
 SHIFT = 0.1 + 1.0j  # of the largest squared shear wavenumber
 PER_ELEMENT = 5.0  # shear wavenumber times length, of the longest element
+MOST = 20  # elements, whose matrices are dense: some seconds for fifty frequencies
 FEWEST = 2  # elements, of all layers in parts of their thickness
 MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengths over 1/|k_s|
 
@@ -79,7 +80,13 @@ def gauss() -> tuple[Floats, Floats, Floats]:
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
-    """Layer of each element, and the lengths (f, e) of elements in metre at frequencies (f,)."""
+    """Layer of each element, and the lengths (f, e) of elements in metre at frequencies (f,).
+
+    Raises
+    ------
+    ValueError
+        If there are too many of them.
+    """
     layers, lengths = [], []
     finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))
     for k, (material, thickness) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):
@@ -92,6 +99,12 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
             count = ceil(max(waves, FEWEST * thickness / finite - 1e-9))
             layers += [k] * count
             lengths += [np.full(len(omega), thickness / count)] * count
+    if len(layers) > MOST:
+        raise ValueError(
+            f"dispersion curves up to {omega.max() / 2 / np.pi:g} Hz of layers of {1e3 * finite:g} "
+            f"mm need {len(layers)} elements in depth, the limit is {MOST}; take a half-space, "
+            "thinner or fewer layers, or lower frequencies"
+        )
     return layers, np.array(lengths, np.complex128).T
 
 
@@ -107,6 +120,11 @@ def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
     Returns
     -------
     Pencil
+
+    Raises
+    ------
+    ValueError
+        As `elements` does.
     """
     layers, length = elements(stack, omega)
     nodes, w, D = lobatto()

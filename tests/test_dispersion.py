@@ -350,6 +350,8 @@ def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
      ('kind = "slab"', ["--highest", "5"], "must be above 20 Hz"),
      ('kind = "slab"', ["--highest", "nan"], "must be above 20 Hz"),
      ('kind = "slab"', ["--modes", "0"], "outside 1..12"),
+     ('kind = "slab"\nthickness_mm = 500', [], "elements in depth, the limit is 20"),
+     ('kind = "slab"', ["--highest", "1e9"], "elements in depth, the limit is 20"),
      ('kind = "slab"\nsize_x_mm = 45', ["--model", "flat-body"], "too near to see waves")],
 )  # fmt: skip
 def test_command_refuses_in_one_sentence(tmp_path, capsys, body, asked, said):

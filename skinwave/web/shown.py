@@ -75,7 +75,10 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
 def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
     """The spectrum, or the dispersion curves of the body if it has any and they are chosen."""
     if state.third == THIRD[1] and guided.has_curves(scene.body):
-        return guided.dispersion_plot(scene, state.highest)
+        try:
+            return guided.dispersion_plot(scene, state.highest)
+        except ValueError as error:  # a body that is too deep, say
+            state.problem = str(error)
     return plots.spectrum_plot(curves, state.highest)
 
 
