@@ -63,8 +63,8 @@ def slab(material: Material, depth: float) -> Compliance:
     density, poisson = material.density, material.poisson
 
     def compliance(k: Complex, w: Complex) -> Complex:
+        mu = material.complex_modulus(w)  # at rest itself, which slow relaxation is far from
         w = np.where(np.abs(w) < LEAST_FREQUENCY, LEAST_FREQUENCY, w)
-        mu = material.complex_modulus(w)
         ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
         k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
         p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)

@@ -103,7 +103,7 @@ def wavenumber_figure(
         for n, mode in enumerate(curves.modes):
             fine, squared, wave = _fine(mode)
             real = np.abs(np.sqrt(squared).real)
-            if wave.any():
+            if wave[fine <= f[-1]].any():
                 ax.plot(fine, np.where(wave, real, np.nan), color=colour(n), lw=2, label=mode.name)
         ax.plot(
             *ridge,

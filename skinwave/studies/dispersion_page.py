@@ -234,9 +234,10 @@ def line_table(found: DrivenModes) -> tuple[list[str], list[list[str]]]:
 
 
 OBSERVED_CAPTION = (
-    "Grey: motion along x, transformed over time and place with a Hann window, as many wavelengths "
-    "as fit on the body; crosses: where it is largest. Circles: Hankel functions fitted beyond the "
-    "focal spot, the one nearest to the strongest mode. Lines: the modes."
+    "Grey: motion along x, transformed over time and place with a Hann window; crosses: where it "
+    "is largest, off a mode where another is near or the body is few wavelengths wide. Circles: of "
+    "the Hankel functions fitted beyond the focal spot the one nearest to the leading mode. Lines: "
+    "the modes that propagate."
 )
 
 

@@ -29,11 +29,13 @@ from simple_model.load_spectrum import (
     path_fourier,
     path_samples,
 )
+from simple_model.prony import FIT_TOLERANCE
 from simple_model.response import step
 from skinwave.bodies.analytic import has_exact_waves
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
+from skinwave.models.laws import relaxing
 from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times
 from skinwave.models.reduction import (
@@ -237,7 +239,7 @@ def _steady(pressure: MovingPressure) -> MovingPressure:
 
 def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     progress("mesh", 0.0)
-    size = body.of_kind.interactive_size
+    size, body = body.of_kind.interactive_size, relaxing(body, FIT_TOLERANCE)
     made = build(body, size if body.of_kind.is_plate else min(size, body.depth))
     progress("assemble", 0.0)
     return made, operators(made)
