@@ -19,11 +19,14 @@ from simple_model.material import Complex, Floats, Material
 from simple_model.mode_tracking import Found
 from simple_model.thin_layers import MATCHED, Pencil, eigenpairs, outgoing, pencil
 
-STEPS, CLOSE = 12, 1e-12  # of inverse iteration; relative change at which it ends
+STEPS, CLOSE = 10, 1e-11  # of inverse iteration; relative change at which it ends
+BESIDE = 1 + 1e-9 * (1 + 1j)  # of a root, where the matrix is not singular
 CONVERGED = 1e-9  # last relative change of a root
 MOVED = 0.05  # of the half-space's shear wavenumber: a root that moves further is none of a mode
 SAME = 1e-6  # of it: roots so near to each other are one
 NEARLY = 1e-5  # relative step of derivatives of the half-space's stiffness
+SLOWER = 0.99  # of its shear wavenumber: from there on waves are bound
+SLOWEST = 1.5  # of the largest shear wavenumber: no guided wave is slower
 SHOWN = 40  # depths in a half-space
 
 
@@ -77,9 +80,9 @@ def modes_above_half_space(
         modulus, at = mu + by * w * dmu, (1 + by) * w
         return _stiffness(k, below.density * at**2 / modulus, modulus, below.poisson)
 
-    start, x = _candidates(pencil(stack, omega, moduli), of, omega, most)
-    k, x, last = _refined(of, omega, start, x, resisting)
     ks = w * np.sqrt(below.density / mu)
+    start, x = _candidates(pencil(stack, omega, moduli), of, omega, ks, most)
+    k, x, last = _refined(of, omega, start, x, resisting)
     genuine = (np.abs(k - start) < MOVED * np.abs(ks)) & (last < CONVERGED)
     genuine &= ~_repeated(k**2, genuine, SAME * np.abs(ks) ** 2)
     ends, up, down = _ends(of), 1 + NEARLY, 1 - NEARLY
@@ -107,8 +110,13 @@ def modes_above_half_space(
     return Found(**kept), np.concatenate([of.depths, layers.thickness + reach[1:]])
 
 
-def _candidates(whole: Pencil, of: Pencil, omega: Floats, most: int) -> tuple[Complex, Complex]:
-    """Roots (f, m) of layers on a matched layer, and their motion (f, m, 2 n) in the layers."""
+def _candidates(
+    whole: Pencil, of: Pencil, omega: Floats, ks: Complex, most: int
+) -> tuple[Complex, Complex]:
+    """Roots (f, m) of layers on a matched layer, and their motion (f, m, 2 n) in the layers: those
+    slower than the shear wave (f, 1) below, which cannot be of the continuum, and those of most
+    motion in the layers.
+    """
     squared, V, W = eigenpairs(whole, omega)
     k = np.sqrt(squared)
     k = np.where(k.imag > 1e-9 * np.abs(k), -k, k)
@@ -120,6 +128,10 @@ def _candidates(whole: Pencil, of: Pencil, omega: Floats, most: int) -> tuple[Co
     share = inside.sum(axis=1) / moving.sum(axis=1)
     shortest = 2 * np.pi / of.depths[-1] + np.abs(k).min(axis=1, keepdims=True)
     share = np.where(np.abs(k.imag) < shortest, share, 0.0)
+    slowest = omega * np.sqrt(np.abs(of.M / of.Aww).max(axis=1))
+    is_bound = (np.abs(k.imag) < k.real / 2) & (k.real > SLOWER * ks.real)
+    is_bound &= k.real < SLOWEST * np.maximum(slowest[:, None], np.abs(ks))
+    share = share + is_bound
     order = np.argsort(-share, axis=1, kind="stable")[:, :most]
     x = np.concatenate([x[:, :n], x[:, len(V[0]) : len(V[0]) + n]], axis=1)
     picked = np.take_along_axis(x, order[:, None], axis=2).swapaxes(1, 2)
@@ -127,17 +139,15 @@ def _candidates(whole: Pencil, of: Pencil, omega: Floats, most: int) -> tuple[Co
 
 
 def _refined(
-    of: Pencil, omega: Floats, k: Complex, x: Complex, resisting: Callable[[Complex], Complex]
+    of: Pencil, omega: Floats, start: Complex, x: Complex, resisting: Callable[[Complex], Complex]
 ) -> tuple[Complex, Complex, Floats]:
     """Roots (f, m) of the layers on the half-space itself, from those of a matched layer, by
     inverse iteration; their motion (f, m, 2 n), and the relative change in the last step.
     """
     ends = np.ix_(_ends(of), _ends(of))
-    last = np.ones(k.shape)
+    k, last = start, np.ones(start.shape)
     for _ in range(STEPS):
-        done = last < CLOSE
-        # Of roots that are found it is taken beside them, where the matrix is not singular.
-        at = np.asarray(k * np.where(done, 1 + 1e3 * CLOSE, 1.0), np.complex128)
+        at = BESIDE * k  # where the matrix is not singular
         matrix, slope = _matrix(of, at, omega), _by_wavenumber(of, at)
         matrix[..., ends[0], ends[1]] += resisting(at)
         change = (resisting((1 + NEARLY) * at) - resisting((1 - NEARLY) * at)) / (2 * NEARLY)
@@ -145,10 +155,13 @@ def _refined(
         x = x / np.linalg.norm(x, axis=-1, keepdims=True)
         y = np.linalg.solve(matrix, slope @ x[..., None])[..., 0]
         step = 1 / (x.conj() * y).sum(axis=-1)
-        step = step * np.minimum(1, 0.2 * np.abs(k / step))  # no further than a fifth at once
-        x, last = np.asarray(y), np.where(done, last, np.abs(step / k))
-        k = np.asarray(np.where(done, k, k - step), np.complex128)
-        if done.all():
+        step = step * np.minimum(1, 0.2 * np.abs(at / step))  # no further than a fifth at once
+        new = at - step
+        lost = ~(np.abs(new - start) < np.abs(start) / 2)
+        x = np.where(lost[..., None], x, y)
+        last = np.where(lost, 1.0, np.abs(new / k - 1))
+        k = np.asarray(np.where(lost, k, new), np.complex128)
+        if (last[~lost] < CLOSE).all():
             break
     return k, x / np.linalg.norm(x, axis=-1, keepdims=True), last
 
