@@ -21,12 +21,13 @@ from simple_model.thin_layers import MATCHED, Pencil, eigenpairs, outgoing, penc
 
 STEPS, CLOSE = 10, 1e-11  # of inverse iteration; relative change at which it ends
 BESIDE = 1 + 1e-9 * (1 + 1j)  # of a root, where the matrix is not singular
-CONVERGED = 1e-9  # last relative change of a root
+CONVERGED = 1e-6  # last relative change of a root; thin layers near nu = 0.5 round off to 1e-7
 MOVED = 0.05  # of the half-space's shear wavenumber: a root that moves further is none of a mode
 SAME = 1e-6  # of it: roots so near to each other are one
 NEARLY = 1e-5  # relative step of derivatives of the half-space's stiffness
 SLOWER = 0.99  # of its shear wavenumber: from there on waves are bound
 SLOWEST = 1.5  # of the largest shear wavenumber: no guided wave is slower
+MOST_GROWTH = 50.0  # exponent of a wave that grows with depth
 SHOWN = 40  # depths in a half-space
 
 
@@ -80,8 +81,12 @@ def modes_above_half_space(
         modulus, at = mu + by * w * dmu, (1 + by) * w
         return _stiffness(k, below.density * at**2 / modulus, modulus, below.poisson)
 
-    ks = w * np.sqrt(below.density / mu)
+    ks = np.asarray(w * np.sqrt(below.density / mu), np.complex128)
     start, x = _candidates(pencil(stack, omega, moduli), of, omega, ks, most)
+    # Thin layers have next to none of the motion of a long wave, which is the half-space's own.
+    rayleigh = ks * below.shear_speed / below.rayleigh_speed
+    start = np.concatenate([rayleigh, start], axis=1)
+    x = np.concatenate([np.ones_like(x[:, :1]), x], axis=1)
     k, x, last = _refined(of, omega, start, x, resisting)
     genuine = (np.abs(k - start) < MOVED * np.abs(ks)) & (last < CONVERGED)
     genuine &= ~_repeated(k**2, genuine, SAME * np.abs(ks) ** 2)
@@ -188,7 +193,11 @@ def _shape(k: Complex, p: Complex, s: Complex, waves: Complex, depths: Floats) -
     z = depths[:, None]
     k, p, s = (x[..., None, None] for x in (k, p, s))
     a, b = (waves[..., None, None, axis] for axis in (0, 1))
-    pressure, shear = a * np.exp(-p * z), b * np.exp(-s * z)
+    # A root that is none, or leaks much, grows with depth: no further than a number holds.
+    pressure, shear = (
+        wave * np.exp(np.minimum(-(rate * z).real, MOST_GROWTH) - 1j * (rate * z).imag)
+        for wave, rate in ((a, p), (b, s))
+    )
     return np.concatenate([-k * pressure + s * shear, -p * pressure + k * shear], axis=-1)
 
 

@@ -76,7 +76,8 @@ def tracked(found: Found, omega: Floats, most: int) -> Found:
     for field in fields(found):
         values = _at(getattr(found, field.name), index)
         missing = (index < 0).reshape(index.shape + (1,) * (values.ndim - 2))
-        picked[field.name] = np.where(missing, np.nan, values)
+        none = complex(np.nan, np.nan) if np.iscomplexobj(values) else np.nan
+        picked[field.name] = np.where(missing, none, values)
     return Found(**picked)
 
 

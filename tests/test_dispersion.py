@@ -378,3 +378,16 @@ def test_wavenumbers_in_the_motion_are_those_of_the_modes(driven):
     assert np.median(apart) < 0.01
     # Both modes are seen, each where it leads.
     assert np.ptp(found.matched.modes.real[(f > 150) & (f < 200)]) > 80
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_a_thin_layer_leaves_long_waves_to_the_half_space_below(poisson):
+    """Without loss, so that bound waves are real, and with as many modes as there may be."""
+    below, thin = solid(poisson), Material(density=1000, shear_modulus=50e3, poisson=poisson)
+    stack = Stack(materials=(thin, below), thicknesses=(2e-4, inf))
+    mode = dispersion_curves(stack, [5.0, 10.0, 40.0, 160.0], most=12).modes[0]
+    assert set(mode.kinds) == {"propagating"}
+    ratio = mode.phase_speed / below.rayleigh_speed
+    assert (np.diff(ratio) > 0).all()  # shorter waves have more of it in the stiffer layer
+    assert ratio[0] == pytest.approx(1, abs=1e-3)
+    assert np.abs(mode.wavenumbers.imag).max() < 1e-9 * mode.wavenumbers.real.max()
