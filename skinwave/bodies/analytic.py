@@ -1,8 +1,12 @@
-"""Wavenumber integral of a body: which bodies have one, its compliance, and its stack of layers."""
+"""Analytic solutions of a body: its wavenumber integral, its stack of layers, and the waves that it
+guides.
+"""
 
 from math import inf
 
+from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
+from simple_model.dispersion import DispersionCurves, dispersion_curves
 from simple_model.layers import BASES, Stack
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import FLAT
@@ -52,17 +56,36 @@ def compliance(body: Body) -> Compliance:
     return body.of_kind.compliance(body)
 
 
-def stack(body: Body) -> Stack:
-    """Layers of a slab as infinite ones. An absorbing base radiates as a half-space of the
-    lowest material does, which is there instead.
+def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
+    """Dispersion curves of a laterally infinite body of the same section.
+
+    Parameters
+    ----------
+    body : Body
+    frequencies : (f,) float, Hz, above 0 and ascending
+    most : how many modes
+
+    Returns
+    -------
+    DispersionCurves
 
     Raises
     ------
     ValueError
-        If the body is no slab.
+        If its kind has none, as there is no body or it has no uniform depth.
     """
-    if not body.of_kind.is_layer:
-        raise ValueError(f"a body of kind '{body.kind}' is no stack of flat layers; take a slab")
+    if body.of_kind.dispersion is None:
+        raise ValueError(
+            f"dispersion curves are of a sheet, a slab or a palm, not of a body of kind "
+            f"'{body.kind}'; take a slab of its depth and layers"
+        )
+    return body.of_kind.dispersion(body, frequencies, most)
+
+
+def stack(body: Body) -> Stack:
+    """Layers of a body as infinite ones. An absorbing base radiates as a half-space of the
+    lowest material does, which is there instead.
+    """
     starts, materials = zip(*body.strata, strict=True)
     end = inf if body.base == "absorbing" else body.depth
     thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]
@@ -71,3 +94,17 @@ def stack(body: Body) -> Stack:
         thicknesses=tuple(thicknesses),
         base=body.base if body.base in BASES else BASES[0],
     )
+
+
+def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
+    """Dispersion curves of a body's layers.
+
+    Parameters
+    ----------
+    body, frequencies, most : as for `dispersion`
+
+    Returns
+    -------
+    DispersionCurves
+    """
+    return dispersion_curves(stack(body), frequencies, most=most)

@@ -10,6 +10,7 @@ from meshes import TetMesh, boundary_facets, palm_mesh
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats
+from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
 from skinwave.bodies.hands import depths, hand_size, support
@@ -69,6 +70,7 @@ PALM = register(
         discretise=discretise,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
+        dispersion=stack_dispersion,  # of a slab as deep as the middle of the palm
         mesh_is_cached=True,
     )
 )
