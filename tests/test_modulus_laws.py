@@ -26,10 +26,11 @@ from simple_model import (
     tabulated,
 )
 from simple_model.compliance import half_space, slab
-from simple_model.flat_body import flat_body, point_response, steady_lines, steady_state
+from simple_model.flat_body import flat_body, steady_lines, steady_state
 from simple_model.focus import spot_width
 from simple_model.load_spectrum import load_lines
 from simple_model.material import PRESETS
+from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance
 from skinwave.models.laws import relaxing
 from skinwave.scene import Body, Layer, Scene

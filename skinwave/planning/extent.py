@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simple_model.focus import spot_width
+from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.sheet import air_mass
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
@@ -48,8 +49,7 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[P
     Body, and the reason if it is not all of the scene's
     """
     body = scene.body
-    plain = body.of_kind.is_layer and body.base == "clamped" and body.is_plain
-    if not plain or body.sides != "absorbing":
+    if not is_flat_layer(body) or (body.base, body.sides) != ("clamped", "absorbing"):
         return body, []
     half = np.array([body.width, body.height]) / 2
     cut = half.copy()

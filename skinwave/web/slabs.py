@@ -3,9 +3,9 @@
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
 in which only the transform S of the focal pressure profile depends on the height: G, which takes
-the time, is cached on one grid of wavenumbers that is fine and wide enough for the narrowest
-profile. As in `simple_model.flat_body` the path of integration runs above the real axis, away from
-the poles of waves.
+the time, is cached on a grid of wavenumbers that is fine and wide enough for the narrowest profile
+of a range of heights. As in `simple_model.wavenumber_integral` the path of integration runs above
+the real axis, away from the poles of waves.
 """
 
 from dataclasses import dataclass
@@ -16,18 +16,19 @@ from scipy.special import jv
 import fem
 from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
-from simple_model.flat_body import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from simple_model.focus import spot_width
-from skinwave.bodies.analytic import compliance
+from simple_model.wavenumber_integral import AT_ONCE, INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
+from skinwave.bodies.analytic import compliance, has_exact_waves, stack
 from skinwave.effort import Progress
 from skinwave.scene import Body
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
+MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor above which motion there lasts 10 ms
 FURTHEST = 0.145  # m: from a path in one corner of the area to the other
-LOWEST = 0.02  # m: the height whose focal spot is the narrowest
+RANGES = 0.02, 0.08, 0.16  # m: heights that ranges begin at, whose focal spots are the narrowest
 ORDER = 16  # of Gauss and Legendre's rule on each panel
-FEWEST_NODES = 512  # of the wavenumber grid
+FEWEST_NODES = 256  # of the wavenumber grid
 LOOKED = 16  # every so many frequencies and distances the grid is checked at
 PHASE = "wavenumber integral of the slab"
 
@@ -54,8 +55,30 @@ class Wavenumbers:
     G: fem.Complex
 
 
-def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
-    """The compliance of a flat body on a grid that serves every height.
+def is_tabulated(body: Body) -> bool:
+    """Whether a body has a table: a wavenumber integral at real frequencies down to rest, where a
+    free slab has a rigid-body drift.
+    """
+    return has_exact_waves(body) and stack(body).is_fixed
+
+
+def lowest(height: float) -> float:
+    """Height in metre that the range of a height begins at."""
+    return max((low for low in RANGES if low <= height), default=RANGES[0])
+
+
+def wavenumbers(body: Body, low: float, progress: Progress) -> Wavenumbers:
+    """The compliance of a flat body on a grid that serves every height of a range.
+
+    Parameters
+    ----------
+    body : Body
+    low : metre, where the range begins
+    progress : is told of the phase
+
+    Returns
+    -------
+    Wavenumbers
 
     Raises
     ------
@@ -63,15 +86,26 @@ def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
         If no grid is fine enough.
     """
     progress(PHASE, 0.0)
-    answer, frequencies = compliance(body), np.arange(0.0, HIGHEST + SPACING, SPACING)
-    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(LOWEST)[::LOOKED]
-    coarse = _tabulated(_on_grid(answer, some, n), LOWEST, at)
+    answer, frequencies = compliance(body), _frequencies(body)
+    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(low)[::LOOKED]
+    coarse = _tabulated(_on_grid(answer, some, low, n), low, at)
     while n < MOST_NODES:
-        fine = _tabulated(_on_grid(answer, some, 2 * n), LOWEST, at)
+        fine = _tabulated(_on_grid(answer, some, low, 2 * n), low, at)
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
-            return _on_grid(answer, frequencies, n)
+            return _on_grid(answer, frequencies, low, n)
         coarse, n = fine, 2 * n
     raise ArithmeticError(UNRESOLVED)
+
+
+def _frequencies(body: Body) -> Floats:
+    """Frequencies in Hz of a table: with half as many above `MIDDLE` where loss lets motion last
+    a tenth of the time.
+    """
+    w = 2 * np.pi * MIDDLE
+    moduli = [solid.complex_modulus(w) for _, solid in body.strata]
+    damped = min(modulus.imag / modulus.real for modulus in moduli) > DAMPED
+    fine = np.arange(0.0, HIGHEST + SPACING, SPACING)
+    return fine[(fine <= MIDDLE) | (fine % (2 * SPACING) == 0)] if damped else fine
 
 
 def tabulate(known: Wavenumbers, height: float) -> Table:
@@ -96,19 +130,21 @@ def _tabulated(known: Wavenumbers, height: float, distances: Floats) -> fem.Comp
     return np.asarray(carried @ jv(0, k[:, None] * distances))
 
 
-def _on_grid(answer: Compliance, frequencies: Floats, n: int) -> Wavenumbers:
+def _on_grid(answer: Compliance, frequencies: Floats, low: float, n: int) -> Wavenumbers:
     w = 2 * np.pi * frequencies.astype(np.complex128)
     lift = min(1.5 / FURTHEST, answer.clearance(w))  # J0 grows by e^1.5 at most
     if not lift > 0:
         raise ArithmeticError(UNRESOLVED)
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
     # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
-    edges = 6.5 / spot_width(LOWEST) * np.linspace(0, 1, n // ORDER + 1) ** 2
+    edges = 6.5 / spot_width(low) * np.linspace(0, 1, n // ORDER + 1) ** 2
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     along = (middle[:, None] + half[:, None] * nodes).ravel()
     ramp = np.tanh(along / lift)
     k = along + 1j * lift * ramp
+    parts = max(1, len(w) * n // AT_ONCE)
     return Wavenumbers(
-        frequencies=frequencies, along=along, k=k, G=answer(k, w[:, None]),
+        frequencies=frequencies, along=along, k=k,
+        G=np.concatenate([answer(k, some) for some in np.array_split(w[:, None], parts)]),
         weights=(half[:, None] * weights).ravel() * (1 + 1j * (1 - ramp**2)),
     )  # fmt: skip
