@@ -7,7 +7,7 @@ import pytest
 
 from simple_model.compliance import half_space, slab, thin_sheet
 from simple_model.dispersion import dispersion_curves
-from simple_model.flat_body import point_response
+from simple_model.wavenumber_integral import point_response
 from simple_model.layers import Stack
 from simple_model.material import PRESETS, Material
 from simple_model.sheet_modes import sheet_curves
