@@ -81,7 +81,7 @@ def dashpots(
     """
     if share is not None:
         nodes, share = _where(nodes, share)
-    m = [materials[r] for r in region[_owners(mesh, nodes)]]
+    m = [materials[r] for r in region[owners(mesh, nodes)]]
     shear = np.array([x.density * x.shear_speed for x in m])
     squared_ratio = np.array(
         [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]
@@ -115,7 +115,7 @@ def _over_facets(mesh: TetMesh, nodes: Ints, traction: Floats) -> sparse.csr_arr
     return sparse.csr_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
-def _owners(mesh: TetMesh, nodes: Ints) -> Ints:
+def owners(mesh: TetMesh, nodes: Ints) -> Ints:
     """The tetrahedron behind each facet: the one that has all its corners."""
     n = len(mesh.points)
     corner_sets = mesh.tets[:, FACES[:, :3]].reshape(-1, 3)
