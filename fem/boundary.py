@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.load_and_probe import facet_geometry, facet_normals
@@ -34,7 +34,7 @@ class Support:
     absorbed: Floats
 
 
-def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
+def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> NDArray[np.bool_]:
     """Mask (3 n,) bool of the fixed degrees of freedom, whose displacement is 0."""
     if isinstance(fixed, str):
         fixed = {fixed: "xyz"}

@@ -13,7 +13,8 @@ from simple_model import Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
 from skinwave.bodies.analytic import has_exact_waves
 from skinwave.bodies.build import build
-from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.coat import coarsest_size
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.comparison import compare
 from skinwave.models import Request

@@ -11,6 +11,7 @@ from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.coat import coat, meshed_strata
 from skinwave.bodies.discretised import Discretised, in_layers
 from skinwave.bodies.hands import depths, hand_size, support
 
@@ -35,8 +36,13 @@ def discretise(body: Body, h: float) -> Discretised:
     coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
     mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
-    mesh, materials = in_layers(mesh, body.strata, depths(mesh))
-    return Discretised(mesh=mesh, materials=materials, support=lambda mesh: _support(body, mesh))
+    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
+    return Discretised(
+        mesh=mesh,
+        materials=materials,
+        coat=coat(body, h),
+        support=lambda mesh: _support(body, mesh),
+    )
 
 
 def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
@@ -69,6 +75,7 @@ PALM = register(
         discretise=discretise,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
+        may_be_coated=True,
         mesh_is_cached=True,
     )
 )

@@ -19,7 +19,7 @@ from skinwave.planning.estimates import (
     reflection_and_transient,
     response_spectrum,
 )
-from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
+from skinwave.planning.extent import PlanRow, coat_rows, extent, left_out, symmetry
 from skinwave.planning.refinement import Convergence, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import of_elements, over_tolerance
@@ -162,7 +162,8 @@ def _own_law(scene: Scene, asked: Model | None, h: float | None) -> Plan:
     check_mesh(scene.body, h)
     size = PlanRow(what="element size", value=f"{1e3 * h:.2f} mm", reason="as asked or by default")
     return Plan(
-        model=model.name, body=scene.body, h=h, error=np.nan, rows=(row, size),
+        model=model.name, body=scene.body, h=h, error=np.nan,
+        rows=(row, size, *coat_rows(scene.body, h)),
         warnings=(f"{said}elements of {1e3 * h:.3g} mm with smaller ones",),
     )  # fmt: skip
 
@@ -250,6 +251,7 @@ def _element_rows(
             if found.convergence is not Convergence.SINGLE_MESH
             else "the file's own, without another to compare it with",
         ),
+        *coat_rows(scene.body, found.h),
         PlanRow(
             what="reduction",
             value=f"{effort.reduced_dofs} dofs, {effort.estimate:.0e} up to {BAND:.0f} Hz",
