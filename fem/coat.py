@@ -270,5 +270,5 @@ def _summed(local: Floats, facets: Ints, n: int) -> sparse.csr_array:
 
 def _dofs(nodes: Ints) -> Ints:
     """Dofs (..., 3) of nodes (...), of a type that keeps the indices of matrices small."""
-    dofs: Ints = 3 * nodes[..., None].astype(np.int32) + np.arange(3, dtype=np.int32)
-    return dofs
+    first = 3 * nodes[..., None].astype(np.int32)
+    return np.asarray(first + np.arange(3, dtype=np.int32), np.int32)
