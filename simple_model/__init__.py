@@ -4,6 +4,7 @@ import warnings
 
 from simple_model.drive import DRIVES, DriveLaw
 from simple_model.flat_body import flat_body, steady_state
+from simple_model.flat_motion import flat_motion, steady_motion
 from simple_model.focus import (
     PressureMap,
     array_field,
@@ -12,6 +13,7 @@ from simple_model.focus import (
     relative_intensity,
 )
 from simple_model.joined import evenly, joined
+from simple_model.layers import Stack
 from simple_model.line_names import named_lines
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
 from simple_model.material import Material, ModulusTable, PronyTerm, from_young, tabulated
@@ -38,6 +40,7 @@ __all__ = [
     "Response",
     "Rhythm",
     "Signal",
+    "Stack",
     "Tacton",
     "Trajectory",
     "Unnamed",
@@ -47,6 +50,7 @@ __all__ = [
     "commanded",
     "evenly",
     "flat_body",
+    "flat_motion",
     "focal_spot",
     "from_young",
     "joined",
@@ -64,6 +68,7 @@ __all__ = [
     "resolved_lines",
     "sensation_level",
     "spectrum",
+    "steady_motion",
     "steady_state",
     "tabulated",
     "threshold",

@@ -5,10 +5,13 @@ Frequencies w are complex, in rad/s; time goes as exp(+i w t).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
 import numpy as np
 
+from simple_model.layered import clearance, surface_compliance
+from simple_model.layers import Stack
 from simple_model.material import Complex, Material
 
 
@@ -30,69 +33,37 @@ class Compliance:
 
 
 AIR_DENSITY = 1.2  # kg/m3
-LEAST_FREQUENCY = 2 * np.pi * 0.05  # rad/s that stands for 0 in a slab
-BACKWARD = 0.5  # of a layer's second resonance: where some of its modes become backward waves
+
+
+def layered(stack: Stack) -> Compliance:
+    """Stack of layers, by their stiffness matrices; a half-space alone by its closed form."""
+    if stack.thicknesses == (inf,):
+        return half_space(stack.materials[0])
+    return Compliance(partial(surface_compliance, stack), partial(clearance, stack))
+
+
+def slab(material: Material, depth: float) -> Compliance:
+    """Laterally infinite layer of `depth` metre bonded to a rigid base."""
+    return layered(Stack(materials=(material,), thicknesses=(depth,)))
 
 
 def half_space(material: Material, *, poisson: float | None = None) -> Compliance:
-    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
+    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, where k_s^2 is
+    divided out of both, so that it holds at rest, too; kappa = k_p^2 / k_s^2.
 
     `poisson` stands in for the material's: here it may be 0.5, incompressible.
     """
     nu = material.poisson if poisson is None else poisson
+    kappa = (0.5 - nu) / (1 - nu)
 
     def compliance(k: Complex, w: Complex) -> Complex:
         mu = material.complex_modulus(w)
-        ks2, kp2 = _squared_wavenumbers(material.density, mu, nu, w)
-        bp, bs = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
-        still = np.abs(ks2) < 1e-9 * np.abs(k) ** 2  # the closed form cancels towards rest
-        rayleigh = (2 * k**2 - ks2) ** 2 - 4 * k**2 * bp * bs
-        dynamic = -bp * ks2 / (mu * np.where(still, 1.0, rayleigh))
-        return np.where(still, (1 - nu) / (mu * k), dynamic)
+        k2, ks2 = k**2, material.density * w**2 / mu
+        bp, bs = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)
+        apart = (k2 * (1 + kappa) - kappa * ks2) / (k2 + bp * bs)  # (k^2 - b_p b_s) / k_s^2
+        return np.asarray(bp / (mu * (4 * k2 * (1 - apart) - ks2)))
 
     return Compliance(compliance)
-
-
-def slab(material: Material, depth: float) -> Compliance:
-    """Laterally infinite layer of `depth` metre bonded to a rigid base.
-
-    Potentials phi = A e^{bp z} + B e^{-bp (z + H)} and psi likewise meet zero displacement at
-    the base and unit pressure without shear at the top: four equations for each k and w, whose
-    exponentials all decay, so that no thickness overflows.
-    """
-    density, poisson = material.density, material.poisson
-
-    def compliance(k: Complex, w: Complex) -> Complex:
-        w = np.where(np.abs(w) < LEAST_FREQUENCY, LEAST_FREQUENCY, w)
-        mu = material.complex_modulus(w)
-        ks2, kp2 = _squared_wavenumbers(density, mu, poisson, w)
-        k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
-        p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
-        ep, es, one, t = np.exp(-p * depth), np.exp(-s * depth), np.ones_like(p), 2 * k**2 - ks2
-        # Rows: normal stress and shear stress at the top, both displacements at the base.
-        rows = [
-            [t, t * ep, -2 * k * s, 2 * k * s * es],
-            [2 * k * p, -2 * k * p * ep, -t, -t * es],
-            [k * ep, k, -s * es, s],
-            [p * ep, -p, -k * es, -k],
-        ]
-        matrix = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-        load = np.stack([one, 0 * one, 0 * one, 0 * one], axis=-1)[..., None]
-        a, b, c, d = np.moveaxis(np.linalg.solve(matrix, load)[..., 0], -1, 0)
-        return (p * (a - b * ep) - k * (c + d * es)) / mu
-
-    def clearance(w: Complex) -> float:
-        """Height above the real axis below which there is no pole. Backward waves, which occur from
-        somewhat below the layer's second resonance, have theirs above it by more than a shear
-        wave's decay, as they carry energy more slowly (Tolstoy and Usdin, J Acoust Soc Am 29:37
-        (1957)). Evanescent waves have theirs above 1 / depth.
-        """
-        ks2, kp2 = _squared_wavenumbers(density, material.complex_modulus(w), poisson, w)
-        turns = np.maximum(np.sqrt(ks2).real / 3, np.sqrt(kp2).real) * depth / (np.pi / 2)
-        decay = np.abs(np.sqrt(ks2).imag)
-        return float(decay[turns > BACKWARD].min(initial=1 / depth))
-
-    return Compliance(compliance, clearance)
 
 
 def thin_sheet(
@@ -136,11 +107,3 @@ def thin_sheet(
         return float(k.imag[still].min(initial=inf))
 
     return Compliance(compliance, clearance)
-
-
-def _squared_wavenumbers(
-    density: float, mu: Complex, poisson: float, w: Complex
-) -> tuple[Complex, Complex]:
-    """Squared wavenumbers k_s^2 and k_p^2 of shear and pressure waves."""
-    ks2 = density * w**2 / mu
-    return ks2, ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)

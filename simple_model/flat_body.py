@@ -1,22 +1,18 @@
-"""Wavenumber-integral solution, without a mesh, for a half-space, an infinite slab on a rigid base
-or an infinite thin sheet.
+"""Wavenumber-integral solution, without a mesh, for layers, a half-space or a thin sheet, all
+laterally infinite, under a moving focus.
 
-A pressure q displaces the surface by u = G q at each wavenumber k and complex frequency w (time
-exp(+i w t)). A focal spot S of unit pressure at the focus displaces a point at distance r by
+Where a focal spot at rest displaces a point by g(x, w) (`wavenumber_integral`; time exp(+i w t)), a
+focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
 
-    g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
-
-and a focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
-
-    u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(|x_p - X(a)|, w) exp(-2 pi i n a) da
+    u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(x_p - X(a), w) exp(-2 pi i n a) da
 
 where Q is the transform of the pressure at the focus. A recorded path may be long and run through
 once; with splines B_j(r) that interpolate g(r, w) = sum_j g_j(w) B_j(r), it moves the probe by
 
     u(w) = sum_j g_j(w) int q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
 
-The path of integration over k runs above the real axis, away from the poles of forward waves, which
-lie below it for any loss; and below those of backward waves, which lie above it.
+Displacement normal to the surface is one component, g(r) itself. A `Field` has m, each a sum of
+integrals times weights that depend on x_p - x.
 """
 
 import time
@@ -26,7 +22,6 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.special import jv
 
 from simple_model.compliance import Compliance
 from simple_model.focus import spot_width
@@ -44,62 +39,13 @@ from simple_model.pressure import MovingPressure, check_lines
 from simple_model.response import Effort, Response, step
 from simple_model.sampling import finer, highest, reached, shown, transform
 from simple_model.trajectory import Floats
+from simple_model.wavenumber_integral import Field, normal_field, point_integrals
 
 PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
 WRAPPED = 1e-5
-INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
-FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
-AT_ONCE = 2**19  # pairs of frequency and wavenumber: some hundred megabytes
+AT_ONCE = 2**19  # pairs of frequency and distance: some ten megabytes
 FEW_DISTANCES = 40  # are integrated one by one, without a spline
-UNRESOLVED = "the wavenumber integral does not converge; add some loss"
-CHECKED_EACH = 8  # batches: how often the grid is checked by halving
-BATCH = 256  # frequencies at a time
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
-
-
-def point_response(
-    compliance: Compliance,
-    distances: ArrayLike,
-    frequencies: ArrayLike,
-    width: float,
-    *,
-    negligible: float = 0.0,
-) -> Complex:
-    """Response g(r, w) to a Gaussian focal spot of 1 Pa.
-
-    Parameters
-    ----------
-    compliance : Compliance
-    distances : (r,) float, metre
-    frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
-    width : metre, standard deviation of the spot
-    negligible : a batch of frequencies that stays below this fraction of the largest response so
-        far is the last one computed; for frequencies that rise
-
-    Returns
-    -------
-    (f, r) complex, m/Pa
-
-    Raises
-    ------
-    ArithmeticError
-        If the wavenumber grid cannot be made fine enough.
-    """
-    r = np.atleast_1d(np.asarray(distances, np.float64))
-    w = np.atleast_1d(np.asarray(frequencies, np.complex128))
-    found = np.zeros((len(w), len(r)), np.complex128)
-    n, before = FEWEST_NODES, 0.0
-    for start in range(0, len(w), BATCH):
-        part = slice(start, start + BATCH)
-        lift = _lift(compliance, r, w[part], width)
-        if lift != before or start % (CHECKED_EACH * BATCH) == 0:
-            least = n if lift == before else FEWEST_NODES
-            n = _enough_nodes(compliance, r, w[part], width, lift, least)
-        before = lift
-        found[part] = _integrated(compliance, r, w[part], width, lift, n)
-        if np.abs(found[part]).max() < negligible * np.abs(found[: part.stop]).max():
-            break
-    return found
 
 
 def steady_lines(
@@ -123,18 +69,40 @@ def steady_lines(
     ValueError
         If the focus is not Gaussian, or its path recorded, or as `pressure.check_lines` does.
     """
+    f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
+    return f, amplitudes[..., 0]
+
+
+def field_lines(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
+) -> tuple[Floats, Complex]:
+    """Steady-state lines of all components of a field.
+
+    Parameters
+    ----------
+    field : Field
+    pressure, probes, threshold : as of `steady_lines`
+
+    Returns
+    -------
+    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m) of Re a exp(2 pi i f t)
+
+    Raises
+    ------
+    ValueError
+        As `steady_lines` does.
+    """
     _check(pressure)
     if pressure.tacton.trajectory.shape == "recorded":
         raise ValueError("a recorded path has no steady state; ask for its motion from rest")
-    probes = np.atleast_2d(np.asarray(probes, np.float64))
     lines = load_lines(pressure, threshold)
     f, which = np.unique(lines.frequencies, return_inverse=True)
-    distance = _distances(pressure, probes)
-    respond = _response_at(compliance, pressure, distance, 2 * np.pi * f)
-    blocks = max(1, distance.size * len(f) // AT_ONCE)
+    away = _offsets(pressure, probes)
+    respond = _response_at(field, pressure, away, 2 * np.pi * f)
+    blocks = max(1, away[..., 0].size * len(f) // AT_ONCE)
     amplitudes = [
-        path_fourier(respond(part))[which, :, lines.harmonics] * lines.coefficients[:, None]
-        for part in np.array_split(distance, min(blocks, len(distance)))
+        path_fourier(respond(part))[which, ..., lines.harmonics] * lines.coefficients[:, None, None]
+        for part in np.array_split(away, min(blocks, len(away)))
     ]
     return merge_lines(lines.frequencies, np.hstack(amplitudes))
 
@@ -197,20 +165,47 @@ def flat_body(
     ValueError
         If the focus is not Gaussian, or as `pressure.check_lines` does.
     """
-    _check(pressure)
     started = time.perf_counter()
-    probes = np.atleast_2d(np.array(probes, np.float64))
-    dt, n = step(times), len(times)
-    padded = int(PADDING * n)
+    probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
+    found = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
+    effort = {"steps": len(times), "dofs": _padded(times) // 2 + 1}
+    return _timed("flat-body", started, times, probes, found, **effort)
+
+
+def field_history(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Floats:
+    """All components of a field from rest, as `flat_body` computes them.
+
+    Parameters
+    ----------
+    field : Field
+    pressure, probes, times : as of `flat_body`
+
+    Returns
+    -------
+    (t, p, m) float
+
+    Raises
+    ------
+    ValueError
+        As `flat_body` does.
+    """
+    _check(pressure)
+    probes = np.atleast_2d(np.asarray(probes, np.float64))
+    dt, n, padded = step(times), len(times), _padded(times)
     damping = -np.log(WRAPPED) / (padded * dt)
     t = np.asarray(np.arange(padded) * dt, np.float64)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
     window = (np.arange(padded) < n) * np.exp(-damping * t)
     answered = _recorded if pressure.tacton.trajectory.shape == "recorded" else _circling
-    u = answered(compliance, pressure, probes, w, window, dt)
-    displacement = np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None])
-    effort = {"steps": n, "dofs": len(w)}
-    return _timed("flat-body", started, np.array(times), probes, displacement, **effort)
+    u = answered(field, pressure, probes, w, window, dt)
+    return np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None, None])
+
+
+def _padded(times: Floats) -> int:
+    """Samples of the transform."""
+    return int(PADDING * len(times))
 
 
 def _timed(
@@ -228,30 +223,31 @@ def _timed(
 
 
 def _circling(
-    compliance: Compliance,
+    field: Field,
     pressure: MovingPressure,
     probes: Floats,
     w: Complex,
     window: Floats,
     dt: float,
 ) -> Complex:
-    """Transform (f, p) of the probes' motion under foci that run a closed path."""
+    """Transform (f, p, m) of the field at the probes under foci that run a closed path."""
     f_d = pressure.tacton.trajectory.drawing_frequency
-    u = np.zeros((len(w), len(probes)), np.complex128)
-    h = path_fourier(_on_path(compliance, pressure, probes, w, NEGLIGIBLE))
-    orders = harmonics(h.shape[2])
-    h[:, :, orders] *= foci_harmonics(pressure, orders)
-    largest = np.abs(h).max()
+    away = _offsets(pressure, probes)
+    h = path_fourier(_response_at(field, pressure, away, w, NEGLIGIBLE)(away))
+    u = np.zeros(h.shape[:-1], np.complex128)
+    orders = harmonics(h.shape[-1])
+    h[..., orders] *= foci_harmonics(pressure, orders)
+    largest = np.abs(h).max(axis=(0, 1, 3))
     gain = cache(partial(_gain, pressure, window, dt))
     for m in orders:
-        if np.abs(h[:, :, m]).max() > 1e-7 * largest:
+        if (np.abs(h[..., m]) > 1e-7 * largest).any():
             parts = finer(highest(pressure, abs(m) * f_d), dt)
 
             def turned(late: float, m: int = m, parts: int = parts) -> Complex:
                 t, gained = gain(late, parts)
                 return gained * np.exp(2j * np.pi * m * f_d * t)
 
-            u += h[:, :, m] * transform(turned, w, dt, parts)[:, None]
+            u += h[..., m] * transform(turned, w, dt, parts)[:, None, None]
     return u
 
 
@@ -269,30 +265,39 @@ def _gain(
 
 
 def _recorded(
-    compliance: Compliance,
+    field: Field,
     pressure: MovingPressure,
     probes: Floats,
     w: Complex,
     window: Floats,
     dt: float,
 ) -> Complex:
-    """Transform (f, p) of the probes' motion under foci that run any path."""
+    """Transform (f, p, m) of the field at the probes under foci that run any path."""
     path, width = pressure.tacton.trajectory, spot_width(pressure.height)
     furthest = np.linalg.norm(probes[:, None] - path.outline, axis=2).max()
     table = _table(furthest, width)
-    g = point_response(compliance, table, w, width, negligible=NEGLIGIBLE)
+    g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
     carriers = _spline(table, np.eye(len(table)))
     parts = finer(reached(pressure), dt)
 
-    def load(late: float, probe: Floats) -> Floats:
+    def load(late: float, probe: Floats, component: int, integral: int) -> Floats:
         t, gain = _gain(pressure, window, dt, late, parts)
         phases = [np.mod(path.phase(t) + ahead, 1.0) for ahead in pressure.tacton.foci]
-        away = [np.linalg.norm(probe - path.at_phase(phase), axis=1) for phase in phases]
+        away = [probe - path.at_phase(phase) for phase in phases]
         gains = [gain * pressure.weight(phase) for phase in phases]
-        return sum(q[:, None] * carriers(r) for q, r in zip(gains, away, strict=True))
+        return sum(
+            (q * field.weights(x)[component, integral])[:, None]
+            * carriers(np.linalg.norm(x, axis=1))
+            for q, x in zip(gains, away, strict=True)
+        )
 
-    loads = [transform(partial(load, probe=probe), w, dt, parts) for probe in probes]
-    return np.stack([(g * each).sum(axis=1) for each in loads], axis=1)
+    used = np.argwhere(field.weights(np.ones((1, 2))).any(axis=-1))
+    u = np.zeros((len(w), len(probes), used[-1, 0] + 1), np.complex128)
+    for i, probe in enumerate(probes):
+        for component, integral in used:
+            loaded = partial(load, probe=probe, component=component, integral=integral)
+            u[:, i, component] += (g[integral] * transform(loaded, w, dt, parts)).sum(axis=1)
+    return u
 
 
 def _table(furthest: float, width: float) -> Floats:
@@ -314,81 +319,32 @@ def _check(pressure: MovingPressure) -> None:
         )
 
 
-def _lift(compliance: Compliance, r: Floats, w: Complex, width: float) -> float:
-    """Height above the real axis, 1/m, of the path of integration."""
-    highest = 1.5 / max(float(r.max()), 5 * width)  # J0 grows by e^1.5 at most
-    lift = min(highest, compliance.clearance(w))
-    if not lift > 0:
-        raise ArithmeticError(UNRESOLVED)
-    return lift
-
-
-def _enough_nodes(
-    compliance: Compliance, r: Floats, w: Complex, width: float, lift: float, n: int
-) -> int:
-    """The fewest wavenumbers, from n, that twice as many do not improve on."""
-    coarse = _integrated(compliance, r, w, width, lift, n)
-    while n < MOST_NODES:
-        fine = _integrated(compliance, r, w, width, lift, 2 * n)
-        if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
-            return n
-        coarse, n = fine, 2 * n
-    raise ArithmeticError(UNRESOLVED)
-
-
-def _integrated(
-    compliance: Compliance, r: Floats, w: Complex, width: float, lift: float, n: int
-) -> Complex:
-    """The wavenumber integral by Gauss-Legendre nodes on panels along the raised path."""
-    nodes, weights = np.polynomial.legendre.leggauss(16)
-    # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
-    edges = 6.5 / width * np.linspace(0, 1, n // 16 + 1) ** 2
-    half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
-    x = (middle[:, None] + half[:, None] * nodes).ravel()
-    dx = (half[:, None] * weights).ravel()
-    ramp = np.tanh(x / lift)
-    k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
-    spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
-    weight = spot * k * dk * dx / (2 * np.pi)
-    bessel = jv(0, k[:, None] * r)
-    some = np.array_split(w[:, None], max(1, len(w) * n // AT_ONCE))
-    return np.concatenate([(compliance(k, part) * weight) @ bessel for part in some])
-
-
-def _distances(pressure: MovingPressure, probes: Floats) -> Floats:
-    """Distances (p, k) in metre from the probes to knots of the path."""
-    return np.linalg.norm(probes[:, None] - path_samples(pressure), axis=2)
-
-
-def _on_path(
-    compliance: Compliance,
-    pressure: MovingPressure,
-    probes: Floats,
-    w: ArrayLike,
-    negligible: float = 0.0,
-) -> Complex:
-    """Point response g (f, p, k) from knots of the path to the probes."""
-    distance = _distances(pressure, probes)
-    return _response_at(compliance, pressure, distance, w, negligible)(distance)
+def _offsets(pressure: MovingPressure, probes: ArrayLike) -> Floats:
+    """Offsets (p, k, 2) in metre of the probes from knots of the path."""
+    return np.atleast_2d(np.asarray(probes, np.float64))[:, None] - path_samples(pressure)
 
 
 def _response_at(
-    compliance: Compliance,
+    field: Field,
     pressure: MovingPressure,
-    distance: Floats,
+    offsets: Floats,
     w: ArrayLike,
     negligible: float = 0.0,
 ) -> Callable[[Floats], Complex]:
-    """Point response g (f, ...) at any of these distances in metre: computed at each of few,
-    interpolated by a spline between many.
+    """Components (f, p, m, k) at any of these offsets (p, k, 2) in metre from the focus: integrated
+    at each of few distances, interpolated by a spline between many.
     """
     width = spot_width(pressure.height)
+    distance = np.linalg.norm(offsets, axis=-1)
     unique = np.unique(distance)
-    if len(unique) <= FEW_DISTANCES:
-        g = point_response(compliance, unique, w, width, negligible=negligible)
-        return lambda some: g[:, np.searchsorted(unique, some)]
-    table = _table(distance.max(), width)
-    spline = _spline(
-        table, point_response(compliance, table, w, width, negligible=negligible), axis=1
-    )
-    return lambda some: np.asarray(spline(some))
+    few = len(unique) <= FEW_DISTANCES
+    table = unique if few else _table(distance.max(), width)
+    g = point_integrals(field, table, w, width, negligible=negligible)
+    spline = None if few else _spline(table, g, axis=2)
+
+    def components(away: Floats) -> Complex:
+        r = np.linalg.norm(away, axis=-1)
+        integrals = spline(r) if spline else g[:, :, np.searchsorted(unique, r)]
+        return np.einsum("mcpk,cfpk->fpmk", field.weights(away), integrals)
+
+    return components

@@ -52,3 +52,8 @@ class Stack:
     def is_half_space(self) -> bool:
         """Whether the last layer is a half-space."""
         return self.thicknesses[-1] == inf
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it ends on a rigid base or a half-space."""
+        return self.base == "clamped" or self.is_half_space

@@ -13,7 +13,7 @@ from fem.materials import rayleigh_damping
 from fem.viscoelastic import LOSS_BAND
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import thin_sheet
-from simple_model.flat_body import point_response
+from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
 from skinwave.models import Request

@@ -7,8 +7,9 @@ from scipy.special import j0
 
 from simple_model import MovingPressure, Tacton, Trajectory, flat_body, point_kernel
 from simple_model.compliance import half_space, slab, thin_sheet
-from simple_model.flat_body import point_response, steady_lines
+from simple_model.flat_body import steady_lines
 from simple_model.material import PRESETS, Material
+from simple_model.wavenumber_integral import point_response
 
 FOREARM = {"density": 1000, "shear_modulus": 7.86e3, "viscosity": 5.03}
 PAPER = thin_sheet(PRESETS["paper"], 1e-4)

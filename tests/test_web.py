@@ -24,8 +24,9 @@ from simple_model import (
     sensation_level,
     spectrum,
 )
-from simple_model.flat_body import point_response, steady_lines
+from simple_model.flat_body import steady_lines
 from simple_model.focus import lobe_width, spot_width
+from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
 from skinwave.models import speeds

@@ -157,11 +157,6 @@ class Body:
         """Whether it is skin: a plate is paper."""
         return self.of_kind.discretise is not None and not self.of_kind.is_plate
 
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is of one material and lies flat under the device."""
-        return len(self.strata) == 1 and self.placement == FLAT
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyKind:

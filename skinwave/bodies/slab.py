@@ -1,7 +1,6 @@
-"""Thick slab: a layer of uniform depth, or a half-space. Its mesh and its wavenumber integral."""
+"""Thick slab: layers of uniform depth, or a half-space. Its mesh and its wavenumber integral."""
 
 from functools import partial
-from math import isfinite
 
 import numpy as np
 
@@ -9,8 +8,9 @@ from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
 from meshes.shapes.structured import check_size, with_planes
 from meshes.tetmesh import Floats
-from simple_model.compliance import Compliance, half_space, slab
+from simple_model.compliance import layered
 from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
+from skinwave.bodies.analytic import stack
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
 
@@ -49,21 +49,6 @@ def cell_layers(body: Body, h: float) -> int:
     return len(_depth_line(body, h)) - 1
 
 
-def compliance(body: Body) -> Compliance:
-    """Compliance of a slab on a rigid base, or of a half-space.
-
-    Raises
-    ------
-    ValueError
-        If its base is another.
-    """
-    if body.base != "clamped" and isfinite(body.depth):
-        raise ValueError(
-            "flat-body is for a sheet, a slab on a clamped base, or thickness_mm = inf; use fem"
-        )
-    return slab(body.solid, body.depth) if isfinite(body.depth) else half_space(body.solid)
-
-
 SLAB = register(
     BodyKind(
         name="slab",
@@ -71,7 +56,7 @@ SLAB = register(
         discretise=discretise,
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
-        compliance=compliance,
+        compliance=lambda body: layered(stack(body)),
         is_layer=True,
         is_symmetric=True,
         conforming=True,

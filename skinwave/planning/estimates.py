@@ -7,11 +7,12 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Trajectory
-from simple_model.flat_body import flat_body, point_response, steady_lines, steady_state
+from simple_model.flat_body import flat_body, steady_lines, steady_state
 from simple_model.focus import spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
-from skinwave.bodies.analytic import compliance, is_plain_layer
+from simple_model.wavenumber_integral import point_response
+from skinwave.bodies.analytic import compliance, is_flat_layer, stack
 from skinwave.scene import Body, Scene
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
@@ -32,9 +33,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     if scene.tacton.trajectory.shape == "recorded":
         lines = load_lines(scene.pressure, tolerance / 100)
         f, a = merge_lines(lines.frequencies, lines.strengths[:, None].astype(complex))
-    elif not body.solid.has_loss or (
-        not body.of_kind.is_plate and not (body.of_kind.compliance and body.base == "clamped")
-    ):
+    elif body.of_kind.compliance is None or not any(m.has_loss for _, m in body.strata):
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
@@ -79,7 +78,7 @@ def is_laterally_infinite(body: Body) -> bool:
 
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
-    return is_plain_layer(scene.body) and scene.pressure.profile == "gaussian"
+    return is_flat_layer(scene.body) and scene.pressure.profile == "gaussian"
 
 
 def reflection_and_transient(scene: Scene) -> tuple[float, float]:
@@ -120,9 +119,14 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
 
 
 def _loss_at_cut_off(body: Body) -> float:
-    """Loss tangent at the lowest cut-off of shear waves across the depth, w = pi c / 2 H."""
-    modulus = body.solid.complex_modulus(np.pi * body.solid.shear_speed / (2 * body.depth))
-    return float(modulus.imag / modulus.real)
+    """Largest loss tangent of its materials at the lowest cut-off of shear waves across the depth,
+    w = pi / 2 over their travel time.
+    """
+    layers = stack(body)
+    pairs = zip(layers.materials, layers.thicknesses, strict=True)
+    w = np.pi / 2 / sum(thickness / material.shear_speed for material, thickness in pairs)
+    moduli = [material.complex_modulus(w) for material in layers.materials]
+    return float(max(modulus.imag / modulus.real for modulus in moduli))
 
 
 def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simple_model.focus import spot_width
+from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.coat import AT, layer_name
 from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.sheet import air_mass
@@ -50,8 +51,7 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[P
     Body, and the reason if it is not all of the scene's
     """
     body = scene.body
-    plain = body.of_kind.is_layer and body.base == "clamped" and body.is_plain
-    if not plain or body.sides != "absorbing":
+    if not is_flat_layer(body) or (body.base, body.sides) != ("clamped", "absorbing"):
         return body, []
     half = np.array([body.width, body.height]) / 2
     cut = half.copy()

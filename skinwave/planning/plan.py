@@ -205,7 +205,7 @@ def _without_mesh(
         both = np.hypot(returned, start)
         asked = HARMONIC if both <= tolerance else FLAT_BODY
     model, left = asked.name, start if asked.is_steady else 0.0
-    reason = "a homogeneous flat slab without reflecting sides: wavenumber integral, no mesh"
+    reason = f"{_section(scene.body)} without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
     if left:
@@ -227,6 +227,11 @@ def _without_mesh(
         model=model, body=scene.body, highest=highest, error=float(np.hypot(returned, left)),
         seconds=asked.seconds, memory=asked.memory, rows=tuple(rows), warnings=warnings,
     )  # fmt: skip
+
+
+def _section(body: Body) -> str:
+    layers = len(body.strata)
+    return "a homogeneous flat slab" if layers == 1 else f"a flat slab of {layers} layers"
 
 
 def _element_rows(
@@ -292,16 +297,12 @@ def _why_elements(scene: Scene, returned: float) -> str:
         )
     if not body.of_kind.compliance:
         return f"a body of kind '{body.kind}' has no wavenumber integral"
-    if len(body.strata) > 1:
-        return f"{len(body.strata)} layers; the wavenumber integral is for one material"
     if body.placement != FLAT:
         return "the body is tilted or moved; the wavenumber integral is for one across the beam"
     if body.of_kind.is_plate and body.sides == "absorbing":
         return "absorbing sides of a sheet reflect in part; the wavenumber integral has no sides"
     if body.of_kind.is_plate:
         return f"the {body.sides} sides of this sheet reflect; the wavenumber integral has no sides"
-    if not has_wavenumber_solution(scene):
-        return f"its base is {body.base}; the wavenumber integral is for a clamped one or none"
     if body.sides == "absorbing":
         return "as asked; this body has a wavenumber integral, too"
     return (

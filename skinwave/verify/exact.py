@@ -11,8 +11,9 @@ import meshes
 from meshes import TetMesh
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import Compliance, half_space, slab, thin_sheet
-from simple_model.flat_body import point_response, steady_lines
+from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
+from simple_model.wavenumber_integral import point_response
 from skinwave.verify import references
 from skinwave.verify.case import Case, Plot, below, described, largest, misfit, relative
 from skinwave.verify.references import Complex, Floats

@@ -17,6 +17,7 @@ from simple_model.tacton import SHARINGS, SUPERPOSITIONS
 from simple_model.trajectory import SHAPES
 from skinwave.scene import BODIES
 from skinwave.studies.paper15 import tactons
+from skinwave.web.layer_values import layers_of
 from skinwave.web.paths import fitted, paths_of
 
 Values = dict[str, Any]
@@ -73,6 +74,7 @@ STARTS = {
     "pulses": "",
     "phases": "",
     "paths": "",
+    "layers": "",
 }
 KEYS = tuple(STARTS)
 NAMES = {key: number.label for key, number in NUMBERS.items()} | {
@@ -85,6 +87,7 @@ NAMES = {key: number.label for key, number in NUMBERS.items()} | {
     "pulses": "Rhythm, ms",
     "phases": "Phases, %",
     "paths": "Paths",
+    "layers": "Layers, mm/kPa",
 }
 MOST_PULSES = 64
 
@@ -170,7 +173,7 @@ def with_its_paths(values: Values, moved: str) -> Values:
     return values | {"paths": fitted(text, values["foci"])}
 
 
-TEXTS = {"pulses": pulses_of, "phases": phases_of, "paths": paths_of}
+TEXTS = {"pulses": pulses_of, "phases": phases_of, "paths": paths_of, "layers": layers_of}
 
 
 def to_query(values: Mapping[str, Any]) -> str:

@@ -15,11 +15,13 @@ from skinwave.web.asked import numbers
 from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, Values
 from skinwave.web.downloads import offered
 from skinwave.web.history import History
+from skinwave.web.layer_values import text_of
 from skinwave.web.paths import STARTS_AT, fitted
 from skinwave.web.session import Session, draw, put, refresh, solid, take
 
 SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
 LIKE = 20.0  # mm: paths of several foci begin no larger, to have place beside each other
+LAYER_PARTS = ("thickness", "modulus")
 LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 
 
@@ -32,7 +34,8 @@ def connect(session: Session) -> None:
     for answered, keys in watched:
         session.state.change(*keys)(_without_state(answered, session))
     for move in (
-        entered, select, restart, zoom, follow, own_path, preset, undo, redo, pin, exchange, cancel,
+        entered, select, restart, zoom, follow, own_path, own_layer, preset, undo, redo, pin,
+        exchange, cancel,
     ):  # fmt: skip
         session.server.trigger(move.__name__)(partial(move, session))
     for name, made in offered(session).items():
@@ -54,6 +57,8 @@ def turn(session: Session, given: Values, whole: bool = False) -> None:
     state = session.state
     accepted, errors, typed = _checked(session, given)
     values = session.good | accepted
+    if values["body"] != session.good["body"] and "layers" not in accepted:
+        values["layers"] = ""  # those of the body before
     for key in ("foci", "paths"):
         if key in accepted:
             values = controls.with_its_paths(values, key)
@@ -114,6 +119,17 @@ def own_path(session: Session, which: int, part: int, given: str) -> None:
         return  # left out while the change was on its way
     parts[which][part] = str(given).strip().replace(",", ".").replace("/", "")
     turn(session, {"paths": ", ".join("/".join(path) for path in parts)})
+
+
+def own_layer(session: Session, which: int, part: str, given: str) -> None:
+    """Set the "thickness" in mm or the shear "modulus" in kPa of one of the body's layers."""
+    rows, (which,) = session.state.body_layers, map(int, numbers(which))
+    if not 0 <= which < len(rows):
+        return  # of a body that is not shown any more
+    part = choose("part of a layer", str(part), LAYER_PARTS)
+    values = [{name: row[name] for name in LAYER_PARTS} for row in rows]
+    values[which][part] = str(given).strip().replace(",", ".").replace("/", "")
+    turn(session, {"layers": text_of([(row["thickness"], row["modulus"]) for row in values])})
 
 
 def select(session: Session, x: float, y: float) -> None:

@@ -18,6 +18,7 @@ from skinwave.web.controls import (
     phases_of,
     pulses_of,
 )
+from skinwave.web.layer_values import with_layers
 from skinwave.web.paths import paths_in, paths_of, text_of
 
 
@@ -43,7 +44,7 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
         sharing=values["sharing"],
         rhythm=Rhythm(pulses=pulses, ramp=values["ramp"] / 1e3) if pulses else None,
     )
-    body = own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
+    body = with_layers(body_of(values, own), values["layers"])
     pressure = MovingPressure(
         tacton=tacton,
         profile=values["profile"],
@@ -54,6 +55,11 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
         name="skinwave web", pressure=pressure, body=body,
         probes=((values["x"] / 1e3, values["y"] / 1e3),),
     )  # fmt: skip
+
+
+def body_of(values: Mapping[str, Any], own: Body | None = None) -> Body:
+    """The body that is chosen, with layers of its own; `own` is one from a file."""
+    return own if values["body"] == OWN_BODY and own else BODIES.get(values["body"], Body())
 
 
 def _one_path(values: Mapping[str, Any]) -> tuple[Trajectory, tuple[float, ...]]:

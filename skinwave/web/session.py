@@ -11,6 +11,7 @@ from skinwave.scene import Body
 from skinwave.web import controls, model, plots, scenes, shown
 from skinwave.web.controls import KEYS, STARTS, Values
 from skinwave.web.history import History
+from skinwave.web.layer_values import rows
 from skinwave.web.model import Answer
 from skinwave.web.worker import Worker
 
@@ -110,6 +111,7 @@ def refresh(session: Session) -> None:
         "busy": (state.busy or ("" if session.waves else "starting")) if waiting else "",
         "left": state.left if waiting and state.busy else "",
     })  # fmt: skip
+    state.body_layers = rows(scenes.body_of(session.good, session.own), session.good["layers"])
     draw(session)
     if waiting:
         session.ask()

@@ -36,6 +36,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
+        "body_layers": [],
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip

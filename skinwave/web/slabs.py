@@ -16,14 +16,15 @@ from scipy.special import jv
 import fem
 from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
-from simple_model.flat_body import INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from simple_model.focus import spot_width
-from skinwave.bodies.analytic import compliance
+from simple_model.wavenumber_integral import AT_ONCE, INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
+from skinwave.bodies.analytic import compliance, has_exact_waves, stack
 from skinwave.effort import Progress
 from skinwave.scene import Body
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
+MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor above which motion there lasts 10 ms
 FURTHEST = 0.145  # m: from a path in one corner of the area to the other
 LOWEST = 0.02  # m: the height whose focal spot is the narrowest
 ORDER = 16  # of Gauss and Legendre's rule on each panel
@@ -54,6 +55,13 @@ class Wavenumbers:
     G: fem.Complex
 
 
+def is_tabulated(body: Body) -> bool:
+    """Whether a body has a table: a wavenumber integral at real frequencies down to rest, which a
+    free slab that the pressure pushes ever further has not.
+    """
+    return has_exact_waves(body) and stack(body).is_fixed
+
+
 def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
     """The compliance of a flat body on a grid that serves every height.
 
@@ -63,7 +71,7 @@ def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
         If no grid is fine enough.
     """
     progress(PHASE, 0.0)
-    answer, frequencies = compliance(body), np.arange(0.0, HIGHEST + SPACING, SPACING)
+    answer, frequencies = compliance(body), _frequencies(body)
     n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(LOWEST)[::LOOKED]
     coarse = _tabulated(_on_grid(answer, some, n), LOWEST, at)
     while n < MOST_NODES:
@@ -72,6 +80,17 @@ def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
             return _on_grid(answer, frequencies, n)
         coarse, n = fine, 2 * n
     raise ArithmeticError(UNRESOLVED)
+
+
+def _frequencies(body: Body) -> Floats:
+    """Frequencies in Hz of a table: with half as many above `MIDDLE` where loss lets motion last
+    a tenth of the time.
+    """
+    w = 2 * np.pi * MIDDLE
+    moduli = [solid.complex_modulus(w) for _, solid in body.strata]
+    damped = min(modulus.imag / modulus.real for modulus in moduli) > DAMPED
+    fine = np.arange(0.0, HIGHEST + SPACING, SPACING)
+    return fine[(fine <= MIDDLE) | (fine % (2 * SPACING) == 0)] if damped else fine
 
 
 def tabulate(known: Wavenumbers, height: float) -> Table:
@@ -108,7 +127,9 @@ def _on_grid(answer: Compliance, frequencies: Floats, n: int) -> Wavenumbers:
     along = (middle[:, None] + half[:, None] * nodes).ravel()
     ramp = np.tanh(along / lift)
     k = along + 1j * lift * ramp
+    parts = max(1, len(w) * n // AT_ONCE)
     return Wavenumbers(
-        frequencies=frequencies, along=along, k=k, G=answer(k, w[:, None]),
+        frequencies=frequencies, along=along, k=k,
+        G=np.concatenate([answer(k, some) for some in np.array_split(w[:, None], parts)]),
         weights=(half[:, None] * weights).ravel() * (1 + 1j * (1 - ramp**2)),
     )  # fmt: skip

@@ -30,7 +30,6 @@ from simple_model.load_spectrum import (
     path_samples,
 )
 from simple_model.response import step
-from skinwave.bodies.analytic import has_exact_waves
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
@@ -59,7 +58,7 @@ from skinwave.web.model import (
     places,
 )
 from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
-from skinwave.web.slabs import FURTHEST, HIGHEST, Table, tabulate, wavenumbers
+from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, tabulate, wavenumbers
 
 TAIL = 0.4  # s that motion may last after the Tacton
 FINER = 4  # places of a map's table in each interval of the table
@@ -101,7 +100,7 @@ class BodyResponses:
         """The response in a scene of one probe, with the motion of the whole body if `moving`;
         raises what `simulate` does.
         """
-        if has_exact_waves(scene.body):
+        if is_tabulated(scene.body):
             gaussian_only(scene.pressure)
             height = scene.pressure.height
             known = self._keep("known", scene.body, lambda: wavenumbers(scene.body, progress))
@@ -129,7 +128,7 @@ class BodyResponses:
 def warned_of(scene: Scene, answer: Answer) -> Answer:
     """The response with the warnings of the command line, except those that need a second mesh."""
     response = answer.response
-    if has_exact_waves(scene.body) and scene.body.sides == "absorbing":
+    if is_tabulated(scene.body) and scene.body.sides == "absorbing":
         return answer  # an infinite slab, whose sides reflect nothing
     said = sentences(scene, response, h=default_size(scene.body))
     effort = replace(response.effort, warnings=said)

@@ -1,0 +1,322 @@
+"""Wavenumber solution of layers: against other codes, closed forms, and limits of itself."""
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+from numpy.polynomial.legendre import Legendre
+from scipy.integrate import quad, quad_vec
+from scipy.special import j0, j1
+
+from simple_model import (
+    Material,
+    MovingPressure,
+    Stack,
+    Tacton,
+    Trajectory,
+    flat_body,
+    flat_motion,
+    steady_motion,
+    timed_path,
+)
+from simple_model.compliance import half_space, layered, slab, thin_sheet
+from simple_model.flat_body import steady_lines
+from simple_model.flat_motion import point_motion
+from simple_model.layered import transfer
+from simple_model.material import PRESETS
+from simple_model.wavenumber_integral import point_response
+
+WIDTH = 4.35e-3
+RADII = np.arange(5) * 5e-3
+K = np.geomspace(0.3, 1400, 16)
+HERTZ = np.array([1.0, 20, 80, 140, 210, 500, 1000, 2000])
+PALM = PRESETS["palm"]
+SOFT = Material(density=1000, shear_modulus=8e3, viscosity=3.0, poisson=0.49)
+STIFF = Material(density=1000, shear_modulus=60e3, viscosity=6.0, poisson=0.49)
+ON_STIFF = Stack(materials=(SOFT, STIFF), thicknesses=(3e-3, 12e-3))
+
+
+def tissue(shear):
+    return Material(density=1000, shear_modulus=shear, viscosity=2e-4 * shear, poisson=0.4999)
+
+
+SKIN = Stack(
+    materials=(tissue(300e3), tissue(30e3), tissue(11e3), tissue(5e3)),
+    thicknesses=(0.3e-3, 1e-3, 4e-3, 9.5e-3),
+)
+
+
+def equal(material, *thicknesses, **base):
+    return Stack(materials=(material,) * len(thicknesses), thicknesses=thicknesses, **base)
+
+
+def angular(hertz):
+    return 2 * np.pi * np.atleast_1d(hertz)[:, None] + 0j
+
+
+def circling(**load):
+    path = Trajectory(shape="circle", size=0.02, speed=6)
+    return MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path), **load)
+
+
+def potentials(material, depth, k, w):
+    """Surface compliance of one layer by four potentials."""
+    mu = material.complex_modulus(w)
+    ks2 = material.density * w**2 / mu
+    kp2 = ks2 * (1 - 2 * material.poisson) / (2 - 2 * material.poisson)
+    k, ks2, kp2 = np.broadcast_arrays(k, ks2, kp2)
+    p, s = np.sqrt(k**2 - kp2), np.sqrt(k**2 - ks2)
+    ep, es, t = np.exp(-p * depth), np.exp(-s * depth), 2 * k**2 - ks2
+    matrix = np.moveaxis(
+        np.array([
+            [t, t * ep, -2 * k * s, 2 * k * s * es],
+            [2 * k * p, -2 * k * p * ep, -t, -t * es],
+            [k * ep, k, -s * es, s],
+            [p * ep, -p, -k * es, -k],
+        ]), (0, 1), (-2, -1),
+    )  # fmt: skip
+    load = np.zeros((*matrix.shape[:-1], 1))
+    load[..., 0, 0] = 1
+    a, b, c, d = np.moveaxis(np.linalg.solve(matrix, load)[..., 0], -1, 0)
+    return (p * (a - b * ep) - k * (c + d * es)) / mu
+
+
+def by_elements(stack, k, w, order=16):
+    """U and W at each interface but a rigid base, by spectral elements in depth; one k and w."""
+    roots = Legendre.basis(order).deriv().roots()
+    x = np.concatenate([[-1], roots, [1]])
+    weights = 2 / (order * (order + 1) * Legendre.basis(order)(x) ** 2)
+    values = np.array([Legendre.basis(n)(x) for n in range(order + 1)]).T
+    slopes = np.array([Legendre.basis(n).deriv()(x) for n in range(order + 1)]).T
+    derivative = slopes @ np.linalg.inv(values)
+    n = order * len(stack.materials) + 1
+    matrix = np.zeros((2 * n, 2 * n), complex)
+    for i, (m, h) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):
+        mu = m.complex_modulus(w)
+        lam = mu * 2 * m.poisson / (1 - 2 * m.poisson)
+        one, d, zero = np.eye(order + 1), derivative * 2 / h, np.zeros((order + 1, order + 1))
+        volume, along = np.hstack([k * one, d]), np.hstack([k * one, zero])
+        across, shear = np.hstack([zero, d]), np.hstack([d, -k * one])
+        q = np.diag(weights * h / 2)
+        stiff = lam * volume.T @ q @ volume + mu * shear.T @ q @ shear
+        stiff += 2 * mu * (along.T @ q @ along + across.T @ q @ across)
+        stiff -= m.density * w**2 * np.kron(np.eye(2), q)
+        nodes = i * order + np.arange(order + 1)
+        at = np.concatenate([nodes, n + nodes])
+        matrix[np.ix_(at, at)] += stiff
+    free = np.arange(2 * n)
+    if stack.base == "clamped":
+        free = free[(free != n - 1) & (free != 2 * n - 1)]
+    load = np.zeros(2 * n)
+    load[n] = 1
+    u = np.zeros(2 * n, complex)
+    u[free] = np.linalg.solve(matrix[np.ix_(free, free)], load[free])
+    return u.reshape(2, n)[:, ::order]
+
+
+@pytest.mark.parametrize("depth", [0.3e-3, 5e-3, 15e-3, 60e-3])
+@pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
+def test_one_layer_and_equal_ones_are_a_slab(poisson, depth):
+    solid = replace(PALM, poisson=poisson)
+    k, w = K + 2j, angular(HERTZ[1:])
+    one = slab(solid, depth)(k, w)
+    parts = np.array([0.01, 0.29, 0.5, 0.2]) * depth
+    np.testing.assert_allclose(layered(equal(solid, *parts))(k, w), one, rtol=1e-9)
+    worn = 1e-4 if depth < 1e-3 else 2e-8  # which cancels: of a layer less where it is thick
+    np.testing.assert_allclose(potentials(solid, depth, k, w), one, rtol=worn)
+
+
+def test_waves_of_a_layer_go_over_into_rest():
+    """Slower and slower, down to nothing, where the potentials have lost all their digits."""
+    for depth in (0.1e-3, 15e-3, 1.0):
+        w = np.array([0, 1e-9, 1e-6, 1e-3])[:, None] + 0j
+        found = slab(replace(PALM, viscosity=0.0), depth)(K + 2j, w)
+        np.testing.assert_allclose(found, np.broadcast_to(found[0], found.shape), rtol=1e-6)
+    rest = layered(equal(PALM, 1e-3, inf))(K + 0j, np.zeros((1, 1), complex))
+    np.testing.assert_allclose(rest[0], (1 - PALM.poisson) / (PALM.shear_modulus * K), rtol=1e-8)
+
+
+def test_soft_on_stiff_moves_as_published():
+    """By spectral elements in depth at each wavenumber."""
+    table = {
+        80: ([70.01, 35.42, 3.42, 1.34, 1.27], [-8.1, -7.2, 0.9, 167.5, 174.1]),
+        140: ([81.69, 44.39, 8.33, 2.33, 2.06], [-17.5, -18.0, -27.5, -80.0, -110.9]),
+        210: ([95.46, 53.24, 13.16, 9.33, 8.36], [-39.0, -45.5, -91.9, -157.4, 170.5]),
+    }
+    found = point_response(layered(ON_STIFF), RADII, [2 * np.pi * f for f in table], WIDTH)
+    for row, (size, phase) in zip(found, table.values(), strict=True):
+        np.testing.assert_allclose(1e9 * np.abs(row), size, rtol=2e-3, atol=0.005)
+        np.testing.assert_allclose(np.degrees(np.angle(row)), phase, atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("stack", "most"),
+    [
+        (SKIN, 3e-5),
+        (replace(SKIN, thicknesses=(0.1e-3, 1e-3, 4e-3, 9.5e-3)), 3e-5),
+        (replace(SKIN, base="free"), 1e-3),  # at 1 Hz, where elements lose digits
+        (
+            Stack(
+                materials=(tissue(5e3), tissue(2e6), tissue(20e3)),
+                thicknesses=(2e-3, 1e-3, 5e-3),
+            ),
+            1e-5,
+        ),
+        (ON_STIFF, 1e-6),
+    ],
+    ids=["skin", "thin", "free", "hard-inside", "soft-on-stiff"],
+)
+def test_layers_move_as_spectral_elements_in_depth_do(stack, most):
+    """At all depths, whose motion and stresses are those of what is between and below."""
+    depths = np.concatenate([[0.0], np.cumsum(stack.thicknesses)])
+    if stack.base == "clamped":
+        depths = depths[:-1]
+    found = transfer(stack, depths)(K + 0j, angular(HERTZ))
+    expected = np.empty((2, len(depths), len(HERTZ), len(K)), complex)
+    for i, hertz in enumerate(HERTZ):
+        for j, k in enumerate(K):
+            expected[:, :, i, j] = by_elements(stack, k, 2 * np.pi * hertz)[:, : len(depths)]
+    largest = np.abs(expected).max(axis=(0, 1))
+    assert (np.abs(found[:2] - expected).max(axis=(0, 1)) / largest).max() < most
+    np.testing.assert_allclose(found[2:, 0, ..., :], [-np.ones(found.shape[2:]), 0 * found[0, 0]])
+    if stack.base == "free":
+        assert np.abs(found[2:, -1]).max() < 1e-12
+
+
+def test_stresses_at_depth_are_those_of_the_motion():
+    """By Hooke's law, of differences of the motion in depth."""
+    z, h, w = 2.1e-3, 1e-6, angular([30.0, 300.0])
+    U, W, N, T = np.moveaxis(transfer(SKIN, [z - h, z, z + h])(K, w), 1, 1)
+    mu = SKIN.materials[2].complex_modulus(w)
+    lam = mu * 2 * 0.4999 / (1 - 2 * 0.4999)
+    wider = K * U[1] + (W[2] - W[0]) / (2 * h)
+    sheared = (U[2] - U[0]) / (2 * h) - K * W[1]
+    np.testing.assert_allclose(mu * sheared, T[1], rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(
+        lam * wider + 2 * mu * (W[2] - W[0]) / (2 * h), N[1], rtol=0.01, atol=1e-3
+    )
+
+
+def test_no_frequency_of_thin_stiff_skin_stands_out():
+    with np.errstate(all="raise", under="ignore"):
+        g = point_response(layered(SKIN), RADII, 2 * np.pi * np.arange(1.0, 1001.0), WIDTH)
+    turns = np.abs(np.diff(g, 4, axis=0)).max(axis=1)  # a spike of 1 % has 6 %
+    assert turns.max() < 0.03 * np.abs(g).max()
+
+
+def test_deep_layers_tend_to_the_half_space():
+    w = 2 * np.pi * np.array([60.0, 140.0, 300.0])
+    below = Stack(materials=(SOFT, STIFF), thicknesses=(3e-3, inf))
+    deep = Stack(materials=(SOFT, STIFF), thicknesses=(3e-3, 0.6))
+    one, other = (point_response(layered(s), RADII, w, WIDTH) for s in (below, deep))
+    assert np.abs(one - other).max() < 1e-4 * np.abs(one).max()
+    space = half_space(SOFT)(K + 2j, angular(HERTZ))
+    np.testing.assert_allclose(
+        layered(equal(SOFT, 2e-3, inf))(K + 2j, angular(HERTZ)), space, rtol=1e-9
+    )
+
+
+def test_a_free_stack_is_a_thin_sheet_where_it_is_thin():
+    paper = PRESETS["paper"]
+    sheet, thick = thin_sheet(paper, 5e-4, air_density=0.0), equal(paper, 1e-4, 4e-4, base="free")
+    load, probes, times = circling(), [[0.0, 0.0], [0.02, 0.0]], np.arange(200) / 4000
+    one, other = (flat_body(b, load, probes, times).displacement for b in (layered(thick), sheet))
+    assert np.abs(one - other).max() < 1e-3 * np.abs(other).max()
+    assert (layered(thick)(K + 2j, np.zeros((1, 1), complex)) == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("stack", "hertz"),
+    [
+        (SKIN, 60.0),
+        (SKIN, 400.0),
+        (ON_STIFF, 210.0),
+        (replace(ON_STIFF, materials=(replace(SOFT, viscosity=0.0), STIFF)), 700.0),
+        (Stack(materials=(SOFT, STIFF), thicknesses=(5e-3, inf)), 300.0),
+        (equal(replace(PALM, viscosity=0.5, poisson=0.35), 5e-3, 10e-3), 165.0),  # runs backwards
+    ],
+)
+def test_every_wave_of_layers_is_on_its_side_of_the_path(stack, hertz):
+    """Compared with the integral along the real axis itself."""
+    body, r = layered(stack), 0.02
+
+    def integrand(k):
+        spot = 2 * np.pi * WIDTH**2 * np.exp(-((k * WIDTH) ** 2) / 2)
+        return spot * body(np.array([k + 0j]), angular(hertz))[0, 0] * j0(k * r) * k / 2 / np.pi
+
+    expected, _ = quad_vec(integrand, 0, 6.5 / WIDTH, epsrel=1e-6, limit=500)
+    found = point_response(body, [0.0, r], [2 * np.pi * hertz], WIDTH)
+    assert found[0, 1] == pytest.approx(expected, rel=1e-4)
+
+
+def test_layers_without_any_loss_have_no_steady_state():
+    still = tuple(replace(m, viscosity=0.0) for m in ON_STIFF.materials)
+    with pytest.raises(ArithmeticError, match="add some loss"):
+        point_response(layered(replace(ON_STIFF, materials=still)), [0.0], [2e3], WIDTH)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_a_half_space_at_rest_moves_as_boussinesq_says(poisson):
+    """Both ways at a depth, under a Gaussian pressure; in layers of one material."""
+    mu, z = PALM.shear_modulus, 3e-3
+    stack = equal(replace(PALM, poisson=poisson), 2e-3, inf)
+    outwards, down = point_motion(stack, RADII, [0.0], WIDTH, depth=z)[:, 0]
+
+    def integral(bessel, part, r):
+        def integrand(k):
+            return part(k * z) * np.exp(-k * z - (k * WIDTH) ** 2 / 2) * bessel(k * r)
+
+        return WIDTH**2 / (2 * mu) * quad(integrand, 0, 8 / WIDTH, limit=200)[0]
+
+    for r, u, w in zip(RADII, outwards, down, strict=True):
+        assert w == pytest.approx(integral(j0, lambda x: 2 * (1 - poisson) + x, r), rel=1e-5)
+        assert u == pytest.approx(
+            integral(j1, lambda x: x - (1 - 2 * poisson), r), abs=1e-5 * abs(w)
+        )
+
+
+def test_all_components_at_depth_are_those_that_a_focus_makes_everywhere():
+    """By an integral over the path of what a focus at rest makes, at the probe."""
+    probe, depth, load = np.array([0.013, 0.004]), 1.5e-3, circling(drive="linear")
+    f, a = steady_motion(SKIN, load, [probe], depth=depth)
+    line = np.argmin(np.abs(f - 140))
+    knots = load.tacton.trajectory.at_phase((np.arange(240) + 0.5) / 240)
+    away = probe - knots
+    r = np.linalg.norm(away, axis=1)
+    outwards, down = point_motion(SKIN, r, [2 * np.pi * f[line]], WIDTH, depth=depth)[:, 0]
+    mean = np.mean([outwards * away[:, 0] / r, outwards * away[:, 1] / r, down], axis=1)
+    gain = load.gain(np.arange(400) / 400 / 140)
+    strength = 2 * np.mean(gain * np.exp(-2j * np.pi * np.arange(400) / 400))
+    np.testing.assert_allclose(a[line, 0], strength * mean, rtol=1e-3, atol=1e-3 * abs(mean[2]))
+
+
+def test_motion_from_rest_settles_and_is_alike_by_either_way():
+    """A circle as such, and as a recording; normal to the surface it is `flat_body`'s."""
+    load, times, probes = circling(), np.arange(600) / 4000, [[0.005, 0.0], [0.013, 0.004]]
+    found = flat_motion(SKIN, load, probes, times, depth=1.5e-3)
+    f, a = steady_motion(SKIN, load, probes, depth=1.5e-3)
+    steady = np.einsum("fpm,tf->tpm", a, np.exp(2j * np.pi * f * times[:, None])).real
+    assert np.abs(found - steady)[400:].max() < 5e-3 * np.abs(steady).max()
+    assert np.abs(found[..., 1]).max() > 0.05 * np.abs(found[..., 2]).max()
+    path = load.tacton.trajectory
+    period = 1 / path.drawing_frequency
+    recorded = timed_path(lambda t: path.at_phase(t / period % 1), period)
+    again = replace(load, tacton=replace(load.tacton, trajectory=recorded))
+    other = flat_motion(SKIN, again, probes, times, depth=1.5e-3)
+    assert np.abs(found - other).max() < 5e-3 * np.abs(found).max()
+    surface = flat_motion(SKIN, load, probes, times)[..., 2]
+    waves = flat_body(layered(SKIN), load, probes, times).displacement
+    assert np.abs(surface - waves).max() < 1e-6 * np.abs(waves).max()
+
+
+def test_a_depth_outside_the_stack_is_refused():
+    for depth in (-1e-3, 0.02, inf):
+        with pytest.raises(ValueError, match="is outside a stack of 14.8 mm"):
+            transfer(SKIN, [depth])
+
+
+def test_steady_lines_of_layers_are_linear_in_the_load():
+    load, double = circling(), circling(peak_pressure=100.0)
+    (_, a), (_, b) = (steady_lines(layered(SKIN), x, [[0.01, 0.0]]) for x in (load, double))
+    np.testing.assert_allclose(2 * a, b, rtol=1e-9)

@@ -1,0 +1,115 @@
+"""Layers of a slab in the interactive tool: as text, as sliders, and in the response."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simple_model.compliance import layered
+from simple_model.wavenumber_integral import point_response
+from skinwave.bodies.analytic import stack
+from skinwave.scene import BODIES, Body, Layer
+from skinwave.scene_file import dumps
+from skinwave.web import moves
+from skinwave.web.controls import STARTS, checked, from_query, to_query
+from skinwave.web.layer_values import layers_of, rows, with_layers
+from skinwave.web.scenes import scene_of
+from skinwave.web.slabs import is_tabulated, tabulate, wavenumbers
+
+SKIN = Body(
+    material="muscle",
+    layers=(
+        Layer(thickness=0.3e-3, material="epidermis"),
+        Layer(thickness=1e-3, material="dermis"),
+    ),
+)
+
+
+@pytest.fixture
+def session(request):
+    pytest.importorskip("trame")
+    from trame.app import get_server
+
+    from skinwave.web.serve import session_of
+
+    scene = dumps(replace(scene_of(STARTS), body=SKIN))
+    made = session_of(get_server(request.node.name, client_type="vue3"), scene)
+    made.state.ready()
+    yield made
+    made.worker.close()
+
+
+def test_layers_come_back_from_their_text():
+    shown = rows(SKIN, "")
+    assert [row["name"] for row in shown] == ["epidermis", "dermis", "muscle"]
+    text = ", ".join(f"{row['thickness']}/{row['modulus']}" for row in shown)
+    same = with_layers(SKIN, text)
+    assert (same.layers, same.material) == (SKIN.layers, SKIN.material)
+    assert same.depth == pytest.approx(SKIN.depth)
+    stiff = with_layers(SKIN, "0.5/90, 1/26.6684, 10/5.0003")
+    assert stiff.depth == pytest.approx(11.5e-3)
+    epidermis = stack(stiff).materials[0]
+    assert epidermis.shear_modulus == pytest.approx(90e3)
+    before = stack(SKIN).materials[0]
+    assert epidermis.viscosity / before.viscosity == pytest.approx(90e3 / before.shear_modulus)
+    assert rows(stiff, "")[0]["modulus"] == "90"
+    assert with_layers(BODIES["skin-slab"], "inf/25").depth == np.inf
+    assert rows(BODIES["paper-sheet"], "") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1", "layer 1: '1' is none"),
+        ("1/27, x/3", "layer 2: 'x/3' is none"),
+        ("1/nan", "a shear modulus of nan kPa is outside"),
+        ("inf/3, 1/3", "layer 1: a thickness of inf mm is outside"),
+        ("70/3", "a thickness of 70 mm is outside 0.01 to 60 mm"),
+    ],
+)
+def test_layers_that_are_none_are_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        checked("layers", text)
+    with pytest.raises(ValueError, match="2 layers are given, and this body has 3"):
+        with_layers(SKIN, "1/2, 3/4")
+    assert layers_of("") == ()
+
+
+def test_layers_are_moved_one_by_one(session):
+    assert [row["thickness"] for row in session.state.body_layers] == ["0.3", "1", "13.7"]
+    with session.state:
+        moves.own_layer(session, 1, "modulus", "40")
+    with session.state:
+        moves.own_layer(session, 0, "thickness", "0,5")
+    assert session.state.layers.startswith("0.5/45.3")
+    assert session.state.body_layers[1]["modulus"] == "40"
+    assert session.scene.body.layers[1].material.shear_modulus == pytest.approx(40e3)
+    again, refused = from_query(to_query(session.values), own=True)
+    assert (again["layers"], refused) == (session.state.layers, ())
+    with session.state:
+        moves.own_layer(session, 0, "thickness", "thick")
+    assert "'thick/45.3" in session.state.errors["layers"]
+    with session.state:
+        moves.undo(session)
+        moves.undo(session)
+    assert session.state.layers == ""
+    assert session.scene.body == SKIN
+    with session.state:
+        moves.turn(session, {"layers": "0.5/90, 1/26, 10/5"})
+        moves.turn(session, {"body": "skin-slab"})
+    assert (session.state.layers, session.state.problem) == ("", "")
+    assert len(session.state.body_layers) == 1
+    with session.state:
+        moves.own_layer(session, 2, "modulus", "40")  # of the body before
+        moves.turn(session, {"body": "paper-sheet"})
+    assert session.state.body_layers == []
+
+
+def test_the_table_of_layers_is_their_wavenumber_integral():
+    assert is_tabulated(SKIN)
+    assert not is_tabulated(replace(SKIN, base="free"))
+    table = tabulate(wavenumbers(SKIN, lambda *_: None), 0.2)
+    f, r = table.frequencies[[0, 20, 56, 120]], table.distances[[0, 10, 30]]
+    expected = point_response(layered(stack(SKIN)), r, 2 * np.pi * f, 4.35e-3)
+    found = table.g[[0, 20, 56, 120]][:, [0, 10, 30]]
+    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
