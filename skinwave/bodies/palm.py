@@ -70,7 +70,7 @@ PALM = register(
     BodyKind(
         name="palm",
         keys=("relief",),
-        presets={"palm": {"width": 0.085}},
+        presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
         discretise=discretise,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
