@@ -14,9 +14,9 @@ Shells (2004), chapter 3). The volume is meshed up to the surface with its own m
 moduli and the density are subtracted in K(z): what is left of it carries the normal stress and
 thins as the coat does, which is an effective boundary condition of first order in the thickness
 (Bovik, J Appl Mech 61:162 (1994)), with part of the second. Only the shear of the material replaced
-is too much, and that matters where a coat is a hundred times as stiff. Bending pays: without T the
-response of a palm slab under 1 mm of 300 kPa is wrong by 2.4 to 8.6 %, with it by 0.2 to 1.3 %, and
-under 0.5 mm of 4 MPa on 40 kPa by 6 to 12 % and by 0.5 to 5 % (wavenumber integrals, 0 to 400 Hz).
+is too much, and that matters where a coat is a hundred times as stiff. Bending pays: without T a
+palm slab under 1 mm of 300 kPa has errors of 2.4 to 8.6 %, with it of 0.2 to 1.3 %, and under
+0.5 mm of 4 MPa on 40 kPa 6 to 12 % and 0.5 to 5 % (wavenumber integrals, 0 to 400 Hz).
 
 T averages the slopes of all facets around a node by their areas (gradient recovery: Guo, Zhang and
 Zou, J Sci Comput 77:1670 (2018)), which is exact for quadratic displacement and needs no further
@@ -219,7 +219,7 @@ def coat_operators(
     region: Ints,
     fixed: NDArray[np.bool_],
 ) -> Matrices:
-    """What a coat adds to K, C, M and the branches of a body, on all dofs of its mesh.
+    """Contribution of a coat to K, C, M and the branches of a body, on all dofs of its mesh.
 
     Parameters
     ----------
@@ -245,15 +245,15 @@ def coat_operators(
 
     def stiffness(share: Floats) -> sparse.csr_array:
         K = coat_stiffness(surface, coat, excess(share * mu), excess(share * lam))
-        return on_mesh(surface, K, mesh.n_dofs)
+        return _on_mesh(surface, K, mesh.n_dofs)
 
     def mass(density: Floats) -> sparse.csr_array:
-        return on_mesh(surface, coat_mass(surface, coat, excess(density)), mesh.n_dofs)
+        return _on_mesh(surface, coat_mass(surface, coat, excess(density)), mesh.n_dofs)
 
     return viscoelastic(all_of_them, stiffness, mass)
 
 
-def on_mesh(surface: Surface, operator: sparse.csr_array, n_dofs: int) -> sparse.csr_array:
+def _on_mesh(surface: Surface, operator: sparse.csr_array, n_dofs: int) -> sparse.csr_array:
     """An operator (3 n, 3 n) of a surface on the dofs of the whole mesh."""
     dofs = _dofs(surface.nodes).ravel()
     part = operator.tocoo()

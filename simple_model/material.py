@@ -282,7 +282,7 @@ def _tissue(young: float) -> Material:
 
 
 PRESETS: Mapping[str, Material] = {
-    # Effective homogeneous soft tissue: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
+    # Effective homogeneous half-spaces: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
     # palms bracket the 5-8 m/s at which a moving focus is perceived as strongest.
     "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
     "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
