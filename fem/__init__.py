@@ -47,7 +47,7 @@ from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
 from fem.transient import Diverged, State, at_rest, transient
-from simple_model.material import PRESETS, Material, PronyTerm, from_young, tabulated
+from simple_model.material import PRESETS, Material, PronyTerm, from_young, of_law, tabulated
 
 __all__ = [
     "PRESETS",
@@ -87,6 +87,7 @@ __all__ = [
     "mean_power",
     "modes",
     "nonlinear",
+    "of_law",
     "on_surface",
     "poles",
     "pressure_force",

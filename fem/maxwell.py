@@ -19,7 +19,7 @@ from meshes.tetmesh import Floats
 
 NO_INTERNAL = (
     "a material with a modulus law of its own has no internal variables, which motion from rest "
-    "and reduced-order models need; give it Prony terms, or use fem-harmonic or flat-body-harmonic"
+    "and reduced-order models need; take its Prony series, material.relaxing(), or fem.harmonic"
 )
 
 

@@ -27,7 +27,7 @@ the larger space. Those further moments are then dropped: the error of the large
 unknown, because convergence may become steep or stall at any moment.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -197,31 +197,26 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 
 
 class KrylovBasis:
-    """Mass-orthonormal basis that grows; its `products` with M, C and the K_j of the Maxwell
-    branches, each formed once, and the `projected` K, C and K_j (size, size).
+    """Mass-orthonormal basis that grows, and the `projected` K, C and K_j (size, size) of the
+    Maxwell branches.
 
-    Memory is touched only as far as it is used.
+    Only the vectors are kept: their products with sparse matrices are formed where they are needed,
+    in less time than it takes to read them from memory. Memory is touched only as far as used.
     """
 
     def __init__(self, operators: Operators, most: int) -> None:
         self._branches = operators.branches
-        self._K, self._M = product(operators.K), product(operators.M)
-        others = [operators.C, *(branch.K for branch in operators.branches)]
-        self._others = [product(other) for other in others]
-        shape = (len(operators.free), most)
-        self._columns = [np.empty(shape, order="F") for _ in [None, self._M, *self._others]]
-        self.projected = [np.empty((0, 0)) for _ in [self._K, *self._others]]
+        self._M = product(operators.M)
+        stiffnesses = [branch.K for branch in operators.branches]
+        self._K, self._C, *self._relaxing = map(product, (operators.K, operators.C, *stiffnesses))
+        self._columns = np.empty((len(operators.free), most), order="F")
+        self.projected = [np.empty((0, 0)) for _ in (None, None, *stiffnesses)]
         self.size = 0
 
     @property
     def basis(self) -> Floats:
         """Vectors (n, size)."""
-        return self._columns[0][:, : self.size]
-
-    @property
-    def products(self) -> list[Floats]:
-        """Products (n, size) of the basis with M, C and the K_j."""
-        return [columns[:, : self.size] for columns in self._columns[1:]]
+        return self._columns[:, : self.size]
 
     @property
     def model(self) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
@@ -229,40 +224,48 @@ class KrylovBasis:
         K, C, *relaxing = self.projected
         return K, C, np.eye(self.size), _branches(relaxing, self._branches)
 
+    def forces(self, y: Floats, z: Floats, stretches: Sequence[Floats]) -> Floats:
+        """Nodal forces C y + M z + sum_j K_j s_j (n, k) of coordinates (size, k) in the basis."""
+        width = y.shape[1]
+        fields = self.basis @ np.hstack([y, z, *stretches])  # reads the basis once
+        applied = (self._C, self._M, *self._relaxing)
+        parts = (times(fields[:, j * width :][:, :width]) for j, times in enumerate(applied))
+        return sum(parts, np.zeros((len(fields), width)))
+
     def extend(self, block: Floats) -> Floats:
         """Add the linearly independent directions of a block (n, k); its coordinates (size, k)."""
-        M, Q, MQ = self._M, self.basis, self.products[0]
-        scale = _norms(block, M(block))
-        block, overlap = block / scale, np.zeros((self.size, len(scale)))
-        for _ in range(2):  # twice is enough
-            coordinates = MQ.T @ block
-            block = block - Q @ coordinates
-            overlap = overlap + coordinates
+        M, Q = self._M, self.basis
         moved = M(block)
+        scale = _norms(block, moved)
+        block, moved, overlap = block / scale, moved / scale, np.zeros((self.size, len(scale)))
+        for _ in range(2):  # twice is enough
+            coordinates = Q.T @ moved
+            block = block - Q @ coordinates
+            overlap, moved = overlap + coordinates, M(block)
         left = _norms(block, moved)
         fresh = left > ROUND_OFF  # of 1: a space of all of a body's dofs has no new direction
         block, moved = (np.where(fresh, x / left, 0.0) for x in (block, moved))
         squares, directions = np.linalg.eigh(block.T @ moved)
-        new = block @ (directions[:, squares > max(DEPENDENT * squares.max(), SMALLEST)])
-        for _ in range(2):
-            new = new - Q @ (MQ.T @ new)
-            moved = M(new)
-            upright = np.linalg.inv(np.linalg.cholesky(new.T @ moved)).T
-            new, moved = new @ upright, moved @ upright
-        self._append(new, moved)
-        return np.vstack([overlap, (moved.T @ block) * left]) * scale
+        distinct = squares > max(DEPENDENT * squares.max(), SMALLEST)
+        apart = directions[:, distinct] / np.sqrt(squares[distinct])
+        # Orthonormal but for round-off that the scaling has raised, also of what is in the basis.
+        new = block @ apart
+        new = new - Q @ (Q.T @ (moved @ apart))
+        moved_new = M(new)
+        upright = np.linalg.inv(np.linalg.cholesky(new.T @ moved_new)).T
+        self._append(new @ upright)
+        return np.vstack([overlap, (upright.T @ (moved_new.T @ block)) * left]) * scale
 
-    def _append(self, new: Floats, moved: Floats) -> None:
-        """Append vectors (n, k) and their products."""
-        added = slice(self.size, self.size + new.shape[1])
-        parts = [new, moved, *(times(new) for times in self._others)]
-        for columns, part in zip(self._columns, parts, strict=True):
-            columns[:, added] = part
-        self.size = added.stop
-        products = [self._K(new), *(x[:, added] for x in self.products[1:])]
+    def _append(self, new: Floats) -> None:
+        """Append vectors (n, k), and project the matrices onto them."""
+        width, start = new.shape[1], self.size
+        self.size = start + width
+        self._columns[:, start : self.size] = new
+        forces = np.hstack([times(new) for times in (self._K, self._C, *self._relaxing)])
+        columns = self.basis.T @ forces
         self.projected = [
-            _bordered(small, self.basis.T @ x)
-            for small, x in zip(self.projected, products, strict=True)
+            _bordered(small, columns[:, j * width :][:, :width])
+            for j, small in enumerate(self.projected)
         ]
 
 
@@ -311,10 +314,8 @@ def _moments(
         yield moment
         earlier, latest = _orthonormalised(earlier, latest)
         y, y_before, *y_relaxed = latest
-        M, C, *K_relaxing = space.products  # with the basis, whose coordinates these are
-        rest = C @ y + M @ (2 * point * y + scale * y_before)
-        for K, lag, part in zip(K_relaxing, lags, y_relaxed, strict=True):
-            rest += K @ (lag * part)
+        stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
+        rest = space.forces(y, 2 * point * y + scale * y_before, stretches)
         upper = space.extend(-factor.solve(rest))
         lower, _, *before = (_padded(part, len(upper)) for part in latest)
         relaxed = [

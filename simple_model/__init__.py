@@ -16,9 +16,17 @@ from simple_model.joined import evenly, joined
 from simple_model.layers import Stack
 from simple_model.line_names import named_lines
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
-from simple_model.material import Material, ModulusTable, PronyTerm, from_young, tabulated
+from simple_model.material import Material, from_young, of_law, tabulated
+from simple_model.modulus_laws import (
+    MODULUS_LAWS,
+    FractionalKelvinVoigt,
+    FractionalZener,
+    ModulusTable,
+    modulus_table,
+)
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
+from simple_model.prony import PronySeries, PronyTerm, fit_prony
 from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
 from simple_model.rhythm import Rhythm, Signal
 from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
@@ -27,15 +35,19 @@ from simple_model.trajectory import SHAPES, Trajectory, arc_path, timed_path
 
 __all__ = [
     "DRIVES",
+    "MODULUS_LAWS",
     "SHAPES",
     "SUPERPOSITIONS",
     "DriveLaw",
     "Effort",
+    "FractionalKelvinVoigt",
+    "FractionalZener",
     "LineTable",
     "Material",
     "ModulusTable",
     "MovingPressure",
     "PressureMap",
+    "PronySeries",
     "PronyTerm",
     "Response",
     "Rhythm",
@@ -49,6 +61,7 @@ __all__ = [
     "array_field",
     "commanded",
     "evenly",
+    "fit_prony",
     "flat_body",
     "flat_motion",
     "focal_spot",
@@ -57,7 +70,9 @@ __all__ = [
     "line_table",
     "lines",
     "modulation",
+    "modulus_table",
     "named_lines",
+    "of_law",
     "pattern_period",
     "phasors",
     "point_kernel",

@@ -7,62 +7,48 @@ The complex shear modulus (time exp(+i w t)) is
 With viscosity alone that is the Kelvin-Voigt model, with Prony terms a generalised Maxwell solid
 (Simo and Hughes, Computational Inelasticity (1998), chapter 10), with one of them the standard
 linear solid (C. Zener, Elasticity and Anelasticity of Metals, 1948): mu in slow and mu + sum mu_j
-in fast motion. A `law` replaces all of it, for models in the frequency domain. Poisson's ratio is
-constant, so that the whole stiffness scales with mu.
+in fast motion. A `law` replaces all of it, and models that need internal variables take its Prony
+series. Poisson's ratio is constant, so that the whole stiffness scales with mu.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular frequencies in rad/s
+from simple_model.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
+from simple_model.prony import (
+    FIT_TOLERANCE,
+    Complex,
+    Floats,
+    ModulusLaw,
+    PronySeries,
+    PronyTerm,
+    fit_prony,
+)
 
-
-@dataclass(frozen=True, kw_only=True)
-class PronyTerm:
-    """Prony term, a Maxwell branch in parallel with the rest: fast motion meets its modulus.
-
-    Parameters
-    ----------
-    modulus : float, Pa, 0 or above
-    time : float, s, above 0, in which its stress falls to 1/e
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or outside these limits.
-    """
-
-    modulus: float
-    time: float
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.modulus) and self.modulus >= 0):
-            raise ValueError(
-                f"modulus of a Prony term = {self.modulus} Pa must be a finite number, 0 or above"
-            )
-        if not (isfinite(self.time) and self.time > 0):
-            raise ValueError(
-                f"relaxation time of a Prony term = {self.time} s must be a finite number above 0; "
-                "give the time, or leave out the term"
-            )
-
-    def __call__(self, omega: ArrayLike) -> Any:
-        """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
-        turned = 1j * np.asarray(omega) * self.time
-        return self.modulus * turned / (1 + turned)
+__all__ = [
+    "PRESETS",
+    "Complex",
+    "Floats",
+    "Material",
+    "ModulusLaw",
+    "ModulusTable",
+    "PronyTerm",
+    "from_young",
+    "of_law",
+    "tabulated",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """An isotropic solid; give `shear_modulus`, or build it with `from_young` or `tabulated`.
+    """An isotropic solid; give `shear_modulus`, or build it with `from_young`, `of_law` or
+    `tabulated`.
 
     Parameters
     ----------
@@ -73,8 +59,8 @@ class Material:
     loss_factor : float, hysteretic loss, the same at every frequency
     prony : Prony terms, each with the modulus that it adds in fast motion, and its time
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa, in place of all
-        other terms, or None. For models in the frequency domain only, as it has no internal
-        variables; `shear_modulus` is its value at rest
+        other terms, or None: a record of `modulus_laws`, or any function that is analytic at
+        frequencies with imaginary part <= 0; `shear_modulus` is its value at rest
 
     Raises
     ------
@@ -109,6 +95,12 @@ class Material:
                 "a material with a modulus law of its own has all losses in it; leave out "
                 "viscosity, loss_factor and prony"
             )
+        at_rest = getattr(self.law, "shear_modulus", self.shear_modulus)
+        if abs(at_rest - self.shear_modulus) > 1e-6 * self.shear_modulus:
+            raise ValueError(
+                f"shear_modulus = {self.shear_modulus:g} Pa is not that of the material's modulus "
+                f"law at rest, {at_rest:g} Pa; build the material with of_law"
+            )
 
     @property
     def has_loss(self) -> bool:
@@ -117,8 +109,11 @@ class Material:
 
     @property
     def fast_modulus(self) -> float:
-        """Sum of the moduli of all Prony terms, Pa: what fast motion meets beside the modulus."""
-        return sum((term.modulus for term in self.prony), 0.0)
+        """Sum of the moduli of all Prony terms, those of a law's series too, in Pa: what fast
+        motion meets beside the modulus.
+        """
+        terms = self.prony if self.law is None else self.series().terms
+        return sum((term.modulus for term in terms), 0.0)
 
     @property
     def young(self) -> float:
@@ -132,7 +127,7 @@ class Material:
 
     def complex_modulus(self, omega: ArrayLike) -> Any:
         """Complex shear modulus (...) in Pa of motion exp(+i w t), at w (...) in rad/s, which may
-        be complex but for a table's; not below 0 with a loss factor, whose loss has one sign.
+        be complex; not below 0 with a loss factor, whose loss has one sign.
         """
         omega = np.asarray(omega)
         if self.law is not None:
@@ -144,16 +139,39 @@ class Material:
         """The part (...) in Pa of the complex modulus that Prony terms add."""
         return sum((term(omega) for term in self.prony), np.zeros((), np.complex128))
 
+    def series(self, tolerance: float = FIT_TOLERANCE) -> PronySeries:
+        """Prony series of its modulus law, that of a table over the table; raises a ValueError if
+        the law is not passive or not causal.
+        """
+        assert self.law is not None
+        if isinstance(self.law, ModulusTable):
+            return self.law.series
+        return fit_prony(self.law, rest=self.shear_modulus, tolerance=tolerance)
+
+    def relaxing(self, tolerance: float = FIT_TOLERANCE) -> "Material":
+        """The material with internal variables: its law's Prony series in place of the law."""
+        if self.law is None:
+            return self
+        series = self.series(tolerance)
+        return replace(
+            self,
+            shear_modulus=series.shear_modulus,
+            viscosity=series.viscosity,
+            prony=series.terms,
+            law=None,
+        )
+
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "Material":
         """The same law with all its moduli, or all its losses, multiplied by a factor."""
         both = modulus * loss
+        law = self.law and _scaled_law(self.law, modulus, loss)
         return replace(
             self,
-            shear_modulus=modulus * self.shear_modulus,
+            shear_modulus=getattr(law, "shear_modulus", modulus * self.shear_modulus),
             viscosity=both * self.viscosity,
             loss_factor=loss * self.loss_factor,
             prony=tuple(replace(term, modulus=both * term.modulus) for term in self.prony),
-            law=self.law and _ScaledLaw(law=self.law, modulus=modulus, loss=loss),
+            law=law,
         )
 
     @property
@@ -177,75 +195,31 @@ class Material:
         return self.shear_speed * brentq(rayleigh, 0.5, 1 - 1e-12, xtol=1e-14)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ModulusTable:
-    """Measured complex shear moduli, straight between their frequencies; a modulus law.
+def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
+    """Material by its Young's modulus in Pa; the rest as in `Material`."""
+    return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
 
-    Below the first frequency the storage modulus is that of the first, and the loss modulus goes
-    with the frequency.
+
+def of_law(*, density: float, poisson: float, law: Any) -> Material:
+    """Material by a modulus law.
 
     Parameters
     ----------
-    frequencies : (k,) Hz, above 0 and ascending
-    moduli : (k,) complex, Pa, with real parts above 0 and imaginary parts of 0 or above
+    density : float, kg/m3
+    poisson : float
+    law : `FractionalKelvinVoigt`, `FractionalZener` or `ModulusTable`
+
+    Returns
+    -------
+    Material
+        Whose modulus at rest is that of the law.
 
     Raises
     ------
     ValueError
-        If these are none, or asked for above the last frequency or at a complex one.
+        As `Material` does.
     """
-
-    frequencies: tuple[float, ...]
-    moduli: tuple[complex, ...]
-
-    def __post_init__(self) -> None:
-        f, mu = np.array(self.frequencies), np.array(self.moduli, np.complex128)
-        rising = len(f) and np.isfinite(f).all() and (np.diff(f, prepend=0.0) > 0).all()
-        if f.shape != mu.shape or f.ndim != 1 or not rising:
-            raise ValueError(
-                f"a table of complex moduli has {len(f)} frequencies and {len(mu)} moduli; give as "
-                "many of each, one or more, with frequencies in Hz above 0 that rise"
-            )
-        if not (np.isfinite(mu).all() and (mu.real > 0).all() and (mu.imag >= 0).all()):
-            raise ValueError(
-                "a table of complex moduli has one that is not finite, or below 0 in its real or "
-                "imaginary part; give storage and loss moduli in Pa"
-            )
-
-    def __call__(self, omega: ArrayLike) -> Complex:
-        """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
-        if np.imag(omega).any():
-            raise ValueError(
-                "a table of complex moduli has none at the complex frequencies by which motion "
-                "from rest is computed; use --model flat-body-harmonic or fem-harmonic"
-            )
-        hertz = np.abs(np.real(omega)) / (2 * np.pi)
-        if (highest := hertz.max(initial=0.0)) > self.frequencies[-1] * (1 + 1e-9):
-            raise ValueError(
-                f"a table of complex moduli ends at {self.frequencies[-1]:g} Hz, and the load has "
-                f"lines up to {highest:g} Hz; extend the table, or take a slower load"
-            )
-        f, mu = np.array([0.0, *self.frequencies]), np.array([self.moduli[0].real, *self.moduli])
-        loss = np.interp(hertz, f, mu.imag) * np.sign(np.real(omega))
-        return np.asarray(np.interp(hertz, f, mu.real) + 1j * loss)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _ScaledLaw:
-    """A modulus law with its storage and loss moduli multiplied by factors."""
-
-    law: ModulusLaw
-    modulus: float
-    loss: float
-
-    def __call__(self, omega: ArrayLike) -> Any:
-        mu = self.modulus * self.law(omega)
-        return mu if self.loss == 1 else mu.real + 1j * self.loss * mu.imag
-
-
-def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
-    """Material by its Young's modulus in Pa; the rest as in `Material`."""
-    return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
+    return Material(density=density, shear_modulus=law.shear_modulus, poisson=poisson, law=law)
 
 
 def tabulated(
@@ -257,13 +231,13 @@ def tabulated(
     ----------
     density : float, kg/m3
     poisson : float
-    frequencies : (k,) float, Hz, ascending
+    frequencies : (k,) float, Hz, ascending; the first may be 0
     moduli : (k,) complex, Pa, at each frequency
 
     Returns
     -------
     Material
-        Whose modulus at rest is the real part of the first.
+        Whose modulus at rest is that at 0 Hz or, without one, that of the table's Prony series.
 
     Raises
     ------
@@ -272,7 +246,13 @@ def tabulated(
     """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))
-    return Material(density=density, shear_modulus=table.moduli[0].real, poisson=poisson, law=table)
+    return of_law(density=density, poisson=poisson, law=table)
+
+
+def _scaled_law(law: Any, modulus: float, loss: float) -> Any:
+    if hasattr(law, "scaled"):
+        return law.scaled(modulus=modulus, loss=loss)
+    return ScaledLaw(law=law, modulus=modulus, loss=loss)
 
 
 def _tissue(young: float) -> Material:
@@ -296,6 +276,14 @@ PRESETS: Mapping[str, Material] = {
         shear_modulus=25e3,
         poisson=0.4999,
         prony=(PronyTerm(modulus=10e3, time=0.5e-3),),
+    ),
+    # Silicone of skin replicas, Ecoflex 00-30: density by its maker's data sheet, the law that of
+    # Lanoy et al., PNAS 117 (2020), doi 10.1073/pnas.2010812117. The constants are second-hand and
+    # were not checked against that paper: a plausible silicone, not a measured one.
+    "ecoflex": of_law(
+        density=1070,
+        poisson=0.4999,
+        law=FractionalKelvinVoigt(shear_modulus=25e3, exponent=0.33, time=0.3e-3),
     ),
     # Layers of a hand. Moduli are those of fingertip models (Maeno, Kobayashi and Yamazaki 1998:
     # Young's modulus 136, 80 and 34 kPa) and, for muscle, the middle of 5 to 30 kPa; published

@@ -11,6 +11,7 @@ import tomli_w
 from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.trajectory import BY_POINTS
+from skinwave.material_file import with_tables
 from skinwave.scene import KINDS, Body, Placement, Scene, kind_of
 from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked, renamed
 
@@ -32,7 +33,7 @@ def read(path: str | Path) -> Scene:
     """
     text = content(path)
     try:
-        scene = loads(text)
+        scene = _scene(parsed(text, Path(path).parent))
         if scene.body.file:  # is named from where the scene is
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
@@ -62,6 +63,18 @@ def content(path: str | Path) -> str:
 
 def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
+    return _scene(parsed(text))
+
+
+def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
+    """The table of a scene's TOML text, by today's keys; with a folder, with the numbers of tables
+    of moduli that are named from there.
+
+    Raises
+    ------
+    ValueError
+        If it is not valid TOML, or a table cannot be read.
+    """
     if DEEP.search(text):
         raise ValueError("a key has more than 16 parts, which none of a scene has; shorten it")
     try:
@@ -70,8 +83,12 @@ def loads(text: str) -> Scene:
         raise ValueError(f"not valid TOML: {error}") from None
     except RecursionError:
         raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
+    return renamed(with_tables(table, folder) if folder else table)
+
+
+def _scene(table: dict[str, Any]) -> Scene:
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
-    top = checked("scene", renamed(table), sections)
+    top = checked("scene", table, sections)
     parts = {
         section: checked(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()

@@ -7,12 +7,14 @@ from functools import partial
 from math import inf, isfinite, nextafter, pi
 from typing import Any
 
-from simple_model import Rhythm, Signal
+from simple_model import ModulusTable, Rhythm, Signal
 from simple_model.choices import meant
 from simple_model.drive import DRIVES, DriveLaw
 from simple_model.focus import FOCI, FocalSpot
 from simple_model.material import Material, PronyTerm
+from simple_model.modulus_laws import COLUMNS
 from simple_model.trajectory import Points
+from skinwave.material_file import material_of, values_of, written_table
 from skinwave.scene import Layer, Relief
 
 
@@ -128,9 +130,6 @@ def _material(key: str, value: Any) -> str | Material:
     table = dict(as_table(key, value))
     one = {new: table.pop(old) for old, new in MAXWELL_BRANCH.items() if old in table}
     values = checked(f"[body.{key}]", table, MATERIAL)
-    missing = [k for k in list(MATERIAL)[:3] if MATERIAL[k].name not in values]
-    if missing:
-        raise ValueError(f"[body.{key}] lacks {' and '.join(missing)}; give it, or name a preset")
     if one:
         warnings.warn(
             f"{' and '.join(MAXWELL_BRANCH)} of [body.{key}] are now modulus_pa and time_s of "
@@ -140,19 +139,37 @@ def _material(key: str, value: Any) -> str | Material:
         )
         if _number(key, one.get("modulus_pa", 0)):
             values["prony"] = (*values.get("prony", ()), *_prony("prony", [{"time_s": 0} | one]))
-    return Material(**values)
+    return material_of(
+        values, f"[body.{key}]", {field.name: own for own, field in MATERIAL.items()}
+    )
 
 
-def _write_material(material: str | Material) -> Any:
+def write_material(material: str | Material) -> Any:
+    """The name of a material, or its table."""
     if isinstance(material, str):
         return material
-    if material.law is not None:
+    values = values_of(material)
+    return {k: key.write(values[key.name]) for k, key in MATERIAL.items() if key.name in values}
+
+
+def _table(key: str, value: Any) -> ModulusTable:
+    if isinstance(value, str):
         raise ValueError(
-            "the material has a modulus law of its own, a Python function or a table, which a "
-            "scene file cannot hold; give it Prony terms, or simulate it from Python"
+            f"{key} = {_shown(value)} names a file, which is looked for beside a scene file, and "
+            f"this scene is none; give its numbers, {key}.{', '.join(COLUMNS)}"
         )
-    table = written(MATERIAL, material)
-    return {key: value for key, value in table.items() if value != []}
+    columns = {name: SceneKey(name, _numbers, list) for name in COLUMNS}
+    found = checked(f"[body.material.{key}]", as_table(key, value), columns)
+    if missing := [name for name in COLUMNS if name not in found]:
+        raise ValueError(f"[body.material.{key}] lacks {' and '.join(missing)}; give it")
+    frequencies, storage, loss = (found[name] for name in COLUMNS)
+    if not len(frequencies) == len(storage) == len(loss):
+        raise ValueError(
+            f"[body.material.{key}] has {len(frequencies)} frequencies, {len(storage)} storage and "
+            f"{len(loss)} loss moduli; give as many of each"
+        )
+    moduli = tuple(complex(*each) for each in zip(storage, loss, strict=True))
+    return ModulusTable(frequencies=frequencies, moduli=moduli)
 
 
 def _write_drive(drive: str | DriveLaw) -> str:
@@ -230,6 +247,11 @@ MATERIAL = {
     "poisson": _scaled("poisson"),
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
+    "law": _word("law"),
+    "fast_modulus_pa": _scaled("fast_modulus"),
+    "exponent": _scaled("exponent"),
+    "time_s": _scaled("time"),
+    "table": SceneKey("table", _table, written_table),
     "prony": SceneKey("prony", _prony, lambda terms: [written(PRONY, term) for term in terms]),
 }
 MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
@@ -239,7 +261,7 @@ MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
-    "material": SceneKey("material", _material, _write_material),
+    "material": SceneKey("material", _material, write_material),
 }
 PULSES = {"pulses_ms": SceneKey("pulses", _pulses, _write_points), "ramp_ms": _scaled("ramp", 1e3)}
 SIGNAL = {
@@ -280,7 +302,7 @@ SECTIONS = {
     },
     "body": {
         "kind": _word("kind"),
-        "material": SceneKey("material", _material, _write_material),
+        "material": SceneKey("material", _material, write_material),
         "size_x_mm": _scaled("width", 1e3),
         "size_y_mm": _scaled("height", 1e3),
         "thickness_mm": _scaled("depth", 1e3),

@@ -10,6 +10,7 @@ from simple_model import Response
 from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models import MapFunction, Request, named
+from skinwave.models.laws import check_laws
 from skinwave.models.prepared import answer, sample_times
 from skinwave.planning.plan import Plan, plan
 from skinwave.planning.warnings import beyond_linear
@@ -189,6 +190,8 @@ def compute(
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     known.refuse(scene.body)
+    if known.needs_body:
+        check_laws(scene.body, scene.pressure)
     request = Request(
         times=sample_times(scene), tolerance=tolerance, report=progress or silent,
         h=h, dt=dt, solver=solver, mapped=mapped,

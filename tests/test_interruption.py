@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(sys.platform == "win32", reason="signals and limits differ"),
 ]
-KILLS = 6
+KILLS = 4
 PLANNED = Plan(model="flat-body", body=BODIES["skin-slab"])
 COMPARE = [sys.executable, "-m", "skinwave", "compare", "good.toml", "--h", "4", "--out", "out"]
 

@@ -9,7 +9,6 @@ import pytest
 
 import fem
 import meshes
-import skinwave
 from meshes import cache
 from simple_model import (
     DRIVES,
@@ -341,28 +340,6 @@ def test_a_measured_modulus_is_that_of_the_law_in_the_frequency_domain(element, 
     assert power.energy_imbalance < 1e-6
 
 
-def test_a_law_of_its_own_is_planned_without_reduction():
-    f = np.linspace(1, 1500, 300)
-    own = scene(tabulated(density=1000.0, poisson=0.45, frequencies=f,
-                          moduli=closed_form(2 * np.pi * f)))  # fmt: skip
-    with pytest.warns(skinwave.SkinwaveWarning, match="not estimated for a modulus law"):
-        found = skinwave.simulate(own)
-    assert (found.model, np.isnan(found.expected_error)) == ("flat-body-harmonic", True)
-    assert skinwave.plan(own, model="fem-harmonic").h > 0
-
-
-@pytest.mark.parametrize(
-    ("model", "said"),
-    [("fem", "fem integrates internal variables"), ("fem-transient", "fem-transient integrates"),
-     ("flat-body", "none at the complex frequencies by which motion from rest")],
-)  # fmt: skip
-def test_models_from_rest_refuse_a_table(model, said):
-    own = scene(tabulated(density=1000.0, poisson=0.45, frequencies=[500.0], moduli=[2e4 + 1e3j]))
-    for ask in (compute, skinwave.simulate):
-        with pytest.raises(ValueError, match=said):
-            ask(own, model)
-
-
 def test_elements_refuse_a_law_without_internal_variables(element):
     mesh, force, S = element
     ops = fem.assemble(mesh, replace(TWO, prony=(), law=closed_form))
@@ -377,17 +354,6 @@ def test_elements_refuse_a_law_without_internal_variables(element):
 def test_a_scene_file_refuses_a_law_that_it_cannot_hold():
     with pytest.raises(ValueError, match="material has a modulus law of its own, .* scene file"):
         dumps(scene(replace(TWO, prony=(), law=closed_form)))
-
-
-def test_a_table_says_where_it_ends():
-    own = tabulated(density=1000.0, poisson=0.45, frequencies=[10, 20], moduli=[2e4, 3e4 + 1e3j])
-    assert own.complex_modulus(2 * np.pi * 15) == pytest.approx(2.5e4 + 500j)
-    with pytest.raises(ValueError, match="ends at 20 Hz, and the load has lines up to 21 Hz"):
-        own.complex_modulus(2 * np.pi * 21)
-    with pytest.raises(ValueError, match="has 2 frequencies and 1 moduli"):
-        tabulated(density=1000.0, poisson=0.45, frequencies=[10, 20], moduli=[2e4])
-    with pytest.raises(ValueError, match="all losses in it"):
-        replace(own, viscosity=1.0)
 
 
 def test_several_terms_in_a_scene_file_and_layers():

@@ -150,6 +150,7 @@ def test_an_address_carries_every_control():
         "foci": 3, "sharing": "time_multiplexed",
         "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
         "drawn": 42.5, "paths": "circle/20/-15/0, line/10/15/0.5, point/0/0/-20",
+        "layers": "0.3/45, inf/5",
     }  # fmt: skip
     assert set(changed) == set(STARTS)
     assert all(changed[key] != STARTS[key] for key in STARTS)
@@ -485,7 +486,7 @@ def test_tabulated_waves_follow_pulses_and_foci(scene):
 @pytest.mark.parametrize("height", [0.02, 0.09, 0.2, 0.6])
 @pytest.mark.parametrize("body", [BODIES["skin-slab"], Body(depth=np.inf), Body(depth=0.004)])
 def test_one_grid_of_wavenumbers_serves_every_height(body, height):
-    table = slabs.tabulate(slabs.wavenumbers(body, nothing), height)
+    table = slabs.tabulate(slabs.wavenumbers(body, slabs.lowest(height), nothing), height)
     some = slice(None, None, 37)
     w, distances = 2 * np.pi * table.frequencies[some], table.distances
     exact = point_response(compliance(body), distances, w, spot_width(height))

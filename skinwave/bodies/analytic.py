@@ -53,7 +53,7 @@ def compliance(body: Body) -> Compliance:
 
 
 def stack(body: Body) -> Stack:
-    """Layers of a slab as infinite ones. An absorbing base lets waves out as a half-space of the
+    """Layers of a slab as infinite ones. An absorbing base radiates as a half-space of the
     lowest material does, which is there instead.
 
     Raises

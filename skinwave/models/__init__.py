@@ -73,6 +73,7 @@ class Model:
     is_stepped : bool, whether its error depends on a time step
     is_nonlinear : bool, whether it has large deflections
     fits_damping : bool, whether a loss factor becomes Rayleigh damping
+    takes_series : whether it takes Prony series for modulus laws of a body
     """
 
     name: str
@@ -94,6 +95,7 @@ class Model:
     is_stepped: bool = False
     is_nonlinear: bool = False
     fits_damping: bool = False
+    takes_series: "Callable[[Body], bool]" = lambda body: False
 
 
 _MODELS: dict[str, Model] = {}

@@ -4,6 +4,7 @@ import simple_model
 from simple_model import Response, steady_state
 from skinwave.bodies.analytic import exact_waves
 from skinwave.models import Model, Request, register
+from skinwave.models.laws import has_table
 from skinwave.scene import Scene
 
 
@@ -29,6 +30,7 @@ FLAT_BODY = register(
         memory=3e8,
         colour="#009E73",
         is_infinite=True,
+        takes_series=has_table,
     )
 )
 HARMONIC = register(

@@ -21,6 +21,7 @@ from skinwave.bodies.build import build as build_body
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models import Request
+from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import Body, Scene
 
@@ -103,8 +104,8 @@ def transient_answer(scene: Scene, request: Request) -> Response:
     times, report, solver = request.times, request.report, request.solver
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
-    clock = Clock()
-    build = meshed(scene.body, request.h, clock, report)
+    clock, body = Clock(), relaxing(scene.body, series_tolerance(request.tolerance))
+    build = meshed(body, request.h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
     S = surface_motion(scene.body, build, scene.probe_points)

@@ -1,15 +1,84 @@
-"""Materials with a modulus law of their own, which only models in the frequency domain take."""
+"""Materials with a modulus law of their own: checked, and by Prony series where a model integrates
+internal variables.
+"""
 
+from dataclasses import replace
+from functools import lru_cache
+
+from fem.materials import Material
+from simple_model import ModulusTable, MovingPressure
+from simple_model.load_spectrum import load_lines
+from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies import Body
+from skinwave.bodies.parts import solid_of
+
+SERIES_SHARE = 0.1  # of a waveform's tolerance: relative error that a series may have
+STRONG = 1e-2  # of the strongest line of a load: lines that a table must reach
+
+
+def own_laws(body: Body) -> tuple[Material, ...]:
+    """The materials of a body that have a modulus law of their own."""
+    return tuple(solid for _, solid in body.strata if solid.law is not None)
 
 
 def has_own_law(body: Body) -> bool:
     """Whether a material of a body has a modulus law of its own."""
-    return any(solid.law is not None for _, solid in body.strata)
+    return bool(own_laws(body))
+
+
+def has_table(body: Body) -> bool:
+    """Whether a material of a body has a table of moduli, which has none at complex frequencies."""
+    return any(isinstance(solid.law, ModulusTable) for solid in own_laws(body))
+
+
+def check_laws(body: Body, pressure: MovingPressure) -> None:
+    """Refuse a body with a modulus law that is not passive or not causal, or with a table that ends
+    below a strong line of the load.
+
+    Raises
+    ------
+    ValueError
+        If it has one.
+    """
+    for solid in own_laws(body):
+        solid.series()
+        if isinstance(solid.law, ModulusTable):
+            last, highest = solid.law.frequencies[-1], _highest(pressure)
+            if highest > last * (1 + 1e-9):
+                raise ValueError(
+                    f"a table of complex moduli ends at {last:g} Hz, and the load has lines of "
+                    f"{100 * STRONG:g} % of its strongest up to {highest:g} Hz; extend the table, "
+                    "or take a slower load"
+                )
+
+
+@lru_cache(maxsize=8)
+def _highest(pressure: MovingPressure) -> float:
+    return float(load_lines(pressure, STRONG).frequencies.max(initial=0.0))
+
+
+def series_tolerance(tolerance: float) -> float:
+    """Relative error of a Prony series: a share of that of a waveform."""
+    return min(FIT_TOLERANCE, SERIES_SHARE * tolerance)
+
+
+def relaxing(body: Body, tolerance: float) -> Body:
+    """The body with internal variables: Prony series for modulus laws of its own, within a relative
+    error where their data allow it.
+    """
+    if not has_own_law(body):
+        return body
+
+    def made(material: str | Material) -> str | Material:
+        solid = solid_of(material)
+        return material if solid.law is None else solid.relaxing(tolerance)
+
+    layers = tuple(replace(layer, material=made(layer.material)) for layer in body.layers)
+    return replace(body, material=made(body.material), layers=layers)
 
 
 def without_own_law(model: str, body: Body) -> None:
-    """Refuse a body with a modulus law of its own, for a model that integrates internal variables.
+    """Refuse a body with a modulus law of its own, for a model that has no internal variables.
 
     Raises
     ------
@@ -18,7 +87,6 @@ def without_own_law(model: str, body: Body) -> None:
     """
     if has_own_law(body):
         raise ValueError(
-            f"{model} integrates internal variables, which a material with a modulus law of "
-            "its own has not; give it Prony terms, or use --model fem-harmonic or "
-            "flat-body-harmonic"
+            f"{model} has no internal variables, which the Prony series of a modulus law needs; "
+            "give the material a viscosity or a loss_factor, or use --model fem"
         )

@@ -7,7 +7,7 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.sizes import default_size
 from skinwave.models import Model, Request, register
 from skinwave.models.full import harmonic_answer, transient_answer
-from skinwave.models.laws import without_own_law
+from skinwave.models.laws import has_own_law
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
 from skinwave.scene import Scene
 
@@ -27,11 +27,6 @@ def vacuum_only(model: str, body: Body) -> None:
         )
 
 
-def _refuse_of_transient(body: Body) -> None:
-    vacuum_only("fem-transient", body)
-    without_own_law("fem-transient", body)
-
-
 def _reduced(scene: Scene, request: Request) -> Response:
     prepared = prepare(
         scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
@@ -46,12 +41,12 @@ FEM = register(
         method="10-node tetrahedra, reduced-order model",
         words="linear waves on 10-node tetrahedra by a reduced-order model",
         solve=_reduced,
-        refuse=partial(without_own_law, "fem"),
         error=None,
         default_size=default_size,
         colour="#0072B2",
         is_reduced=True,
         fits_damping=True,
+        takes_series=has_own_law,
     )
 )
 HARMONIC = register(
@@ -73,11 +68,12 @@ TRANSIENT = register(
         method="10-node tetrahedra, step by step",
         words="linear waves on 10-node tetrahedra, step by step",
         solve=transient_answer,
-        refuse=_refuse_of_transient,
+        refuse=partial(vacuum_only, "fem-transient"),
         error=None,
         default_size=default_size,
         colour="#D55E00",
         is_stepped=True,
         fits_damping=True,
+        takes_series=has_own_law,
     )
 )

@@ -15,6 +15,7 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.models.full import assembled, meshed, spent
+from skinwave.models.laws import relaxing
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.reduction import (
     BAND,
@@ -28,6 +29,7 @@ from skinwave.models.reduction import (
 from skinwave.scene import SAMPLE_RATE, Body, Scene
 
 REDUCTION_TOLERANCE = 1e-3
+SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = 2  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points")
@@ -86,7 +88,7 @@ def prepare(
     -------
     `Prepared`
     """
-    clock = Clock()
+    clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
     (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
     name = _entry_name(body, build, probes, solver, tolerance)

@@ -14,6 +14,7 @@ from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
 from skinwave.models import reduction
 from skinwave.models.full import assembled, meshed, spent
+from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times
 from skinwave.scene import Scene
@@ -55,7 +56,8 @@ def waves(
     """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
     check_options(solver, h=h)
     clock, report = Clock(), progress or silent
-    build = meshed(scene.body, h, clock, report)
+    body = relaxing(scene.body, series_tolerance(tolerance))
+    build = meshed(body, h, clock, report)
     operators = assembled(build, clock, report)
     P, points = surface_load(build)
     with clock("factorise and reduce"):
@@ -63,7 +65,7 @@ def waves(
         spots = scene.pressure.spot(points, path_samples(scene.pressure))
         subspace = sparse.csr_array(fem.load_subspace(P @ spots.T, tolerance / 10).T)
         reduced, model = reduction.reduce_body(
-            scene.body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
+            body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
             report=report,
         )  # fmt: skip
     with clock("lines"):

@@ -18,6 +18,7 @@ from skinwave.models import named
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import compared_with, convergence, quantity_of_interest
+from skinwave.planning.series import series_error
 from skinwave.planning.warnings import beyond_linear, of_elements
 from skinwave.scene import Body, Scene
 
@@ -82,6 +83,7 @@ def told(
     same = coarse.effort.dofs == response.effort.dofs
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
     _, error = convergence(body, (other, size), (found, fine), tolerance, same=same)
+    error += series_error(scene, response.model, tolerance, coarse)
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)

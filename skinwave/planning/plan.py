@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.sampling import resolving_step
-from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
 from skinwave.models import Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
-from skinwave.models.laws import has_own_law
+from skinwave.models.laws import check_laws
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import (
@@ -22,6 +22,7 @@ from skinwave.planning.estimates import (
 from skinwave.planning.extent import PlanRow, coat_rows, extent, left_out, symmetry
 from skinwave.planning.refinement import Convergence, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
+from skinwave.planning.series import with_series
 from skinwave.planning.warnings import of_elements, over_tolerance
 from skinwave.scene import FLAT, Body, Scene
 
@@ -97,8 +98,7 @@ def plan(
         asked.refuse(scene.body)
         if asked.error and not asked.needs_body:
             return _unplanned(scene, tolerance, asked, h)
-    if has_own_law(scene.body):
-        return _own_law(scene, asked, h)
+    check_laws(scene.body, scene.pressure)
     if asked and asked.error:
         return _unplanned(scene, tolerance, asked, h)
     spectrum = response_spectrum(scene, tolerance)
@@ -115,7 +115,8 @@ def plan(
         reflection_and_transient(scene) if has_wavenumber_solution(scene) else (1.0, 1.0)
     )
     if asked.is_infinite if asked else returned <= WAVES_SHARE * tolerance:
-        return _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
+        found = _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
+        return with_series(found, scene, tolerance)
     body: Body = scene.body
     cut: list[PlanRow] = []
     if model is None or h is None:  # else all of it is meshed, as asked
@@ -125,47 +126,26 @@ def plan(
         *cut,
     ]
     axes = symmetry(scene) if asked is None or asked.is_reduced else ""
-    found = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
+    mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     scene = replace(scene, body=body)
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     step_error, start_error = _march_errors(scene, asked, step)
-    return Plan(
-        model=model or "fem", body=body, symmetry=axes, h=found.h, highest=highest,
-        error=found.error + step_error + start_error,
-        seconds=sum(found.prepared.effort.seconds.values()),
-        memory=found.prepared.effort.peak_memory,
-        rows=(*rows, *_element_rows(scene, tolerance, axes, found, highest, h)),
+    found = Plan(
+        model=model or "fem", body=body, symmetry=axes, h=mesh.h, highest=highest,
+        error=mesh.error + step_error + start_error,
+        seconds=sum(mesh.prepared.effort.seconds.values()),
+        memory=mesh.prepared.effort.peak_memory,
+        rows=(*rows, *_element_rows(scene, tolerance, axes, mesh, highest, h)),
         warnings=(
-            *of_elements(scene, found.h, found.error, tolerance),
+            *of_elements(scene, mesh.h, mesh.error, tolerance),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *over_tolerance("fem-harmonic, which leaves out the initial transient,", start_error,
                       tolerance, "fem is"),
         ),
-        prepared=found.prepared,
+        prepared=mesh.prepared,
     )  # fmt: skip
-
-
-def _own_law(scene: Scene, asked: Model | None, h: float | None) -> Plan:
-    """Plan of a material with a modulus law of its own, a frequency at a time: meshes are compared
-    by reduced-order models, which it has none of, and so the error of elements is not known.
-    """
-    model = asked or (HARMONIC if has_wavenumber_solution(scene) else named("fem-harmonic"))
-    row = PlanRow(
-        what="model", value=model.name, reason="the material has a modulus law of its own"
-    )
-    said = "the error of this response is not estimated for a modulus law of its own; compare "
-    if model.is_infinite:
-        said += "with fem-harmonic, which has the body's sides"
-        return Plan(model=model.name, body=scene.body, error=np.nan, rows=(row,), warnings=(said,))
-    h = h or default_size(scene.body)
-    check_mesh(scene.body, h)
-    size = PlanRow(what="element size", value=f"{1e3 * h:.2f} mm", reason="as asked or by default")
-    return Plan(
-        model=model.name, body=scene.body, h=h, error=np.nan,
-        rows=(row, size, *coat_rows(scene.body, h)),
-        warnings=(f"{said}elements of {1e3 * h:.3g} mm with smaller ones",),
-    )  # fmt: skip
+    return with_series(found, scene, tolerance)
 
 
 def _unplanned(scene: Scene, tolerance: float, model: Model, h: float | None) -> Plan:

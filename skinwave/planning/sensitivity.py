@@ -14,7 +14,7 @@ from meshes.tetmesh import Floats
 from simple_model.load_spectrum import reduced_lines
 from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.sizes import default_size
-from skinwave.models.prepared import prepare
+from skinwave.models.prepared import Prepared, prepare
 from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene
 
@@ -36,10 +36,12 @@ class Sensitivity:
     start: float
 
 
-def sensitivity(scene: Scene) -> Sensitivity:
-    """Sensitivity from two responses of a coarse reduced model, seconds once per body."""
+def sensitivity(scene: Scene, prepared: Prepared | None = None) -> Sensitivity:
+    """Sensitivity from two responses of a reduced body: one that is at hand, or that of a coarse
+    mesh, seconds once per body.
+    """
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
-    coarse = prepare(scene.body, scene.probe_points, h=h)
+    coarse = prepared or prepare(scene.body, scene.probe_points, h=h)
     values = coarse.body.poles.values * (1 - DETUNING)
     frequencies, forces = reduced_lines(scene.pressure, coarse.body.points, coarse.body.load)
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE

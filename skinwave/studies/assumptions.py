@@ -215,7 +215,7 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
 def as_one(layers: Sequence[Layer]) -> Layer:
     """One layer as thick as all and of their mean stiffness, for a mesh without interfaces."""
     thickness = sum(layer.thickness for layer in layers)
-    solids = [solid_of(layer.material) for layer in layers]
+    solids = [solid_of(layer.material).relaxing() for layer in layers]
 
     def mean(name: str) -> float:
         parts = zip(layers, solids, strict=True)
@@ -236,6 +236,10 @@ def as_one(layers: Sequence[Layer]) -> Layer:
 
 def with_little_loss(solid: Material, w: float) -> Material:
     """A tenth of the damping, and the same storage modulus at w in rad/s."""
+    if solid.law is not None:
+        less = solid.scaled(loss=LOSS_LEFT)
+        storage = [float(m.complex_modulus(w).real) for m in (solid, less)]
+        return less.scaled(modulus=storage[0] / storage[1])
     stiffer = (1 - LOSS_LEFT) * float(solid.relaxing_modulus(w).real)
     return _of_modulus(solid.scaled(loss=LOSS_LEFT), solid.shear_modulus + stiffer)
 

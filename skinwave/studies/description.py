@@ -145,8 +145,11 @@ def above(body: Body) -> str:
 def _material(solid: Material) -> str:
     text = (
         f"density {solid.density:g} kg/m3, shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
-        f"Poisson's ratio {solid.poisson:g}, viscosity {solid.viscosity:g} Pa s"
+        f"Poisson's ratio {solid.poisson:g}, "
     )
+    if solid.law is not None:
+        return text + getattr(solid.law, "words", "a complex modulus of its own")
+    text += f"viscosity {solid.viscosity:g} Pa s"
     if solid.loss_factor:
         text += f", loss factor {solid.loss_factor:g}"
     for term in solid.prony:
@@ -154,8 +157,6 @@ def _material(solid: Material) -> str:
             f", a Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
             f"{1e3 * term.time:g} ms"
         )
-    if solid.law is not None:
-        text += ", and a complex modulus of its own"
     return text
 
 

@@ -18,8 +18,8 @@ from meshes import reading
 from simple_model.choices import choose, meant
 from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
-from skinwave.scene_file import content, dumps, loads, read
-from skinwave.scene_keys import MATERIAL, SECTIONS, renamed, written
+from skinwave.scene_file import content, dumps, loads, parsed, read
+from skinwave.scene_keys import SECTIONS, renamed, write_material
 
 DESIGNS = ("factorial", "zip", "lhs")
 MOST_RUNS = 100_000
@@ -137,7 +137,7 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint
         If the file is no scene, no combination makes one, or a word is refused by each it is in.
     """
     base = read(path)
-    table = renamed(tomllib.loads(content(path)))
+    table = parsed(content(path), path.parent)
     if base.body.file:
         table["body"]["file"] = base.body.file
     complete = tomllib.loads(dumps(base))
@@ -247,7 +247,7 @@ def _with(node: Any, complete: Any, path: Sequence[str], value: Any) -> Any:
         return [*node[:k], _with(node[k], None, rest, value), *node[k + 1 :]]
     if isinstance(node, str):  # a preset's name stands for its table
         choose("material", node, list(PRESETS))
-        node = written(MATERIAL, solid_of(node))
+        node = write_material(solid_of(node))
     if not isinstance(node, dict):
         raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
     before = complete.get(head) if isinstance(complete, dict) else None

@@ -29,10 +29,12 @@ from simple_model.load_spectrum import (
     path_fourier,
     path_samples,
 )
+from simple_model.prony import FIT_TOLERANCE
 from simple_model.response import step
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
+from skinwave.models.laws import relaxing
 from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times
 from skinwave.models.reduction import (
@@ -58,7 +60,7 @@ from skinwave.web.model import (
     places,
 )
 from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
-from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, tabulate, wavenumbers
+from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, tabulate, wavenumbers
 
 TAIL = 0.4  # s that motion may last after the Tacton
 FINER = 4  # places of a map's table in each interval of the table
@@ -103,7 +105,8 @@ class BodyResponses:
         if is_tabulated(scene.body):
             gaussian_only(scene.pressure)
             height = scene.pressure.height
-            known = self._keep("known", scene.body, lambda: wavenumbers(scene.body, progress))
+            wide = scene.body, lowest(height)
+            known = self._keep("known", wide, lambda: wavenumbers(*wide, progress))
             table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
             return warned_of(scene, flat_answer(table, scene, moving))
         tacton = scene.tacton
@@ -236,7 +239,7 @@ def _steady(pressure: MovingPressure) -> MovingPressure:
 
 def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     progress("mesh", 0.0)
-    size = body.of_kind.interactive_size
+    size, body = body.of_kind.interactive_size, relaxing(body, FIT_TOLERANCE)
     made = build(body, size if body.of_kind.is_plate else min(size, body.depth))
     progress("assemble", 0.0)
     return made, operators(made)

@@ -1,0 +1,125 @@
+"""Materials as scene files have them: values by attribute name, and the laws behind them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from meshes import reading
+from simple_model import MODULUS_LAWS, Material, ModulusTable, modulus_table, of_law
+from simple_model.choices import choose
+from simple_model.modulus_laws import COLUMNS
+
+PLAIN = ("density", "shear_modulus", "poisson")  # and losses, which may be left out
+LOSSES = ("viscosity", "loss_factor", "prony")
+TABULATED = ("density", "poisson", "table")
+
+
+def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Material:
+    """The material of the values that a scene file has.
+
+    Parameters
+    ----------
+    values : by attribute name
+    where : the section of the file, for messages
+    keys : attribute name -> key of the file, for messages
+
+    Returns
+    -------
+    Material
+
+    Raises
+    ------
+    ValueError
+        If a value is missing, not of this kind of material, or out of range.
+    """
+    kind, needed, optional = _kind(values)
+    if missing := [keys[name] for name in needed if name not in values]:
+        raise ValueError(f"{where} lacks {' and '.join(missing)}; give it, or name a preset")
+    if others := [keys[name] for name in values if name not in (*needed, *optional)]:
+        raise ValueError(
+            f"{where} is {kind} and has no {' or '.join(others)}; leave it out, it has "
+            f"{', '.join(keys[name] for name in (*needed, *optional))}"
+        )
+    rest = {name: value for name, value in values.items() if name not in ("law", "table")}
+    if "table" in values:
+        return of_law(**rest, law=values["table"])
+    if "law" not in values:
+        return Material(**values)
+    solid = {name: rest.pop(name) for name in ("density", "poisson")}
+    return of_law(**solid, law=MODULUS_LAWS[values["law"]](**rest))
+
+
+def _kind(values: Mapping[str, Any]) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """A material in words, the attributes that it needs, and those that it may have."""
+    if "table" in values:
+        return "a table of complex moduli", TABULATED, ()
+    if "law" in values:
+        law = MODULUS_LAWS[choose("material law", values["law"], MODULUS_LAWS)]
+        own = (field.name for field in fields(law) if field.name != "shear_modulus")
+        return f"of law '{values['law']}'", (*PLAIN, "law", *own), ()
+    return "without a law", PLAIN, LOSSES
+
+
+def values_of(material: Material) -> dict[str, Any]:
+    """The values of a material that a scene file holds, by attribute name.
+
+    Raises
+    ------
+    ValueError
+        If its modulus law is a Python function.
+    """
+    law = material.law
+    if law is None:
+        found = {name: getattr(material, name) for name in (*PLAIN, *LOSSES)}
+        return {name: value for name, value in found.items() if value != ()}
+    if isinstance(law, ModulusTable):
+        return {"density": material.density, "poisson": material.poisson, "table": law}
+    for name, kind in MODULUS_LAWS.items():
+        if type(law) is kind:
+            return {attribute: getattr(material, attribute) for attribute in PLAIN} | {
+                "law": name, **{each.name: getattr(law, each.name) for each in fields(kind)}
+            }  # fmt: skip
+    raise ValueError(
+        "the material has a modulus law of its own, a Python function, which a scene file cannot "
+        "hold; give it Prony terms or a table, or simulate it from Python"
+    )
+
+
+def with_tables(scene: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The table of a scene with the numbers of files of moduli, named from a folder, in place of
+    their names.
+
+    Raises
+    ------
+    ValueError
+        If a file cannot be read or is no such table, with its path.
+    """
+    for material in _materials(scene):
+        if isinstance(name := material.get("table"), str):
+            material["table"] = written_table(_read(folder / name))
+    return scene
+
+
+def _materials(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    body = scene.get("body")
+    if isinstance(body, dict):
+        layers = body.get("layers")
+        parts = [body, *(layers if isinstance(layers, list) else [])]
+        found = (part.get("material") for part in parts if isinstance(part, dict))
+        yield from (material for material in found if isinstance(material, dict))
+
+
+def _read(path: Path) -> ModulusTable:
+    text = reading.text(path)
+    try:
+        return modulus_table(text)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def written_table(table: ModulusTable) -> dict[str, list[float]]:
+    """The columns of a table of complex moduli, by their keys."""
+    moduli = table.moduli
+    columns = (table.frequencies, [mu.real for mu in moduli], [mu.imag for mu in moduli])
+    return {key: list(column) for key, column in zip(COLUMNS, columns, strict=True)}
