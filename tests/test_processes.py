@@ -117,6 +117,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "report": small,
         "film": ["out", "--out", "film.gif"],
         "relax": small,
+        "dispersion": ["small.toml", "--quiet"],
         "tradeoff": ["small.toml", "--quiet"],
         "verify": ["--quick", "--quiet"],
     }  # fmt: skip

@@ -1,6 +1,7 @@
 """The interactive tool: its model, its state without a browser, and the page itself."""
 
 import asyncio
+import json
 import re
 import subprocess
 import sys
@@ -36,17 +37,20 @@ from skinwave.scene import BODIES, KINDS, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
 from skinwave.steps import PREPARING, Step, follower
+from skinwave.studies.driven_modes import driven_modes
 from skinwave.studies.paper15 import tactons
 from skinwave.web import (
     check_extra,
     controls,
     downloads,
     drawings,
+    guided,
     model,
     moves,
     moving,
     plots,
     scenes,
+    shown,
     slabs,
     waves,
     worker,
@@ -337,6 +341,37 @@ def test_a_main_lobe_on_a_slab_is_refused_rather_than_answered_as_a_gaussian():
 
 
 # What is shown
+
+
+@pytest.mark.parametrize("body", ["skin-slab", "paper-sheet"])
+def test_dispersion_curves_follow_the_load_and_are_computed_once_a_body(body):
+    here = STARTS | {"body": body, "shape": "circle", "size": 20, "speed": 12}
+    scene = scenes.scene_of(here)
+    plot = guided.dispersion_plot(scene, 600)
+    assert json.loads(json.dumps(plot, allow_nan=False)) == plot
+    speed = next(curve for curve in plot["data"] if curve.get("name") == "speed of the focus")
+    assert speed["y"] == [12, 12]
+    f_d = next(name for name in plot["names"] if name["said"][0] == "f<sub>d</sub>")
+    exact = next(line for line in driven_modes(scene).lines if line.name == "f_d")
+    assert f_d["x"] == pytest.approx(exact.frequency, abs=0.01)
+    assert f_d["y"] == pytest.approx(exact.phase_speed, rel=5e-3)
+    assert float(f_d["said"][1].split()[0].replace(",", "")) == pytest.approx(
+        1e3 * exact.decay_length, rel=0.01
+    )
+    known = guided.curves_of.cache_info().misses
+    slower = guided.dispersion_plot(scenes.scene_of(here | {"speed": 6, "am": 80}), 600)
+    assert guided.curves_of.cache_info().misses == known
+    assert slower["names"] != plot["names"]
+
+
+def test_the_third_plot_shows_what_is_chosen_of_what_the_body_has():
+    def third(body):
+        scene = scenes.scene_of(STARTS | {"body": body})
+        state = Mock(third="dispersion", highest=600)
+        return shown.third_plot(state, scene, plots.Curves(kernel=model.kernel(scene)))["title"]
+
+    assert third("palm").startswith("Dispersion")
+    assert third("none").startswith("Spectrum")
 
 
 def test_what_is_shown_is_what_simulate_answers():

@@ -1,8 +1,10 @@
-"""Wavenumber integral of a body: which bodies have one, its compliance, and its stack of layers."""
+"""Analytic solutions of a body: its stack of layers, their wavenumber integral and modes."""
 
 from math import inf
 
+from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
+from simple_model.dispersion import DispersionCurves, dispersion_curves
 from simple_model.layers import BASES, Stack
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import FLAT
@@ -63,6 +65,11 @@ def stack(body: Body) -> Stack:
     """
     if not body.of_kind.is_layer:
         raise ValueError(f"a body of kind '{body.kind}' is no stack of flat layers; take a slab")
+    return flattened(body)
+
+
+def flattened(body: Body) -> Stack:
+    """Layers of a body as a `stack`, as if all of it were flat and as deep as in its middle."""
     starts, materials = zip(*body.strata, strict=True)
     end = inf if body.base == "absorbing" else body.depth
     thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]
@@ -71,3 +78,43 @@ def stack(body: Body) -> Stack:
         thicknesses=tuple(thicknesses),
         base=body.base if body.base in BASES else BASES[0],
     )
+
+
+def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
+    """Dispersion curves of a laterally infinite body of the same section.
+
+    Parameters
+    ----------
+    body : Body
+    frequencies : (f,) float, Hz, above 0 and ascending
+    most : how many modes
+
+    Returns
+    -------
+    DispersionCurves
+
+    Raises
+    ------
+    ValueError
+        If its kind has none, as there is no body or it has no uniform depth.
+    """
+    if body.of_kind.dispersion is None:
+        raise ValueError(
+            f"dispersion curves are of a sheet, a slab or a palm, not of a body of kind "
+            f"'{body.kind}'; take a slab of its depth and layers"
+        )
+    return body.of_kind.dispersion(body, frequencies, most)
+
+
+def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
+    """Dispersion curves of a body's layers.
+
+    Parameters
+    ----------
+    body, frequencies, most : as for `dispersion`
+
+    Returns
+    -------
+    DispersionCurves
+    """
+    return dispersion_curves(flattened(body), frequencies, most=most)

@@ -9,8 +9,10 @@ import numpy as np
 
 from fem.materials import Material
 from meshes import Palm
+from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.compliance import Compliance
+from simple_model.dispersion import DispersionCurves
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.parts import FLAT, PLAIN, Layer, Placement, Relief, check_material, solid_of
@@ -175,6 +177,8 @@ class BodyKind:
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
     compliance : wavenumber integral of a laterally infinite body; None without any
+    dispersion : dispersion curves of a laterally infinite body of the same section, at
+        frequencies (f,) in Hz and of at most so many modes; None without any
     wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
     is_plate : bool, whether it is thin, so that it bends, in-plane tension stiffens it, and air
         adds mass
@@ -199,6 +203,7 @@ class BodyKind:
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3
     compliance: Callable[[Body], Compliance] | None = None
+    dispersion: Callable[[Body, Floats, int], DispersionCurves] | None = None
     wave_speed: Callable[[Body, float], float] = lambda body, frequency: _rayleigh(body, frequency)
     is_plate: bool = False
     is_layer: bool = False

@@ -10,6 +10,7 @@ from meshes import TetMesh, boundary_facets, palm_mesh
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats
+from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.coat import coat, meshed_strata
 from skinwave.bodies.discretised import Discretised, in_layers
@@ -76,6 +77,7 @@ PALM = register(
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
         may_be_coated=True,
+        dispersion=stack_dispersion,  # of a slab as deep as the middle of the palm
         mesh_is_cached=True,
     )
 )

@@ -9,7 +9,10 @@ from fem.materials import Material, rayleigh_damping
 from fem.viscoelastic import LOSS_BAND
 from meshes import sheet
 from meshes.shapes.structured import check_size, round_up
+from meshes.tetmesh import Floats
 from simple_model.compliance import AIR_DENSITY, Compliance, thin_sheet
+from simple_model.dispersion import DispersionCurves
+from simple_model.sheet_modes import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
@@ -58,6 +61,23 @@ def _check_size(body: Body, h: float) -> None:
 def compliance(body: Body) -> Compliance:
     """Compliance of an infinite sheet."""
     return thin_sheet(body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0)
+
+
+def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
+    """Dispersion curves of an infinite sheet: its bending wave and near field.
+
+    Parameters
+    ----------
+    body : Body, a sheet
+    frequencies : (f,) float, Hz
+    most : not asked, as there are two modes
+
+    Returns
+    -------
+    DispersionCurves
+    """
+    air_density = AIR_DENSITY if body.air else 0.0
+    return sheet_curves(body.solid, body.depth, frequencies, air_density=air_density)
 
 
 def bending_wavenumber(body: Body, frequency: float) -> float:
@@ -124,6 +144,7 @@ SHEET = register(
         default_size=lambda body: min(body.width, body.height) / SHEET_CELLS,
         interactive_size=2.5e-3,
         compliance=compliance,
+        dispersion=dispersion,
         wave_speed=lambda body, frequency: 2 * pi * frequency / bending_wavenumber(body, frequency),
         is_plate=True,
         is_symmetric=True,

@@ -10,7 +10,7 @@ from meshes.shapes.structured import check_size, with_planes
 from meshes.tetmesh import Floats
 from simple_model.compliance import layered
 from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
-from skinwave.bodies.analytic import stack
+from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
 from skinwave.bodies.parts import Layer
@@ -79,6 +79,7 @@ SLAB = register(
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),
+        dispersion=stack_dispersion,
         is_layer=True,
         is_symmetric=True,
         conforming=True,

@@ -7,6 +7,7 @@ from skinwave.commands import (
     cache,
     compare,
     convert,
+    dispersion,
     doctor,
     film,
     mesh,
@@ -24,7 +25,7 @@ from skinwave.commands import (
 )
 
 MODULES = (
-    run, compare, tradeoff, relax, plan, sweep, plot, mesh, convert, verify, report, film, web,
-    rerun, same, doctor, cache,
+    run, compare, tradeoff, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
+    film, web, rerun, same, doctor, cache,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

@@ -23,7 +23,7 @@ TOLERANCE = "relative error of waveforms"
 
 def add_output(parser: argparse.ArgumentParser) -> None:
     """Options of output: where and how results are written."""
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
+    parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder to write")
     parser.add_argument(
         "--overwrite", action="store_true", help="replace a folder that skinwave wrote"
     )

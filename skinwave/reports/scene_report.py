@@ -24,6 +24,8 @@ from skinwave.scene_file import dumps
 from skinwave.studies import description, summary, tables
 from skinwave.studies.changes import Drawn, beside_kernels, shown
 from skinwave.studies.claims import evaluate
+from skinwave.studies.dispersion_page import page_parts
+from skinwave.studies.driven_modes import driven_modes
 from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
 TABLED = 12  # lines in the table of lines
@@ -61,6 +63,7 @@ def write_report(
         document.section("What was modelled, and what was left out", *_modelled(album)),
         document.section("What comes out", *views),
         document.section("What the probes see", *drawn, *map(_lines, groups.values())),
+        *_guided(album, gallery),
         document.section("How far the models agree", *_comparison(album)),
         document.section("Effort", _effort(album)),
         document.section("How far to trust it", *_trust(album)),
@@ -222,6 +225,22 @@ def _level(level: float | None) -> str:
     if level is None:
         return ""
     return f"{round(level):+d}" if level >= FAINTEST else decibel(level)
+
+
+def _guided(album: Album, gallery: Gallery) -> list[str]:
+    """Dispersion curves of the scene's body, folded; nothing of a body that has none."""
+    if album.scene.body.of_kind.dispersion is None:
+        return []
+    try:
+        parts = page_parts(driven_modes(album.scene), gallery.figure, gallery.style)
+    except ValueError as error:  # such as a table of moduli that ends below the curves
+        parts = [document.paragraph(f"No dispersion curves: {error}.")]
+    folded = document.Markup(
+        "<details><summary>Speeds and decay of its modes, and which the load drives</summary>{}"
+        "</details>"
+    )
+    inside = document.Markup("\n").join(parts)
+    return [document.section("Which waves the body guides", folded.format(inside))]
 
 
 def _comparison(album: Album) -> list[str]:

@@ -15,7 +15,7 @@ from typing import Any
 
 from skinwave.web.controls import KEYS
 from skinwave.web.plots import SPANS
-from skinwave.web.shown import HIGHEST
+from skinwave.web.shown import HIGHEST, THIRD
 
 LONGEST = 10_000  # characters of a text
 LARGEST_NUMBER = 1e12
@@ -57,6 +57,7 @@ SET: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(("hold", "solid", "published", "dark", "about", "drawer"), is_switch),
     "span": lambda given: is_text(given) and given in SPANS,
     "highest": lambda given: is_number(given) and given in HIGHEST,
+    "third": lambda given: is_text(given) and given in THIRD,
     "phase": lambda given: is_number(given) and 0 <= given <= 100,
     "pulse": lambda given: is_number(given) and given >= 0,
     "rhythm_span": lambda given: is_number(given) and given >= 0,

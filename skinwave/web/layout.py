@@ -13,7 +13,7 @@ from simple_model.drive import DRIVES
 from skinwave.web import controls, drawings
 from skinwave.web.plots import SPANS
 from skinwave.web.session import Session
-from skinwave.web.shown import HIGHEST
+from skinwave.web.shown import HIGHEST, THIRD
 
 STATIC = Path(__file__).with_name("static")
 MODULE = {
@@ -31,6 +31,7 @@ LOST = """
 ITEMS: dict[str, list[Any]] = {  # of dropdowns
     "spans": list(SPANS),
     "highests": list(HIGHEST),
+    "thirds": list(THIRD),
     "ratio_items": list(controls.RATIOS),
     "drive_items": [
         {"title": f"{name.replace('_', ' ')}: {law.words}", "value": name}

@@ -28,8 +28,9 @@ LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 def connect(session: Session) -> None:
     """Have a page's session follow what is done on it, and compute its first response."""
     watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
-        (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest")), (phase, ("phase",)),
-        (solid, ("solid",)), (opened, ("opened",)), (published, ("published",)),
+        (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest", "third")),
+        (phase, ("phase",)), (solid, ("solid",)), (opened, ("opened",)),
+        (published, ("published",)),
     )  # fmt: skip
     for answered, keys in watched:
         session.state.change(*keys)(_without_state(answered, session))

@@ -9,7 +9,7 @@ from simple_model import MovingPressure, named_lines, published
 from simple_model.line_names import line_names
 from skinwave.propagation import share_outside
 from skinwave.scene import Body, Scene
-from skinwave.web import drawings, model, moving, plots
+from skinwave.web import drawings, guided, model, moving, plots
 from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.model import Answer
 from skinwave.web.plots import Curves
@@ -17,6 +17,7 @@ from skinwave.web.plots import Curves
 NAMED = 3  # lines that a sentence names
 PRESENT = 1e-2  # of the strongest line of a load: one that is named
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
+THIRD = ("spectrum", "dispersion")  # what the third plot shows
 
 
 def bodies(own: Body | None) -> list[str]:
@@ -31,7 +32,8 @@ def first(own: Body | None) -> dict[str, Any]:
         "busy": "", "done": 0, "left": "",
         "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
-        "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "dark": False, "solid": False,
+        "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "third": THIRD[0],
+        "dark": False, "solid": False,
         "summary": [], "warnings": [], "expected": "", "published": False,
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
@@ -48,7 +50,7 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
     span = plots.span_of(state.span, tacton.duration)
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
-        "spectrum_plot": plots.spectrum_plot(curves, state.highest),
+        "spectrum_plot": third_plot(state, scene, curves),
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
@@ -69,6 +71,16 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         })  # fmt: skip
     elif seen is None and state.body_motion:
         state.update({"body_shape": {}, "body_motion": {}})
+
+
+def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
+    """The spectrum, or the dispersion curves of the body if it has any and they are chosen."""
+    if state.third == THIRD[1] and guided.has_curves(scene.body):
+        try:
+            return guided.dispersion_plot(scene, state.highest)
+        except ValueError as error:  # a body that is too deep, say
+            state.problem = str(error)
+    return plots.spectrum_plot(curves, state.highest)
 
 
 def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:

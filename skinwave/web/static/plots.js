@@ -3,6 +3,7 @@
   const EDGE = { left: 56, right: 56, top: 22, bottom: 34 };
   const FONT = "Roboto, sans-serif";
   const PALE = 0.25; // opacity of curves that are not of what the controls say
+  const MODES = [1, 2, 3, 4, 5, 6].map((n) => `mode${n}`); // roles of dispersion curves
   const LEAST_DRAG = 6; // pixels that are no click any more
   const shown = {}; // by id of the canvas: { canvas, figure, zoom, drag, at }
 
@@ -95,13 +96,14 @@
   function entries(g, figure, w) {
     g.font = `500 12px ${FONT}`;
     let x = 4 + g.measureText(figure.title).width + 16, y = 11;
+    const named = figure.data.filter((curve) => curve.name);
     if (figure.data.length < 2 && !figure.legend) return { placed: [], top: EDGE.top };
     g.font = `11px ${FONT}`;
-    const widths = figure.data.map((curve) => g.measureText(curve.name).width + 34);
+    const widths = named.map((curve) => g.measureText(curve.name).width + 34);
     const all = widths.reduce((a, b) => a + b, 0), below = w - 6 - all < x;
     x = below ? EDGE.left + 4 : w - 6 - all;
     if (below) y += 16;
-    const placed = figure.data.map((curve, k) => {
+    const placed = named.map((curve, k) => {
       if (below && x > EDGE.left + 4 && x + widths[k] > w) {
         x = EDGE.left + 4;
         y += 16;
@@ -217,7 +219,8 @@
   // The value of each curve where the pointer is.
   function readout(g, { box, range, to, w }, plot, ink, paper) {
     const value = range[0] + ((plot.at - box.x) / box.w) * (range[1] - range[0]);
-    const said = plot.figure.data.filter((c) => !c.mirrored).map((curve) => {
+    const at = (c) => value >= xOf(c, 0) && value <= xOf(c, c.y.length - 1);
+    const said = plot.figure.data.filter((c) => c.name && !c.mirrored && at(c)).map((curve) => {
       let low = 0, high = curve.y.length - 1;
       while (high - low > 1) {
         const middle = (low + high) >> 1;
@@ -245,7 +248,7 @@
     const style = getComputedStyle(canvas), own = (name) => style.getPropertyValue(name).trim();
     const ink = own("--sw-ink"), faint = own("--sw-grid"), paper = own("--sw-paper");
     const colours = Object.fromEntries(
-      ["kernel", "published", "waves", "pinned", "threshold"].map((role) => [role, own(`--sw-${role}`)]));
+      ["kernel", "published", "waves", "pinned", "threshold", ...MODES].map((role) => [role, own(`--sw-${role}`)]));
     const g = canvas.getContext("2d"), said = entries(g, figure, canvas.clientWidth);
     plot.top = said.top;
     const at = scales(plot), { box } = at;

@@ -1,0 +1,68 @@
+"""Dispersion curves of a scene's body: speeds and decay of its waves, and which a Tacton drives."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skinwave.commands.common import (
+    add_mesh,
+    add_output,
+    add_scene,
+    metre,
+    progress_of,
+    summarise,
+)
+
+if TYPE_CHECKING:
+    from skinwave.studies.dispersion_page import Observed
+    from skinwave.studies.driven_modes import DrivenModes
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """Declare the command-line options."""
+    add_scene(parser)
+    parser.add_argument(
+        "--highest", type=float, default=650.0, metavar="HZ", help="up to which frequency"
+    )
+    parser.add_argument("--modes", type=int, default=6, metavar="N", help="how many modes, 1 to 12")
+    parser.add_argument(
+        "--model", choices=("fem", "flat-body"),
+        help="also the wavenumbers in the motion of a line of probes along x, by this model",
+    )  # fmt: skip
+    add_mesh(parser)
+    add_output(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; the exit code."""
+    from skinwave import record
+    from skinwave.outputs import output_folder
+    from skinwave.scene_file import read
+    from skinwave.simulation import check_options
+    from skinwave.studies.dispersion_page import observed_sentence, sentences, taken_as, write
+    from skinwave.studies.driven_modes import driven_modes
+
+    check_options(options.solver, h=metre(options.h))
+    if not 1 <= options.modes <= 12:
+        raise ValueError(f"--modes {options.modes} is outside 1..12; give one of these")
+    scene = read(options.scene)
+    found = driven_modes(scene, highest=options.highest, most=options.modes)
+    out = options.out or Path(f"{options.scene.stem}-dispersion")
+    inputs = [options.scene, scene.body.file]
+    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
+        observed = _observed(options, found) if options.model else None
+        write(folder, found, observed)
+        record.write(folder, record.of_command(options), scene=scene)
+    said = [" ".join(sentences(found)), *taken_as(scene)]
+    said += [observed_sentence(observed)] if observed else []
+    summary = {"out": str(out), "sentences": said}
+    summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
+    return 0
+
+
+def _observed(options: argparse.Namespace, found: "DrivenModes") -> "Observed":
+    """Motion along a line of probes, and the waves in it."""
+    from skinwave.studies.dispersion_page import observe
+
+    with progress_of(options) as progress:
+        return observe(found, options.model, progress, h=metre(options.h), solver=options.solver)
