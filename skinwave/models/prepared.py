@@ -110,7 +110,8 @@ def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance
     used = fem.available()[0] if solver == "auto" else solver
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
-        build.fixed, build.absorbing, build.drag, *rests, probes, BAND, tolerance, used, versions(),
+        build.fixed, build.absorbing, build.coat, build.drag, *rests, probes, BAND, tolerance, used,
+        versions(),
     )  # fmt: skip
 
 
