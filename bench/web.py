@@ -113,6 +113,9 @@ def in_a_browser(moves: int) -> None:
             row("slider to waves of the slab", [t / 1e3 for t in times])
             times = page.evaluate(PRESSED, ["height", moves, "waves (flat-body), µm"])
             row("height to waves of the slab", [t / 1e3 for t in times])
+            page.evaluate("document.getElementById('layers').open = true")
+            times = page.evaluate(PRESSED, ["modulus-0", moves, "waves (flat-body), µm"])
+            row("modulus of a layer to waves of the slab", [t / 1e3 for t in times])
             browser.close()
     finally:
         server.terminate()

@@ -29,6 +29,7 @@ from fem import nonlinear
 from fem.added_mass import AddedMass, added_mass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
+from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
@@ -62,6 +63,7 @@ from simple_model.material import PRESETS, Material, PronyTerm, from_young, of_l
 __all__ = [
     "PRESETS",
     "AddedMass",
+    "Coat",
     "Complex",
     "DispersiveBranch",
     "Diverged",

@@ -10,27 +10,29 @@
     K      += int k delta_ij N_a N_b dA where a surface rests on springs of k per area
     K_j     = (mu_j/mu) K of the elements with a Prony term of one relaxation time: the stiffness
               of a generalised Maxwell branch, see `maxwell`
+    and likewise of thin layers at a surface, see `coat`
 
 Where nu > 0.45 most of lam acts on a projection of the dilatation, see `pressure_projection`;
 without that volumetric locking makes displacements some wavelengths away several per cent too
 small.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.boundary import Support, dashpots, fixed_dofs, springs
+from fem.coat import Coat, coat_operators
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
-from fem.materials import Material, rayleigh_damping
-from fem.maxwell import Branch, DispersiveBranch, MaxwellBranch, on_free
+from fem.materials import Material
+from fem.maxwell import Branch, on_free
 from fem.pressure_projection import projected_divergence
 from fem.sparsity import UPPER, SparsityPattern, from_components, from_nodal, slabs
+from fem.viscoelastic import Matrices, property_of, together, viscoelastic
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
@@ -38,7 +40,6 @@ LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra do no
 UNPROJECTED = (
     2.0  # lam / mu of the unprojected part beyond it; a slab's error was least with 1 to 3
 )
-LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +75,7 @@ def assemble(
     absorbing: str | Ints | None = None,
     drag: Floats | None = None,
     support: Support | None = None,
+    coat: Coat | None = None,
 ) -> Operators:
     """Assemble the operators of a body.
 
@@ -86,6 +88,7 @@ def assemble(
     absorbing : absorbing facets (dashpots), by the name of their set or as nodes, or None.
     drag : (m,) float, 1/s, mass-proportional damping of each element in an absorbing layer
     support : springs and dashpots of a surface as functions of position, or None
+    coat : thin layers at a surface, in place of the material that is meshed there, or None
 
     Returns
     -------
@@ -106,6 +109,9 @@ def assemble(
         raise ValueError("every node is fixed; leave some of the body free to move")
 
     K, C, M, branches = _volume_operators(mesh, pattern, materials, region)
+    if coat is not None:
+        added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
+        K, C, M, branches = together((K, C, M, branches), added)
     R = sparse.csr_array(K.shape)
     if absorbing is not None:
         R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
@@ -114,7 +120,7 @@ def assemble(
     if support is not None and support.absorbed.any():
         R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
     if drag is not None:
-        R = R + _drag(mesh, pattern, _of(materials, "density")[region] * drag)
+        R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
     if R.nnz:
         C = C + R
     if len(free) < mesh.n_dofs:
@@ -123,19 +129,11 @@ def assemble(
     return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
 
 
-def _of(materials: list[Material], name: str) -> Floats:
-    """A property (r,) of the materials."""
-    return np.array([getattr(m, name) for m in materials], np.float64)
-
-
 def _volume_operators(
     mesh: TetMesh, pattern: SparsityPattern, materials: list[Material], region: Ints
-) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]:
+) -> Matrices:
     """K, C, M and the branches of all materials, on all dofs."""
-    rho, mu, lam = (_of(materials, name) for name in ("density", "shear_modulus", "first_lame"))
-    mass_rate, hysteretic_lag = np.array(
-        [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
-    ).T
+    mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
     D = {
         m: projected_divergence(elements_of(mesh, region == m))
@@ -149,47 +147,7 @@ def _volume_operators(
         summed = from_components(pattern, pattern.sum(blocks, 6))
         return sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
 
-    def portion(share: Floats) -> sparse.csr_array:
-        """The same, which is a multiple of K if all materials have one share."""
-        if not np.ptp(share):
-            return share[0] * K if share[0] else sparse.csr_array(K.shape)
-        summed = stiffness(share)
-        summed.eliminate_zeros()
-        return summed
-
-    K = stiffness(np.ones(len(materials)))
-    M = _mass(mesh, pattern, rho[region])
-    branches = _branches(materials, portion)
-    C = portion(hysteretic_lag + _of(materials, "viscosity") / mu)
-    if np.ptp(mass_rate):
-        C = C + _mass(mesh, pattern, (mass_rate * rho)[region])
-    elif mass_rate[0]:
-        C = C + mass_rate[0] * M
-    return K, C, M, branches
-
-
-def _branches(
-    materials: list[Material], portion: Callable[[Floats], sparse.csr_array]
-) -> tuple[Branch, ...]:
-    """A Maxwell branch of each relaxation time, and one of each material with a law of its own;
-    `portion` of shares (r,) of the materials' moduli is their stiffness.
-    """
-    terms = [(r, term) for r, m in enumerate(materials) for term in m.prony if term.modulus]
-    shares: dict[float, Floats] = {
-        time: np.zeros(len(materials)) for time in sorted({term.time for _, term in terms})
-    }
-    for r, term in terms:
-        shares[term.time][r] += term.modulus / materials[r].shear_modulus
-    own = [(np.eye(len(materials))[r], m) for r, m in enumerate(materials) if m.law is not None]
-    return (
-        *(MaxwellBranch(K=portion(share), time=time) for time, share in shares.items()),
-        *(DispersiveBranch(K=portion(only), modulus=_relative(m)) for only, m in own),
-    )
-
-
-def _relative(material: Material) -> Callable[[Any], Any]:
-    """Complex modulus over that at rest, as a function of the angular frequency in rad/s."""
-    return lambda w: material.complex_modulus(w) / material.shear_modulus
+    return viscoelastic(materials, stiffness, lambda rho: _mass(mesh, pattern, rho[region]))
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:

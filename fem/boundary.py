@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.load_and_probe import facet_geometry, facet_normals
@@ -34,7 +34,7 @@ class Support:
     absorbed: Floats
 
 
-def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Ints:
+def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> NDArray[np.bool_]:
     """Mask (3 n,) bool of the fixed degrees of freedom, whose displacement is 0."""
     if isinstance(fixed, str):
         fixed = {fixed: "xyz"}
@@ -81,7 +81,7 @@ def dashpots(
     """
     if share is not None:
         nodes, share = _where(nodes, share)
-    m = [materials[r] for r in region[_owners(mesh, nodes)]]
+    m = [materials[r] for r in region[owners(mesh, nodes)]]
     shear = np.array([x.density * x.shear_speed for x in m])
     squared_ratio = np.array(
         [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]
@@ -115,7 +115,7 @@ def _over_facets(mesh: TetMesh, nodes: Ints, traction: Floats) -> sparse.csr_arr
     return sparse.csr_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
-def _owners(mesh: TetMesh, nodes: Ints) -> Ints:
+def owners(mesh: TetMesh, nodes: Ints) -> Ints:
     """The tetrahedron behind each facet: the one that has all its corners."""
     n = len(mesh.points)
     corner_sets = mesh.tets[:, FACES[:, :3]].reshape(-1, 3)

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.assembly import LOSS_BAND, Operators, assemble, by_region
+from fem.assembly import Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
 from fem.sparsity import UPPER, SparsityPattern, from_components, slabs
+from fem.viscoelastic import LOSS_BAND
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 

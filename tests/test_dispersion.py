@@ -7,10 +7,10 @@ import pytest
 
 from simple_model.compliance import half_space, slab, thin_sheet
 from simple_model.dispersion import dispersion_curves
-from simple_model.flat_body import point_response
 from simple_model.layers import Stack
 from simple_model.material import PRESETS, Material
 from simple_model.sheet_modes import sheet_curves
+from simple_model.wavenumber_integral import point_response
 
 WIDTH = 4.35e-3  # m, of the focal spot
 SOFT = Material(density=1000, shear_modulus=8e3, poisson=0.45, viscosity=1.0)

@@ -13,7 +13,8 @@ from simple_model import Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
 from skinwave.bodies.analytic import has_exact_waves
 from skinwave.bodies.build import build
-from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.coat import coarsest_size
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.comparison import compare
 from skinwave.models import Request
@@ -299,11 +300,12 @@ def test_exact_waves_are_not_planned_for_what_has_none():
 
 
 def test_meshes_of_a_palm_tell_its_layers_apart():
-    thin = Body(kind="palm", layers=(Layer(thickness=1e-3, material="dermis"),))
+    fat = Layer(thickness=3e-3, material="fat")  # what is below it is no coat
+    thin = Body(kind="palm", layers=(fat, Layer(thickness=1e-3, material="dermis")))
     assert default_size(thin) == coarsest_size(thin) == 2e-3
     thick = Body(kind="palm", layers=(Layer(thickness=2.5e-3, material="dermis"),))
     assert default_size(thick) == default_size(Body(kind="palm"))
-    fine = Body(kind="palm", layers=(Layer(thickness=0.6e-3, material="epidermis"),))
+    fine = Body(kind="palm", layers=(fat, Layer(thickness=0.6e-3, material="epidermis")))
     for body, h, cure in ((thin, 2.1e-3, "elements of 2 mm"), (fine, 2e-3, "elements of 1.2 mm")):
         with pytest.raises(ValueError, match=f"thinner than half an element.*take {cure}, thicker"):
             check_mesh(body, h)
@@ -312,7 +314,8 @@ def test_meshes_of_a_palm_tell_its_layers_apart():
 @pytest.mark.parametrize("h", [5e-3, 0.6e-3, 0.2e-3])
 def test_a_layer_that_no_mesh_of_a_palm_resolves_is_refused_in_one_way(h):
     """Whatever the elements: smaller ones are more than the mesher may make."""
-    thin = Body(kind="palm", layers=(Layer(thickness=0.3e-3, material="epidermis"),))
+    fat = Layer(thickness=3e-3, material="fat")
+    thin = Body(kind="palm", layers=(fat, Layer(thickness=0.3e-3, material="epidermis")))
     for do in (check_mesh, build):
         with pytest.raises(ValueError, match="take thicker layers, or a slab") as error:
             do(thin, h)

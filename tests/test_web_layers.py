@@ -14,7 +14,7 @@ from skinwave.web import moves
 from skinwave.web.controls import STARTS, checked, from_query, to_query
 from skinwave.web.layer_values import layers_of, rows, with_layers
 from skinwave.web.scenes import scene_of
-from skinwave.web.slabs import is_tabulated, tabulate, wavenumbers
+from skinwave.web.slabs import is_tabulated, lowest, tabulate, wavenumbers
 
 SKIN = Body(
     material="muscle",
@@ -108,7 +108,7 @@ def test_layers_are_moved_one_by_one(session):
 def test_the_table_of_layers_is_their_wavenumber_integral():
     assert is_tabulated(SKIN)
     assert not is_tabulated(replace(SKIN, base="free"))
-    table = tabulate(wavenumbers(SKIN, lambda *_: None), 0.2)
+    table = tabulate(wavenumbers(SKIN, lowest(0.2), lambda *_: None), 0.2)
     f, r = table.frequencies[[0, 20, 56, 120]], table.distances[[0, 10, 30]]
     expected = point_response(layered(stack(SKIN)), r, 2 * np.pi * f, 4.35e-3)
     found = table.g[[0, 20, 56, 120]][:, [0, 10, 30]]

@@ -1,6 +1,4 @@
-"""Analytic solutions of a body: its wavenumber integral, its stack of layers, and the waves that it
-guides.
-"""
+"""Analytic solutions of a body: its stack of layers, their wavenumber integral and modes."""
 
 from math import inf
 
@@ -56,6 +54,32 @@ def compliance(body: Body) -> Compliance:
     return body.of_kind.compliance(body)
 
 
+def stack(body: Body) -> Stack:
+    """Layers of a slab as infinite ones. An absorbing base radiates as a half-space of the
+    lowest material does, which is there instead.
+
+    Raises
+    ------
+    ValueError
+        If the body is no slab.
+    """
+    if not body.of_kind.is_layer:
+        raise ValueError(f"a body of kind '{body.kind}' is no stack of flat layers; take a slab")
+    return flattened(body)
+
+
+def flattened(body: Body) -> Stack:
+    """Layers of a body as a `stack`, as if all of it were flat and as deep as in its middle."""
+    starts, materials = zip(*body.strata, strict=True)
+    end = inf if body.base == "absorbing" else body.depth
+    thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]
+    return Stack(
+        materials=materials,
+        thicknesses=tuple(thicknesses),
+        base=body.base if body.base in BASES else BASES[0],
+    )
+
+
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
     """Dispersion curves of a laterally infinite body of the same section.
 
@@ -82,20 +106,6 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
     return body.of_kind.dispersion(body, frequencies, most)
 
 
-def stack(body: Body) -> Stack:
-    """Layers of a body as infinite ones. An absorbing base radiates as a half-space of the
-    lowest material does, which is there instead.
-    """
-    starts, materials = zip(*body.strata, strict=True)
-    end = inf if body.base == "absorbing" else body.depth
-    thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]
-    return Stack(
-        materials=materials,
-        thicknesses=tuple(thicknesses),
-        base=body.base if body.base in BASES else BASES[0],
-    )
-
-
 def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
     """Dispersion curves of a body's layers.
 
@@ -107,4 +117,4 @@ def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCu
     -------
     DispersionCurves
     """
-    return dispersion_curves(stack(body), frequencies, most=most)
+    return dispersion_curves(flattened(body), frequencies, most=most)

@@ -187,6 +187,7 @@ class BodyKind:
     is_bounded : bool, whether width and height are those of its surface
     may_be_layered : bool
     conforming : bool, whether elements follow its layers
+    may_be_coated : bool, whether layers that elements do not resolve may be a coat
     mesh_is_cached : bool, whether its mesh is one per machine, which no run has to wait for
     normal_patch : float, metre, standard deviation of the area about a probe whose mean normal is
         the direction of its motion; 0 for the normal at the probe
@@ -210,6 +211,7 @@ class BodyKind:
     is_bounded: bool = True
     may_be_layered: bool = True
     conforming: bool = False
+    may_be_coated: bool = False
     mesh_is_cached: bool = False
     normal_patch: float = 0.0
 

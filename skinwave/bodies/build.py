@@ -7,6 +7,7 @@ import numpy as np
 
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
+from fem.coat import Coat
 from fem.materials import Material
 from meshes import TetMesh, half
 from meshes.tetmesh import Floats, Ints
@@ -20,14 +21,15 @@ COMPARED = 4 / 3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Build:
-    """Meshed body: arguments of `fem.assemble`; `drag` (m,) in 1/s of the absorbing layer, or None;
-    `support` of a hand, or None.
+    """Meshed body: arguments of `fem.assemble`; `coat` and `support` of a hand, or None; `drag`
+    (m,) in 1/s of the absorbing layer, or None.
     """
 
     mesh: TetMesh
     material: dict[int, Material]
     fixed: dict[str, str]
     absorbing: Ints | None
+    coat: Coat | None = None
     drag: Floats | None = None
     support: Support | None = None
     symmetry: str = ""
@@ -83,6 +85,7 @@ def build(
         material=dict(enumerate(made.materials)),
         fixed=fixed,
         absorbing=np.vstack(leaky) if leaky else None,
+        coat=made.coat,
         drag=drag,
         support=support,
         symmetry=symmetry,
@@ -98,4 +101,5 @@ def operators(build: Build) -> Operators:
         absorbing=build.absorbing,
         drag=build.drag,
         support=build.support,
+        coat=build.coat,
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.boundary import Support
+from fem.coat import Coat
 from fem.materials import Material
 from meshes import TetMesh
 from meshes.tetmesh import Floats
@@ -19,13 +20,14 @@ class Discretised:
     """Mesh of a body in its own frame, of 10-node tetrahedra, with facets `top`, and `bottom` and
     `sides` where conditions of these names hold.
 
-    `materials` by region; `drag`: mass-proportional damping (m,) in 1/s of the elements of a mesh;
-    `support`: elastic and absorbing support of a mesh. Both are called with the part of the mesh
-    that symmetry leaves.
+    `materials` by region; `coat`: thin layers at the top; `drag`: mass-proportional damping (m,) in
+    1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh. Both are
+    called with the part of the mesh that symmetry leaves.
     """
 
     mesh: TetMesh
     materials: Sequence[Material]
+    coat: Coat | None = None
     drag: Callable[[TetMesh], Floats] | None = None
     support: Callable[[TetMesh], Support] | None = None
 
@@ -46,9 +48,3 @@ def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, l
     starts, materials = zip(*strata, strict=True)
     region = np.searchsorted(starts[1:], depths, side="right")
     return replace(mesh, region=region), list(materials)
-
-
-def resolving_size(strata: Strata) -> float:
-    """Coarsest size in metre of elements that resolve layers which they do not follow."""
-    starts = [start for start, _ in strata]
-    return float(np.diff(starts).min(initial=np.inf)) / THINNEST

@@ -9,7 +9,7 @@ from fem.load_and_probe import facet_geometry
 from meshes import TetMesh, boundary_facets, corner_volumes
 from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
-from skinwave.bodies.discretised import resolving_size
+from skinwave.bodies.coat import coarsest_size
 
 HAND_CELL = 5e-3  # m: within 1.2 % of elements of 3 mm at every probe, at a third of the cost
 FINE_PALM = 2e-3  # m: elements of a palm with thin layers, 300,000 dofs; finer ones on request only
@@ -23,7 +23,7 @@ STIFFEST = 1e6
 
 def hand_size(body: Body) -> float:
     """Default element size of a hand, metre, whatever its depth."""
-    return min(HAND_CELL, max(resolving_size(body.strata), FINE_PALM))
+    return min(HAND_CELL, max(coarsest_size(body), FINE_PALM))
 
 
 def support(

@@ -10,6 +10,7 @@ from meshes import MeshError, TetMesh, body_from_file, boundary_facets, quadrati
 from meshes.facets import seen_from_above
 from meshes.tetmesh import Ints
 from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.coat import coat, meshed_strata
 from skinwave.bodies.discretised import Discretised, in_layers
 from skinwave.bodies.hands import depths, hand_size, support
 
@@ -34,8 +35,13 @@ def discretise(body: Body, h: float) -> Discretised:
     if not _is_rest(mesh):
         facets["bottom"] = mesh.facets["bottom"]
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets=facets)
-    mesh, materials = in_layers(mesh, body.strata, depths(mesh))
-    return Discretised(mesh=mesh, materials=materials, support=lambda mesh: _support(body, mesh))
+    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
+    return Discretised(
+        mesh=mesh,
+        materials=materials,
+        coat=coat(body, h),
+        support=lambda mesh: _support(body, mesh),
+    )
 
 
 def _support(body: Body, mesh: TetMesh) -> fem.Support:
@@ -71,6 +77,7 @@ MESH = register(
         discretise=discretise,
         default_size=hand_size,
         is_bounded=False,
+        may_be_coated=True,
         normal_patch=NORMAL_PATCH,
     )
 )

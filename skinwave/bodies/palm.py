@@ -12,6 +12,7 @@ from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.coat import coat, meshed_strata
 from skinwave.bodies.discretised import Discretised, in_layers
 from skinwave.bodies.hands import depths, hand_size, support
 
@@ -36,8 +37,13 @@ def discretise(body: Body, h: float) -> Discretised:
     coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
     mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
-    mesh, materials = in_layers(mesh, body.strata, depths(mesh))
-    return Discretised(mesh=mesh, materials=materials, support=lambda mesh: _support(body, mesh))
+    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
+    return Discretised(
+        mesh=mesh,
+        materials=materials,
+        coat=coat(body, h),
+        support=lambda mesh: _support(body, mesh),
+    )
 
 
 def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
@@ -65,11 +71,12 @@ PALM = register(
     BodyKind(
         name="palm",
         keys=("relief",),
-        presets={"palm": {"width": 0.085}},
+        presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
         discretise=discretise,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
+        may_be_coated=True,
         dispersion=stack_dispersion,  # of a slab as deep as the middle of the palm
         mesh_is_cached=True,
     )

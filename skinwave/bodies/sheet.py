@@ -4,8 +4,9 @@ from dataclasses import replace
 from math import pi
 
 from fem.added_mass import AddedMass, added_mass
-from fem.assembly import LOSS_BAND, Operators
+from fem.assembly import Operators
 from fem.materials import Material, rayleigh_damping
+from fem.viscoelastic import LOSS_BAND
 from meshes import sheet
 from meshes.shapes.structured import check_size, round_up
 from meshes.tetmesh import Floats

@@ -69,8 +69,14 @@ def probe_rows(
     -------
     (p c, 3 n) sparse, the c components of a probe next to each other; p materials, none where
     nothing depends on them
+
+    Raises
+    ------
+    ValueError
+        If a probe is not in the body, or its strain in a coat.
     """
     asked = reading.asked
+    _check_coat(build, reading)
     if asked.is_normal and reading.is_on_surface:
         return surface_motion(body, build, probes), ()
     mesh = build.mesh
@@ -84,6 +90,24 @@ def probe_rows(
     if asked.field == STRAIN:
         return (rows @ strain_operator(mesh, build.material, points)).tocsr(), solids
     return (rows @ displacement_operator(mesh, points)).tocsr(), solids
+
+
+def _check_coat(build: Build, reading: Reading) -> None:
+    """Refuse strain and stress in a coat, where elements are of the material below it.
+
+    Raises
+    ------
+    ValueError
+        If it is so.
+    """
+    thickness = sum(build.coat.thicknesses) if build.coat else 0.0
+    least = min(reading.depths, default=0.0)
+    if reading.asked.field == STRAIN and least < thickness:
+        raise ValueError(
+            f"{reading.asked.words} at a depth of {1e3 * least:g} mm is in layers of "
+            f"{1e3 * thickness:g} mm that are a coat, without elements of their own; take smaller "
+            "elements, or a greater depth"
+        )
 
 
 def line_factor(asked: Quantity, s: Any, solids: tuple[Material, ...], outputs: int) -> fem.Complex:

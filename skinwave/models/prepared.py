@@ -131,8 +131,8 @@ def _entry_name(
     read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
-        build.fixed, build.absorbing, build.drag, *rests, probes, BAND, tolerance, used, versions(),
-        *read,
+        build.fixed, build.absorbing, build.coat, build.drag, *rests, probes, BAND, tolerance, used,
+        versions(), *read,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Extent of a body that a scene requires, its symmetry, and physics that is neglected."""
+"""Extent of a body that a scene requires, its symmetry, its coat, and physics that is neglected."""
 
 from dataclasses import dataclass, replace
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from simple_model.focus import spot_width
 from skinwave.bodies.analytic import is_flat_layer
+from skinwave.bodies.coat import AT, layer_name
+from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.sheet import air_mass
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
@@ -72,6 +74,24 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[P
         f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
     )
     return replace(body, width=width, height=height), [row]
+
+
+def coat_rows(body: Body, h: float) -> list[PlanRow]:
+    """Top layers that are a coat, and why."""
+    coat = coat_of(body, h)
+    if coat is None:
+        return []
+    return [
+        PlanRow(
+            what="coat",
+            value=" and ".join(
+                f"{layer_name(body, solid)} of {1e3 * thickness:g} mm"
+                for solid, thickness in zip(coat.materials, coat.thicknesses, strict=True)
+            ),
+            reason=f"a Kirchhoff shell on the surface: thinner than half an element of "
+            f"{1e3 * h:.3g} mm, and than a tenth of a shear wavelength at {AT:g} Hz",
+        )
+    ]
 
 
 def left_out(scene: Scene, highest: float) -> list[PlanRow]:

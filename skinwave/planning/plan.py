@@ -19,7 +19,7 @@ from skinwave.planning.estimates import (
     reflection_and_transient,
     response_spectrum,
 )
-from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
+from skinwave.planning.extent import PlanRow, coat_rows, extent, left_out, symmetry
 from skinwave.planning.refinement import Convergence, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
@@ -236,6 +236,7 @@ def _element_rows(
             if found.convergence is not Convergence.SINGLE_MESH
             else "the file's own, without another to compare it with",
         ),
+        *coat_rows(scene.body, found.h),
         PlanRow(
             what="reduction",
             value=f"{effort.reduced_dofs} dofs, {effort.estimate:.0e} up to {BAND:.0f} Hz",

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
+from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.hands import FINE_PALM
-from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.effort import Progress
 from skinwave.models.prepared import (

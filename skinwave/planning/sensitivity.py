@@ -12,7 +12,8 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats
 from simple_model.load_spectrum import reduced_lines
-from skinwave.bodies.sizes import coarsest_size, default_size
+from skinwave.bodies.coat import coarsest_size
+from skinwave.bodies.sizes import default_size
 from skinwave.models.prepared import Prepared, prepare
 from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene

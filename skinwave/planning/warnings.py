@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fem.assembly import LOSS_BAND
 from fem.materials import rayleigh_damping
+from fem.viscoelastic import LOSS_BAND
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.focus import spot_width

@@ -122,9 +122,9 @@ def _driven(line: DrivenLine) -> str:
         return f"{start}no propagating wave: evanescent motion, {line.mode.name}, {away}."
     wave = f"the {line.mode.name}" if " " in line.mode.name.strip("0123456789 ") else line.mode.name
     return (
-        f"{start}most of all {wave} ({line.kind}), which runs at "
-        f"{significant(line.phase_speed)} m/s, is {significant(1e3 * line.wavelength)} mm long and "
-        f"{away}."
+        f"{start}most of all {wave} ({line.kind}): its phase speed is "
+        f"{significant(line.phase_speed)} m/s, its wavelength "
+        f"{significant(1e3 * line.wavelength)} mm, and it {away}."
     )
 
 

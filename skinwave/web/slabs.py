@@ -3,9 +3,9 @@
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
 in which only the transform S of the focal pressure profile depends on the height: G, which takes
-the time, is cached on one grid of wavenumbers that is fine and wide enough for the narrowest
-profile. As in `simple_model.flat_body` the path of integration runs above the real axis, away from
-the poles of waves.
+the time, is cached on a grid of wavenumbers that is fine and wide enough for the narrowest profile
+of a range of heights. As in `simple_model.wavenumber_integral` the path of integration runs above
+the real axis, away from the poles of waves.
 """
 
 from dataclasses import dataclass
@@ -26,9 +26,9 @@ HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
 MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor above which motion there lasts 10 ms
 FURTHEST = 0.145  # m: from a path in one corner of the area to the other
-LOWEST = 0.02  # m: the height whose focal spot is the narrowest
+RANGES = 0.02, 0.08, 0.16  # m: heights that ranges begin at, whose focal spots are the narrowest
 ORDER = 16  # of Gauss and Legendre's rule on each panel
-FEWEST_NODES = 512  # of the wavenumber grid
+FEWEST_NODES = 256  # of the wavenumber grid
 LOOKED = 16  # every so many frequencies and distances the grid is checked at
 PHASE = "wavenumber integral of the slab"
 
@@ -62,8 +62,23 @@ def is_tabulated(body: Body) -> bool:
     return has_exact_waves(body) and stack(body).is_fixed
 
 
-def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
-    """The compliance of a flat body on a grid that serves every height.
+def lowest(height: float) -> float:
+    """Height in metre that the range of a height begins at."""
+    return max((low for low in RANGES if low <= height), default=RANGES[0])
+
+
+def wavenumbers(body: Body, low: float, progress: Progress) -> Wavenumbers:
+    """The compliance of a flat body on a grid that serves every height of a range.
+
+    Parameters
+    ----------
+    body : Body
+    low : metre, where the range begins
+    progress : is told of the phase
+
+    Returns
+    -------
+    Wavenumbers
 
     Raises
     ------
@@ -72,12 +87,12 @@ def wavenumbers(body: Body, progress: Progress) -> Wavenumbers:
     """
     progress(PHASE, 0.0)
     answer, frequencies = compliance(body), _frequencies(body)
-    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(LOWEST)[::LOOKED]
-    coarse = _tabulated(_on_grid(answer, some, n), LOWEST, at)
+    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(low)[::LOOKED]
+    coarse = _tabulated(_on_grid(answer, some, low, n), low, at)
     while n < MOST_NODES:
-        fine = _tabulated(_on_grid(answer, some, 2 * n), LOWEST, at)
+        fine = _tabulated(_on_grid(answer, some, low, 2 * n), low, at)
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
-            return _on_grid(answer, frequencies, n)
+            return _on_grid(answer, frequencies, low, n)
         coarse, n = fine, 2 * n
     raise ArithmeticError(UNRESOLVED)
 
@@ -115,14 +130,14 @@ def _tabulated(known: Wavenumbers, height: float, distances: Floats) -> fem.Comp
     return np.asarray(carried @ jv(0, k[:, None] * distances))
 
 
-def _on_grid(answer: Compliance, frequencies: Floats, n: int) -> Wavenumbers:
+def _on_grid(answer: Compliance, frequencies: Floats, low: float, n: int) -> Wavenumbers:
     w = 2 * np.pi * frequencies.astype(np.complex128)
     lift = min(1.5 / FURTHEST, answer.clearance(w))  # J0 grows by e^1.5 at most
     if not lift > 0:
         raise ArithmeticError(UNRESOLVED)
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
     # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
-    edges = 6.5 / spot_width(LOWEST) * np.linspace(0, 1, n // ORDER + 1) ** 2
+    edges = 6.5 / spot_width(low) * np.linspace(0, 1, n // ORDER + 1) ** 2
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     along = (middle[:, None] + half[:, None] * nodes).ravel()
     ramp = np.tanh(along / lift)

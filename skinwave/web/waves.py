@@ -61,7 +61,7 @@ from skinwave.web.model import (
     places,
 )
 from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
-from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, tabulate, wavenumbers
+from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, tabulate, wavenumbers
 
 TAIL = 0.4  # s that motion may last after the Tacton
 FINER = 4  # places of a map's table in each interval of the table
@@ -107,7 +107,8 @@ class BodyResponses:
         if is_tabulated(scene.body):
             gaussian_only(scene.pressure)
             height = scene.pressure.height
-            known = self._keep("known", scene.body, lambda: wavenumbers(scene.body, progress))
+            wide = scene.body, lowest(height)
+            known = self._keep("known", wide, lambda: wavenumbers(*wide, progress))
             table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
             return warned_of(scene, flat_answer(table, scene, moving))
         tacton = scene.tacton
