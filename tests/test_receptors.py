@@ -3,17 +3,20 @@
 import csv
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_stress import boussinesq
 
-import skinwave
+from fem.coat import Coat
 from simple_model import lines
 from simple_model.focus import spot_width
 from simple_model.quantities import QUANTITIES, Quantity, register
 from simple_model.tensors import energy_root, largest_shear, von_mises
 from skinwave.cli import main
+from skinwave.models import check_reading, named
+from skinwave.models.loads import probe_rows
 from skinwave.models.prepared import sample_times
 from skinwave.reports.album import open_album
 from skinwave.run import Run
@@ -97,13 +100,11 @@ def test_a_sheet_has_the_motion_of_its_surface_alone():
 def test_a_model_without_the_quantity_refuses_it():
     sheet = loads('[tacton]\nduration_s = 0.01\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
                   'sides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n')  # fmt: skip
-    assert skinwave.models.named("fem-nonlinear").reads(replace(sheet, quantity="velocity"))
-    assert not skinwave.models.named("fem-nonlinear").reads(scene("strain_zz"))
+    assert named("fem-nonlinear").reads(replace(sheet, quantity="velocity"))
     kernel = compute(scene("strain_zz", "2"), "point-kernel")
     assert (kernel.quantity, kernel.unit) == ("pressure", "Pa")
-    for command in ("compare", "relax", "report"):
-        path = Path(__file__).with_name("no-such-folder")
-        assert not path.exists(), command
+    with pytest.raises(ValueError, match="fem-nonlinear has no strain zz at a depth of 2 mm"):
+        check_reading(named("fem-nonlinear"), scene("strain_zz", "2"))
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])
@@ -283,6 +284,15 @@ def test_the_interactive_tool_has_quantity_and_depth():
     assert not any(curve["role"] == "threshold" for curve in drawn["data"])
     with pytest.raises(ValueError, match="strain zz at a depth of 0.7 mm of a palm is not"):
         BodyResponses()(scene_of(values | {"body": "palm"}), lambda phase, done: None)
+
+
+def test_strain_in_a_coat_is_refused():
+    """Elements there are of the material below it."""
+    coat = Coat(materials=(scene().body.solid,), thicknesses=(0.3e-3,))
+    build = SimpleNamespace(coat=coat)
+    reading = replace(scene("strain_zz", "[0.1, 2]").reading)
+    with pytest.raises(ValueError, match="at a depth of 0.1 mm is in layers of 0.3 mm that are a"):
+        probe_rows(scene().body, build, np.zeros((2, 2)), reading)
 
 
 def test_names_of_quantities_are_given_once():
