@@ -58,8 +58,11 @@ class Mode:
 
     @property
     def group_speed(self) -> Floats:
-        """Group speed (f,) in m/s."""
-        return np.asarray(1 / self.slowness.real)
+        """Group speed 1 / Re dk/dw (f,) in m/s; NaN where the imaginary part of dk/dw is larger:
+        a packet changes its shape there before it moves on.
+        """
+        real, imaginary = self.slowness.real, self.slowness.imag
+        return np.where(np.abs(imaginary) > np.abs(real), np.nan, 1 / real)
 
     @property
     def decay_length(self) -> Floats:

@@ -32,9 +32,8 @@ from simple_model.material import Complex, Floats, Material
 THIN = 0.3  # thickness times wavenumber below which differences of exponentials lose digits
 NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
 BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
-WEAKEST = (
-    0.1  # of the mean decay in a stack, that of a mode which is mostly in a layer without loss
-)
+WEAKEST = 0.1  # of the mean decay, that of a mode that is mostly in a layer without loss
+SLOWEST = 2 * np.pi * 0.5  # rad/s: slower lines of a free stack count as its mean
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
@@ -63,7 +62,7 @@ class Impedances(NamedTuple):
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
     """Displacement of the surface into the stack per pressure; of a free stack, which has no bound
-    at rest, about its mean: 0 at w = 0.
+    at rest, about its mean: 0 at w = 0 and at lines slower than `SLOWEST`.
 
     Parameters
     ----------
@@ -90,7 +89,8 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
     Returns
     -------
     Function of k (k,) in 1/m and w (f, 1) in rad/s to (4, d, f, k): U and W in m/Pa, N and T in
-    Pa/Pa, of the field of a surface pressure J0(kr) exp(i w t); of a free stack 0 at w = 0.
+    Pa/Pa, of the field of a surface pressure J0(kr) exp(i w t); of a free stack 0 as in
+    `surface_compliance`.
 
     Raises
     ------
@@ -142,7 +142,12 @@ def clearance(stack: Stack, w: Complex) -> float:
 
 
 def _about_mean(stack: Stack, w: Complex, values: Complex) -> Complex:
-    return np.asarray(values if stack.is_fixed else np.where(w == 0, 0, values))
+    return np.asarray(values if stack.is_fixed else np.where(_drifts(w), 0, values))
+
+
+def _drifts(w: Complex) -> Any:
+    """Whether a steady frequency is so low that a free stack moves by it as by the mean."""
+    return (np.imag(w) == 0) & (np.abs(w) < SLOWEST)
 
 
 def _bending(stack: Stack, w: Complex) -> float:
@@ -157,6 +162,7 @@ def _bending(stack: Stack, w: Complex) -> float:
     z = z - (stiff * z).sum(axis=0) / stiff.sum(axis=0)
     bending = (stiff * (z**2 + h[:, None] ** 2 / 12)).sum(axis=0)
     mass = sum(m.density * t for m, t in zip(stack.materials, stack.thicknesses, strict=True))
+    w, bending = (np.broadcast_to(x, w.shape)[~_drifts(w)] for x in (w, bending))
     k = (mass * w**2 / bending + 0j) ** 0.25 * np.array([1, 1j, -1, -1j])[:, None]
     return float(k.imag[(k.real > 0) & (k.imag > 0.1 * np.abs(k))].min(initial=inf))
 

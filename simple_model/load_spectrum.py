@@ -74,10 +74,10 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     check_lines(pressure)
     n, of_spot = path_strengths(pressure, threshold)
     f, c = (_sampled_lines if pressure.tacton.is_sampled else _sinusoid_lines)(pressure, n)
-    order = np.repeat(n, f.shape[1])
-    c = (c * foci_harmonics(pressure, n)[:, None]).ravel() * np.where((f := f.ravel()) > 1e-9, 2, 1)
+    f, order = np.round(f, 9), np.repeat(n, f.shape[1])  # f_AM - 2 f_d may be 0 but for round-off
+    c = (c * foci_harmonics(pressure, n)[:, None]).ravel() * np.where((f := f.ravel()) > 0, 2, 1)
     strength = np.abs(c) * np.repeat(of_spot, f.size // len(n))
-    kept = (f > -1e-9) & (strength > threshold * strength.max())
+    kept = (f >= 0) & (strength > threshold * strength.max())
     if pressure.tacton.trajectory.shape == "recorded":
         kept &= f <= HIGHEST
     if not kept.any():

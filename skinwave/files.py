@@ -116,9 +116,9 @@ def line_rows(run: Run, columns: Sequence[str] = LINE_COLUMNS) -> Iterator[tuple
     found = [(name, f, run.table.amplitudes[name]) for name, f in run.listed.items()]
     found += [(peak.kind, peak.frequency, peak.amplitudes) for peak in run.unnamed]
     for name, frequency, amplitudes in found:
-        for (x, y), z, amplitude in zip(
-            run.response.probes, run.scene.depths, amplitudes, strict=True
-        ):
+        # The point kernel's pressure is that on the surface, whatever is asked of bodies.
+        depths = run.scene.depths if asked.of_body else [0.0] * len(run.scene.depths)
+        for (x, y), z, amplitude in zip(run.response.probes, depths, amplitudes, strict=True):
             row: dict[str, object] = {
                 "tacton": run.tacton, "body": run.body, "model": run.model, "line": name,
                 "probe_x_mm": _short(1e3 * x), "probe_y_mm": _short(1e3 * y),

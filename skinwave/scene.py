@@ -136,8 +136,8 @@ class Scene:
             )
         if (deepest := max(self.depths)) >= body.depth and body.of_kind.is_layer:
             raise ValueError(
-                f"depth_mm = {1e3 * deepest:g} of a probe is below the body, which is "
-                f"{1e3 * body.depth:g} mm thick; move it up"
+                f"depth_mm = {1e3 * deepest:g} of a probe is not within the body, which is "
+                f"{1e3 * body.depth:g} mm thick; give less than that"
             )
 
     def _check_extent(self) -> None:

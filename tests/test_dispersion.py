@@ -173,7 +173,11 @@ def test_group_speed_is_the_derivative_of_refined_phase_curves():
         ends = [refined(stack, 2 * pi * 140 * (1 + d), mode.wavenumbers[0]) for d in (-step, step)]
         slowness = (ends[1] - ends[0]) / (2 * pi * 140 * 2 * step)
         assert abs(mode.slowness[0] - slowness) < 1e-4 * abs(slowness)
-        assert mode.group_speed[0] == pytest.approx(1 / slowness.real, rel=1e-3)
+        if abs(slowness.imag) > abs(slowness.real):
+            assert np.isnan(mode.group_speed[0])
+        else:
+            assert mode.group_speed[0] == pytest.approx(1 / slowness.real, rel=1e-3)
+    assert any(np.isfinite(mode.group_speed[0]) for mode in found.modes)
 
 
 @pytest.mark.parametrize("f", [60.0, 140.0, 300.0])

@@ -24,6 +24,7 @@ from simple_model.compliance import half_space, layered, slab, thin_sheet
 from simple_model.flat_body import steady_lines
 from simple_model.flat_motion import point_motion
 from simple_model.layered import transfer
+from simple_model.load_spectrum import load_lines
 from simple_model.material import PRESETS
 from simple_model.wavenumber_integral import point_response
 
@@ -320,3 +321,19 @@ def test_steady_lines_of_layers_are_linear_in_the_load():
     load, double = circling(), circling(peak_pressure=100.0)
     (_, a), (_, b) = (steady_lines(layered(SKIN), x, [[0.01, 0.0]]) for x in (load, double))
     np.testing.assert_allclose(2 * a, b, rtol=1e-9)
+
+
+def test_a_free_stack_follows_a_line_as_slow_as_nothing_as_its_mean():
+    free = Stack(materials=(PALM,), thicknesses=(0.015,), base="free")
+    slow, line = 2 * np.pi * np.array([1e-10, 1e-4, 1e-2]), 2 * np.pi * 140.0
+    beside = point_motion(free, [0.005], [*slow, line], WIDTH)
+    assert not beside[:, :3].any()
+    np.testing.assert_allclose(beside[:, 3:], point_motion(free, [0.005], [line], WIDTH), rtol=1e-4)
+
+
+def test_lines_that_cancel_but_for_round_off_are_the_mean():
+    path = Trajectory(shape="circle", size=0.02, speed=4.39822971503)
+    load = MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path))
+    f = load_lines(load, 1e-2).frequencies
+    assert (f == 0).sum() > 1  # the mean, and f_AM - 2 f_d
+    assert not ((f > 0) & (f < 1)).any()

@@ -297,10 +297,12 @@ def test_a_plan_of_elements_counts_the_series():
 
 
 def test_a_load_beyond_a_table_is_refused():
-    own = scene(table_of(ECOFLEX, [20.0, 60.0, 130.0]))
-    for ask in (skinwave.plan, compute):
-        with pytest.raises(ValueError, match=r"ends at 130 Hz, .* up to 140 Hz; extend the table"):
-            ask(own, model="flat-body-harmonic")
+    for measured in ([20.0, 60.0, 130.0], [150.0, 200.0, 300.0]):
+        own = scene(table_of(ECOFLEX, measured))
+        ends = f"from {measured[0]:g} to {measured[-1]:g} Hz, .* to 140 Hz; extend the table"
+        for ask in (skinwave.plan, compute):
+            with pytest.raises(ValueError, match=ends):
+                ask(own, model="flat-body-harmonic")
 
 
 def test_a_table_continues_by_its_series():

@@ -23,7 +23,7 @@ from skinwave.run import Run
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
 from skinwave.sweeps.measures import columns, measured
-from skinwave.sweeps.variation import DesignPoint
+from skinwave.sweeps.variation import DesignPoint, cases, combinations, parse
 from skinwave.web.controls import STARTS
 from skinwave.web.model import kernel
 from skinwave.web.plots import Curves, spectrum_plot
@@ -79,7 +79,7 @@ def test_keys_of_a_scene_are_read_and_written():
         ("pressure", "0", "quantity 'pressure' is that of the point kernel"),
         ("velocity", "[1]", "depth_mm has 1 values for 2 probes"),
         ("velocity", "-1", "depth_mm = -1 of a probe must be a finite number"),
-        ("strain_zz", "6", "depth_mm = 6 of a probe is below the body, which is 6 mm"),
+        ("strain_zz", "6", "depth_mm = 6 of a probe is not within the body, which is 6 mm"),
         ("strain_zz", '"pacinian"', "depth_mm 'pacinian' is unknown.*pacini"),
         ("strain_zz", "true", "depth_mm = True must be a number"),
     ],
@@ -303,3 +303,10 @@ def test_names_of_quantities_are_given_once():
     assert len(sample_times(scene())) == 500
     run = Run(tacton="", body="", scene=scene(), response=compute(scene(), "flat-body-harmonic"))
     assert run.is_motion
+
+
+def test_a_depth_by_its_name_is_a_number_in_the_table_of_a_sweep(tmp_path):
+    (tmp_path / "scene.toml").write_text("[body]\nkind = 'slab'\n")
+    varied = parse("probes.depth_mm=0.5,meissner")
+    found = cases(tmp_path / "scene.toml", combinations([varied]))
+    assert [case.keys["probes.depth_mm"] for case in found] == [0.5, 0.7]

@@ -17,7 +17,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "source", type=Path, metavar="SCENE|DIR",
         help="scene file, or a folder that report wrote: then no model is run",
     )  # fmt: skip
-    parser.add_argument("--out", type=Path, metavar="FILE", help=".gif (default) or .mp4")
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE", help=".gif (default) or .mp4")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     parser.add_argument("--style", choices=("report", "talk", "print"), default="report")
     parser.add_argument("--camera", choices=("tilted", "front", "top"), default="tilted")

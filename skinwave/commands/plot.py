@@ -25,7 +25,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="png")
     parser.add_argument("--style", default="report", help="report, talk or print")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: DIR/figures")
+    parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="default: DIR/figures")
     parser.add_argument("--overwrite", action="store_true", help="replace figures in that folder")
     parser.add_argument("--quiet", action="store_true", help="no summary")
     add_reporting(parser)

@@ -37,7 +37,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--design", default="factorial", help="factorial (default), zip or lhs")
     parser.add_argument("--samples", type=int, metavar="N", help="runs of a Latin hypercube")
     parser.add_argument("--seed", type=int, default=0, help="of a Latin hypercube")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the table")
+    parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     parser.add_argument(
         "--scheduler", default="processes", metavar="WHERE",
         help="processes (default), threads, or the address of a Dask scheduler",

@@ -5,6 +5,8 @@ internal variables.
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from fem.materials import Material
 from simple_model import ModulusTable, MovingPressure
 from simple_model.load_spectrum import load_lines
@@ -32,8 +34,8 @@ def has_table(body: Body) -> bool:
 
 
 def check_laws(body: Body, pressure: MovingPressure) -> None:
-    """Refuse a body with a modulus law that is not passive or not causal, or with a table that ends
-    below a strong line of the load.
+    """Refuse a body with a modulus law that is not passive or not causal, or with a table that some
+    strong line of the load is outside of; its mean may be.
 
     Raises
     ------
@@ -43,18 +45,21 @@ def check_laws(body: Body, pressure: MovingPressure) -> None:
     for solid in own_laws(body):
         solid.series()
         if isinstance(solid.law, ModulusTable):
-            last, highest = solid.law.frequencies[-1], _highest(pressure)
-            if highest > last * (1 + 1e-9):
+            first, last = solid.law.frequencies[0], solid.law.frequencies[-1]
+            lowest, highest = _slowest_and_fastest(pressure)
+            if lowest < first * (1 - 1e-9) or highest > last * (1 + 1e-9):
                 raise ValueError(
-                    f"a table of complex moduli ends at {last:g} Hz, and the load has lines of "
-                    f"{100 * STRONG:g} % of its strongest up to {highest:g} Hz; extend the table, "
-                    "or take a slower load"
+                    f"a table of complex moduli is from {first:g} to {last:g} Hz, and the load has "
+                    f"lines of {100 * STRONG:g} % of its strongest from {lowest:g} to {highest:g} "
+                    "Hz; extend the table, or take another load"
                 )
 
 
 @lru_cache(maxsize=8)
-def _highest(pressure: MovingPressure) -> float:
-    return float(load_lines(pressure, STRONG).frequencies.max(initial=0.0))
+def _slowest_and_fastest(pressure: MovingPressure) -> tuple[float, float]:
+    """Strong lines of a load, but for its mean, in Hz."""
+    f = load_lines(pressure, STRONG).frequencies
+    return float(f[f > 0].min(initial=np.inf)), float(f.max(initial=0.0))
 
 
 def series_tolerance(tolerance: float) -> float:

@@ -48,7 +48,8 @@ CAPTION = (
     "Modes of the laterally infinite body: a strong line where energy propagates, a pale one where "
     "the mode is evanescent: it falls to 1/e within a quarter of its wavelength, or its energy "
     "moves at less than a twentieth of its phase speed. Dotted: the lines of the load; dashed: the "
-    "speed of the focus. With much loss the group speed is no speed of energy."
+    "speed of the focus. The group speed is left out where loss changes a packet's shape before it "
+    "moves on (imaginary part of dk/dω above the real part)."
 )
 EXPLAINED = (
     "The driven mode is, of those that propagate if any does, the one that moves the surface most "

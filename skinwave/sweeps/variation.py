@@ -219,7 +219,9 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
-    keys = _flat(tomllib.loads(text)) | {key: _plain(value) for key, value in varied.items()}
+    keys = _flat(tomllib.loads(text))
+    for key, value in varied.items():  # a name for a number, as of a depth, is that number
+        keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
     return DesignPoint(varied=varied, keys=keys, text=text, scene=scene, error=error)
 
 
