@@ -149,7 +149,7 @@ def thin_strip(cells):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("load", [2.0, 5.0, 10.0])
+@pytest.mark.parametrize("load", [2.0, 10.0])
 def test_a_thin_strip_bends_as_the_elastica(load):
     body, share, stiffness = thin_strip(40)
     u = nonlinear.static(body, load * stiffness * share.ravel()).reshape(-1, 3)

@@ -527,9 +527,9 @@ def test_smoothing_evens_out_sizes_and_spoils_no_angle():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("palm", [Palm(), BODIES["palm"].palm])
-def test_the_palm_as_planned_is_meshed_within_its_bars(monkeypatch, palm):
+def test_the_palm_as_planned_is_meshed_within_its_bars(monkeypatch):
     monkeypatch.setenv("SKINWAVE_CACHE", "")
+    palm = BODIES["palm"].palm
     sizing = meshes.graded(3e-3, meshes.Grading(radius=0.03, growth=1.25, coarsest=6e-3))
     mesh = meshes.palm_mesh(palm, 3e-3, sizing=sizing)
     assert meshes.dihedral_angles(mesh).min() >= 10

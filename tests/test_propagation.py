@@ -117,7 +117,7 @@ def test_answers_to_different_loads_are_not_compared():
 
 
 @pytest.mark.slow
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(
     am=st.integers(2, 12), drawn=st.integers(2, 12), size=st.integers(5, 40),
     drive=st.sampled_from(["linear", "pressure_squared", "force_corrected"]),

@@ -41,6 +41,13 @@ def stiff():
     return ops, A, np.random.default_rng(0).standard_normal((A.shape[0], 3))
 
 
+@pytest.fixture(scope="module")
+def fill(stiff):
+    """Entries of a factor in the order of the mesh."""
+    options = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    return sparse.linalg.splu(sparse.csc_array(stiff[1]), permc_spec="NATURAL", **options).L.nnz
+
+
 @pytest.mark.parametrize("backend", linear_solver.BACKENDS)
 def test_every_solver_solves(stiff, backend):
     if backend not in fem.available():
@@ -76,7 +83,7 @@ def test_without_mkl_and_metis_superlu_carries_it(stiff, monkeypatch):
 
 
 @pytest.mark.parametrize("metis", [True, False])
-def test_superlu_is_ordered_to_save_fill(stiff, monkeypatch, metis):
+def test_superlu_is_ordered_to_save_fill(stiff, fill, monkeypatch, metis):
     _, A, b = stiff
     if metis:
         pytest.importorskip("pymetis")
@@ -84,8 +91,6 @@ def test_superlu_is_ordered_to_save_fill(stiff, monkeypatch, metis):
         np.testing.assert_array_equal(np.sort(order), np.arange(A.shape[0]))
     else:
         monkeypatch.setitem(sys.modules, "pymetis", None)
-    options = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    plain = sparse.linalg.splu(sparse.csc_array(A), permc_spec="NATURAL", **options)
     made = []
 
     def recorded(*args, **kwargs):
@@ -95,7 +100,7 @@ def test_superlu_is_ordered_to_save_fill(stiff, monkeypatch, metis):
     monkeypatch.setattr(linear_solver, "splu", recorded)
     x = fem.factorise(A, backend="superlu").solve(b)
     assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
-    assert made[0].L.nnz < 0.6 * plain.L.nnz
+    assert made[0].L.nnz < 0.6 * fill
 
 
 @pytest.mark.parametrize("with_mkl", [True, False])
@@ -160,7 +165,7 @@ def misfit(candidate, reference):
 def test_the_reduced_model_follows_the_transient_from_rest():
     ops, P, points, S, load, model = reduced_for_circling("skin", 0.0075)
     dt = 2.5e-5
-    full = marched(ops, S, lambda t: P @ load(points, t), dt, 0.1)
+    full = marched(ops, S, lambda t: P @ load(points, t), dt, 0.05)
     frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
     poles = fem.poles(model)
     lines, start = fem.line_response(poles, forces, frequencies)
@@ -171,7 +176,7 @@ def test_the_reduced_model_follows_the_transient_from_rest():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "h", "seconds"), [("skin", 0.0065, 0.3), ("sheet", 0.005, 0.1)])
+@pytest.mark.parametrize(("kind", "h", "seconds"), [("skin", 0.0065, 0.1), ("sheet", 0.005, 0.05)])
 def test_reduction_alone_costs_less_than_a_thousandth(kind, h, seconds):
     """Both marched by the same scheme at the same step, so that only the reduction differs."""
     ops, P, points, S, load, model = reduced_for_circling(kind, h)
@@ -187,7 +192,9 @@ def test_reduction_alone_costs_less_than_a_thousandth(kind, h, seconds):
     assert misfit(reduced, full) <= 1e-3
 
 
-@pytest.mark.parametrize(("kind", "h"), [("skin", 0.006), ("sheet", 0.1 / 25), ("sheet", 0.1 / 30)])
+@pytest.mark.parametrize(
+    ("kind", "h"), [("skin", 0.0075), ("sheet", 0.1 / 16), ("sheet", 0.1 / 20)]
+)
 def test_the_estimate_is_near_the_true_error(kind, h):
     """Also where moments converge ever faster, as those of sheets with little loss do."""
     mesh, ops = body(kind, h)
@@ -318,7 +325,7 @@ def test_a_field_is_the_transients_everywhere():
     build = build_body(body, 0.005)
     ops = operators(build)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
-    states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 2.5e-5), 0, 601, 120)
+    states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 5e-5), 0, 301, 60)
     full = np.array([state.displacement.reshape(-1, 3) for state in states])
     full = full[:, meshes.part(build.mesh, build.drag == 0)[1]]  # without the layer around it
     assert np.linalg.norm(found.displacement - full) < 0.01 * np.linalg.norm(full)
@@ -336,6 +343,7 @@ def test_an_unreachable_tolerance_is_said(monkeypatch):
 @pytest.mark.parametrize("name", ["paper-sheet", "skin-slab"])
 def test_fem_and_fem_transient_agree_on_a_scene(name):
     scene = scenes("short", Tacton(am_frequency=210, duration=0.012))[name]
+    scene = replace(scene, body=replace(scene.body, width=0.05, height=0.05))
     h = 0.008 if name == "skin-slab" else 0.005
     reduced = compute(scene, "fem", h=h)
     full = compute(scene, "fem-transient", h=h, dt=2.5e-5)

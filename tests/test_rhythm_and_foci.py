@@ -237,6 +237,7 @@ def small_scene(**tacton):
 @pytest.mark.parametrize("name", LOADS)
 def test_lines_and_time_steps_answer_the_same_load(name):
     scene = small_scene(**LOADS[name])
+    scene = replace(scene, body=replace(scene.body, sides="clamped"))  # no layer around it
     x = compute(scene, "fem", h=0.006).displacement
     y = compute(scene, "fem-transient", h=0.006, dt=2.5e-5).displacement
     error = np.linalg.norm(x - y, axis=0) / np.linalg.norm(y, axis=0)

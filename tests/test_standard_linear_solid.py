@@ -194,13 +194,13 @@ def test_reduced_motion_from_rest_is_that_of_the_transient():
     typical = P @ load.spot(points, path.at_phase(np.linspace(0, 1, 12))).T
     model = fem.reduce(ops, S, 1000.0, 2e-4, loads=typical)
     dt = 1.25e-5
-    states = islice(fem.transient(ops, lambda t: P @ load(points, t), dt), 1600)
+    states = islice(fem.transient(ops, lambda t: P @ load(points, t), dt), 800)
     full = np.array([S @ state.displacement for state in states])
     poles = fem.poles(model)
     frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
     lines, start = fem.line_response(poles, forces, frequencies)
     rates = np.concatenate([2j * np.pi * frequencies, poles.values])
-    reduced = fem.exponential_sum(rates, np.vstack([lines, start]), np.arange(1600) * dt)
+    reduced = fem.exponential_sum(rates, np.vstack([lines, start]), np.arange(800) * dt)
     misfit = np.linalg.norm(reduced - full, axis=0) / np.linalg.norm(full, axis=0)
     assert misfit.max() <= 1e-3
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -192,7 +192,13 @@ def _beside_exact_waves(
     size = np.abs(exact).max(axis=1) * (f > 1.0)
     chosen = np.argsort(-size)[:5]
     chosen = chosen[size[chosen] > 0.02 * size.max()]
-    found = np.array([_line(mesh, solid, fixed, load, f[k], probes) for k in chosen])
+
+    @cache
+    def quarter(odd: bool) -> fem.Operators:
+        middle = {"left": "yz" if odd else "x", "front": "y"}
+        return fem.assemble(mesh, solid, fixed={**fixed, **middle})
+
+    found = np.array([_line(mesh, quarter, load, f[k], probes) for k in chosen])
     exact = exact[chosen]
     what = "strongest lines at five probes, complex, relative L2"
     checks = [misfit(what, found, exact, bar, "um")]
@@ -215,10 +221,10 @@ def _beside_exact_waves(
 
 
 def _line(
-    mesh: TetMesh, solid: fem.Material, fixed: dict[str, str], load: MovingPressure, hz: float,
+    mesh: TetMesh, quarter: Callable[[bool], fem.Operators], load: MovingPressure, hz: float,
     probes: Floats,
 ) -> Complex:  # fmt: skip
-    """One line's complex amplitude (p,) in metre from a quarter of the body.
+    """One line's complex amplitude (p,) in metre from a quarter of the body, odd or even in x.
 
     Harmonic n of the circling focal spot is f(r) exp(-i n angle); a probe on the x axis responds
     to its cosine part only, which is even in y and, as n is, even or odd in x.
@@ -226,8 +232,7 @@ def _line(
     lines = load_lines(load)
     mine = np.flatnonzero(np.abs(lines.frequencies - hz) < 1e-6)
     n = lines.harmonics[mine]
-    odd = bool(n[0] % 2)
-    ops = fem.assemble(mesh, solid, fixed={**fixed, "left": "yz" if odd else "x", "front": "y"})
+    ops = quarter(bool(n[0] % 2))
     spots = path_fourier(load.spot(fem.facet_points(mesh), path_samples(load)).T)[:, n].real
     force = fem.load_operator(mesh) @ (spots @ lines.coefficients[mine])
     return fem.probe_operator(mesh, probes) @ fem.harmonic(ops, force, hz)[0]

@@ -9,7 +9,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.focus import spot_width
-from skinwave.bodies.build import build, operators
+from skinwave.bodies.build import Build, build, operators
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.scene import Body, Scene
 from skinwave.verify.case import Case, below, relative
@@ -26,10 +26,15 @@ def _prepared() -> Prepared:
 
 
 @cache
+def _meshed() -> tuple[Build, fem.Operators]:
+    made = build(BODY, H)
+    return made, operators(made)
+
+
+@cache
 def _static(pressure: MovingPressure, ring: int) -> tuple[float, ...]:
     """Displacement of the probes at rest under the mean of so many focal spots along the path."""
-    made = build(BODY, H)
-    ops = operators(made)
+    made, ops = _meshed()
     points = fem.facet_points(made.mesh)[:, :2]
     centres = pressure.tacton.trajectory.at_phase(np.arange(ring) / ring)
     spot = pressure.spot(points, centres).mean(axis=0) * float(pressure.gain(np.zeros(1))[0])
@@ -82,9 +87,9 @@ def modulation_frequencies() -> Case:
         for k, (x, _) in enumerate(PROBES)
     ]
     fast = float(lines(_answered(0.5, am=1000.0), [1000.0])[0, 0])
-    made, load = build(BODY, H), MovingPressure(tacton=Tacton(), drive="linear")
+    (made, ops), load = _meshed(), MovingPressure(tacton=Tacton(), drive="linear")
     force = fem.load_operator(made.mesh) @ load(fem.facet_points(made.mesh)[:, :2], 0.0)
-    u = fem.probe_operator(made.mesh, PROBES) @ fem.harmonic(operators(made), force, 1000.0)[0]
+    u = fem.probe_operator(made.mesh, PROBES) @ fem.harmonic(ops, force, 1000.0)[0]
     checks.append(relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m"))
     return Case(
         title="Amplitude modulation from 1 Hz to 1 kHz",
