@@ -566,7 +566,10 @@ def test_a_page_imports_nothing_of_the_folder_that_it_is_started_in(tmp_path):
     process, address = served(tmp_path)
 
     async def use():
-        async with browser() as session, opened(session, address, body="skin-slab", duration=0.1) as page:
+        async with (
+            browser() as session,
+            opened(session, address, body="skin-slab", duration=0.1) as page,
+        ):
             while (await page.state())["waves_stale"]:  # of a process that this one starts
                 await asyncio.sleep(0.1)
             for name, *given in (("figure", "svg"), ("report",), ("waveform_wav",)):
