@@ -12,6 +12,7 @@ einsum in this package:
     a b  nodes of an element
     d    derivative along an element edge, from corner 0 to another corner
     i j  components of displacement
+    c    components of a symmetric tensor: xx, yy, zz, xy, xz, yz
     k l  directions at rest, of which a membrane has two
     v w  linear pressure functions of a macroelement
     n    node, or degree of freedom
@@ -32,6 +33,7 @@ from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
+from fem.interior import displacement_operator, locate
 from fem.linear_solver import Factor, available, factorise
 from fem.load_and_probe import (
     facet_normals,
@@ -40,12 +42,21 @@ from fem.load_and_probe import (
     on_surface,
     pressure_force,
     probe_operator,
+    surface_frame,
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
+from fem.stress import (
+    materials_at,
+    nodal_strain,
+    relaxation,
+    relaxed,
+    strain_operator,
+    stress_operator,
+)
 from fem.transient import Diverged, State, at_rest, transient
 from simple_model.material import PRESETS, Material, PronyTerm, from_young, of_law, tabulated
 
@@ -73,6 +84,7 @@ __all__ = [
     "assemble",
     "at_rest",
     "available",
+    "displacement_operator",
     "exponential_sum",
     "facet_normals",
     "facet_points",
@@ -84,8 +96,11 @@ __all__ = [
     "line_response",
     "load_operator",
     "load_subspace",
+    "locate",
+    "materials_at",
     "mean_power",
     "modes",
+    "nodal_strain",
     "nonlinear",
     "of_law",
     "on_surface",
@@ -93,9 +108,14 @@ __all__ = [
     "pressure_force",
     "probe_operator",
     "reduce",
+    "relaxation",
+    "relaxed",
     "static",
     "stored",
+    "strain_operator",
+    "stress_operator",
     "stretching_modes",
+    "surface_frame",
     "tabulated",
     "transfer",
     "transient",

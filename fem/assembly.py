@@ -135,7 +135,10 @@ def _volume_operators(
     """K, C, M and the branches of all materials, on all dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
-    D = {m: projected_divergence(_part(mesh, region == m)) for m in np.flatnonzero(lam > direct)}
+    D = {
+        m: projected_divergence(elements_of(mesh, region == m))
+        for m in np.flatnonzero(lam > direct)
+    }
     projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
 
     def stiffness(share: Floats) -> sparse.csr_array:
@@ -152,7 +155,7 @@ def direct_part(lam: Floats, mu: Floats) -> Floats:
     return np.where(lam > LOCKING_FREE * mu, UNPROJECTED * mu, lam)
 
 
-def _part(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
+def elements_of(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
     """Some of the elements (m,) of a mesh, among all its nodes."""
     return replace(mesh, tets=mesh.tets[chosen], region=mesh.region[chosen], facets={})
 
@@ -206,7 +209,7 @@ def _mass(mesh: TetMesh, pattern: SparsityPattern, rho: Floats) -> sparse.csr_ar
 def _drag(mesh: TetMesh, pattern: SparsityPattern, rate: Floats) -> sparse.csr_array:
     """Mass-proportional damping matrix of a rate (m,) in kg/m3/s that is 0 in most elements."""
     layer = np.flatnonzero(rate)
-    R = _mass(_part(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
+    R = _mass(elements_of(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
     R.eliminate_zeros()
     return R
 

@@ -110,6 +110,35 @@ def probe_operator(
     ValueError
         If a point lies outside the facets, or has no finite coordinates.
     """
+    nodes, N, normals = _surface_frame(mesh, points, facets, patch)
+    values = -np.einsum("pa,pi->pai", N, normals)
+    columns = 3 * nodes[:, :, None] + np.arange(3)
+    rows = np.broadcast_to(np.arange(len(nodes))[:, None, None], columns.shape)
+    shape = (len(nodes), mesh.n_dofs)
+    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def surface_frame(
+    mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Places (p, 3) in metre on a surface and unit normals (p, 3) out of the body there.
+
+    Parameters
+    ----------
+    mesh, points, facets, patch : as for `probe_operator`, with its errors
+
+    Returns
+    -------
+    places, normals
+    """
+    nodes, N, normals = _surface_frame(mesh, points, facets, patch)
+    return np.einsum("pa,pai->pi", N, mesh.points[nodes]), normals
+
+
+def _surface_frame(
+    mesh: TetMesh, points: ArrayLike, facets: str | Ints, patch: float
+) -> tuple[Ints, Floats, Floats]:
+    """Nodes (p, a) of the facet below each point, shape functions (p, a) and normals (p, 3)."""
     nodes = facet_set(mesh, facets)
     points = np.atleast_2d(np.asarray(points, np.float64))
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
@@ -124,19 +153,14 @@ def probe_operator(
             f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
         )
     if mesh.order == 2:
-        barycentric = _on_curved(mesh.points[nodes[owner], :2], barycentric, points)
+        barycentric = on_curved(mesh.points[nodes[owner], :2], barycentric, points)
     N = shape_functions(barycentric, nodes.shape[1])
     if patch:
         places = np.einsum("pa,pai->pi", N, mesh.points[nodes[owner]])
         normals = _mean_normals(mesh, nodes, places, patch)
     else:
         normals = np.cross(*_facet_tangents(mesh, nodes[owner], barycentric))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    values = -np.einsum("pa,pi->pai", N, normals)
-    columns = 3 * nodes[owner][:, :, None] + np.arange(3)
-    rows = np.broadcast_to(np.arange(len(points))[:, None, None], columns.shape)
-    shape = (len(points), mesh.n_dofs)
-    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+    return nodes[owner], N, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
@@ -169,17 +193,27 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
     return shape_functions(barycentric, places.shape[1]), normals * weights[:, None]
 
 
-def _on_curved(facets: Floats, barycentric: Floats, points: Floats) -> Floats:
-    """Barycentric coordinates (p, 3) of points (p, 2) on curved facets (p, a, 2) seen along z, by
+def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
+    """Barycentric coordinates of points on curved facets seen along z, or in curved tetrahedra, by
     Newton's method.
 
     A point next to the edge of a bowed facet may lie a little beyond it, which does no harm.
+
+    Parameters
+    ----------
+    elements : (p, a, i) float, metre, nodes of the facet or tetrahedron of each point
+    barycentric : (p, i + 1) float, to start from
+    points : (p, i) float, metre
+
+    Returns
+    -------
+    (p, i + 1) float
     """
     for _ in range(4):
-        N = shape_functions(barycentric, facets.shape[1])
-        miss = points - np.einsum("pa,pai->pi", N, facets)
+        N = shape_functions(barycentric, elements.shape[1])
+        miss = points - np.einsum("pa,pai->pi", N, elements)
         tangents = np.einsum(
-            "pad,pai->pid", shape_derivatives(barycentric, facets.shape[1]), facets
+            "pad,pai->pid", shape_derivatives(barycentric, elements.shape[1]), elements
         )
         step = np.linalg.solve(tangents, miss[:, :, None])[:, :, 0]
         barycentric = barycentric + np.column_stack([-step.sum(axis=1), step])

@@ -25,8 +25,28 @@ def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:
     `linear_functions`.
     """
     cluster, sloping = macroelements(mesh)
-    slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
+    return _coefficients(mesh, cluster, linear_functions(mesh, cluster, sloping))
+
+
+def dilatation_operator(mesh: TetMesh, elements: Ints) -> sparse.csr_array:
+    """Projected dilatation at the quadrature points for degree 2 of some elements (k,) of those of
+    `projected_divergence`: sum_v q_v (D u)_v, a matrix (4 k, 3 n) in 1/m.
+    """
+    cluster, sloping = macroelements(mesh)
     q = linear_functions(mesh, cluster, sloping)
+    owners = 4 * cluster[elements, None, None] + np.arange(4)
+    columns = np.broadcast_to(owners, q[elements].shape).ravel()
+    starts = 4 * np.arange(4 * len(elements) + 1)
+    D = _coefficients(mesh, cluster, q)
+    Q = sparse.csr_array(
+        (q[elements].ravel(), columns, starts), shape=(len(starts) - 1, D.shape[0])
+    )
+    return (Q @ D).tocsr()
+
+
+def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
+    """Matrix D of `projected_divergence`, by macroelements (e,) and functions (e, q, v)."""
+    slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
     starts = 10 * np.arange(len(cluster) + 1, dtype=np.int32)
     by_element = sparse.bsr_array(
@@ -34,7 +54,7 @@ def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:
     )
     order = np.argsort(cluster, kind="stable").astype(np.int32)
     ones = np.broadcast_to(np.eye(4), (len(cluster), 4, 4))
-    starts = np.searchsorted(cluster[order], np.arange(len(sloping) + 1)).astype(np.int32)
+    starts = np.searchsorted(cluster[order], np.arange(cluster.max() + 2)).astype(np.int32)
     return sparse.bsr_array((ones, order, starts)) @ by_element
 
 

@@ -217,7 +217,7 @@ def _timed(
         model=model,
         times=times,
         probes=probes,
-        displacement=displacement,
+        values=displacement,
         effort=Effort(seconds=seconds, **effort),  # type: ignore[arg-type]
     )
 

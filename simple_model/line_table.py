@@ -164,7 +164,7 @@ def _fit(found: LineNames, response: Response, settle: float) -> _Fit:
     fitted = np.zeros(len(f), bool)
     for k in np.argsort(-strengths, kind="stable"):
         fitted[k] = f[k] >= least and not _near(f[k : k + 1], f[fitted], least)[0]
-    amplitudes = np.zeros((len(f), response.displacement.shape[1]))
+    amplitudes = np.zeros((len(f), response.values.shape[1]))
     complex_amplitudes, rest = fit_lines(response, f[fitted], settle=settle)
     amplitudes[fitted] = np.abs(complex_amplitudes)
     resolved = fitted & unmixed(f, strengths, least)
@@ -177,7 +177,7 @@ def _peaks(response: Response, fit: _Fit, highest: float, settle: float) -> list
     """Peaks in the spectrum of the whole response less the fitted lines."""
     dt, begun = step(response.times), round(settle * len(fit.rest))
     amplitude = _windowed(fit.rest)
-    round_off = ROUND_OFF * float(np.abs(response.displacement).max(initial=0.0))
+    round_off = ROUND_OFF * float(np.abs(response.values).max(initial=0.0))
     loudest = _loudest(np.vstack([amplitude[LOBE:], fit.amplitudes]))
     level = amplitude / np.maximum(loudest, round_off / SEEN)
     of_any = level.max(axis=1)[: int(highest * dt * len(fit.rest)) + 1]
@@ -191,7 +191,7 @@ def _peaks(response: Response, fit: _Fit, highest: float, settle: float) -> list
     for k in chosen[:MOST_SEEN]:
         bins = k + _offset(amplitude[k - 1 : k + 2, int(np.argmax(level[k]))])
         turns = bins / len(fit.rest)
-        free = response.unit == "m" and _decays(fit.rest[begun:], turns)
+        free = response.record.of_body and _decays(fit.rest[begun:], turns)
         kind = FREE if free else UNNAMED
         found.append(Unnamed(frequency=turns / dt, amplitudes=amplitude[k], kind=kind))
     return found
@@ -269,7 +269,7 @@ def _mixed(response: Response, frequencies: Floats) -> list[Unnamed]:
     """Lines that are not resolved, as the spectrum of the response shows them together."""
     if not len(frequencies):
         return []
-    amplitude = _windowed(response.displacement - response.displacement.mean(axis=0))
+    amplitude = _windowed(response.values - response.values.mean(axis=0))
     bins = frequencies * step(response.times) * len(response.times)
     return [
         Unnamed(frequency=float(f), kind=UNRESOLVED,

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from simple_model.drive import PUBLISHED
 from simple_model.pressure import MovingPressure
+from simple_model.quantities import PRESSURE
 from simple_model.response import Effort, Response
 from simple_model.sampling import fold_parts, low_passed
 from simple_model.trajectory import Floats
@@ -71,7 +72,7 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
         model="point-kernel",
         times=np.array(times),
         probes=probes,
-        displacement=stimulation,
-        unit="Pa",
+        values=stimulation,
+        quantity=PRESSURE.name,
         effort=effort,
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from simple_model.trajectory import Floats
 from simple_model.windows import kaiser, named
 
@@ -15,7 +16,6 @@ SETTLE = 0.25  # of a response, before which no line is fitted
 ALIKE = 1e-3  # of the frequency resolution: lines as close as that are one, with one amplitude
 MINOR = 0.05  # of a line: most that others that it is not resolved from may have together
 FAINT = 0.02  # of the strongest line: weaker ones may have a larger relative error
-UNITS = ("m", "Pa")
 UNEVEN = 1e-6  # of a sampling interval
 
 
@@ -52,17 +52,17 @@ class Effort:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
-    """Response of a model: motion of the probes.
+    """Response of a model: a quantity at the probes.
 
     Parameters
     ----------
     model : str, name of the model
     times : (t,) float, s, equally spaced
     probes : (p, 2) float, metre
-    displacement : (t, p) float, metre, normal to the surface, positive the way a pressure
-        pushes. The point kernel has no body to displace: in its response this is the
-        stimulation it predicts instead, in Pa, and `unit` says so.
-    unit : "m" or "Pa"
+    values : (t, p) float, in the unit of the quantity
+    quantity : name of one of `quantities.QUANTITIES`. That of bodies is the displacement normal to
+        the surface, positive the way a pressure pushes, unless a scene asks for another; the point
+        kernel has no body to displace: its response is the stimulation it predicts, a pressure
     effort : Effort
     expected_error : float, relative to the waveforms, as estimated beforehand; nan if unknown
 
@@ -71,32 +71,54 @@ class Response:
     Raises
     ------
     ValueError
-        If shapes do not fit, a number is not finite, times are not equally spaced, or the unit is
-        neither of the two.
+        If shapes do not fit, a number is not finite, times are not equally spaced, or the quantity
+        is unknown.
     """
 
     model: str
     times: Floats
     probes: Floats
-    displacement: Floats
-    unit: str = "m"
+    values: Floats
+    quantity: str = DISPLACEMENT.name
     effort: Effort = field(default_factory=Effort)
     expected_error: float = np.nan
 
     def __post_init__(self) -> None:
-        for name in ("times", "probes", "displacement"):
+        for name in ("times", "probes", "values"):
             array = np.array(getattr(self, name), np.float64)
             if not np.isfinite(array).all():
                 raise ValueError(f"{name} of a response must be finite; leave out nan and inf")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        if self.unit not in UNITS:
-            raise ValueError(f"unit '{self.unit}' of a response is none of {', '.join(UNITS)}")
-        _check_shapes(self.times, self.probes, self.displacement)
+        quantity(self.quantity)  # which refuses an unknown one
+        _check_shapes(self.times, self.probes, self.values)
         _check_spacing(self.times)
 
+    @property
+    def record(self) -> Quantity:
+        """The record of its quantity."""
+        return quantity(self.quantity)
 
-def _check_shapes(times: Floats, probes: Floats, displacement: Floats) -> None:
+    @property
+    def unit(self) -> str:
+        """The unit of its values, SI."""
+        return self.record.unit
+
+    @property
+    def displacement(self) -> Floats:
+        """The values (t, p) of a normal displacement or, of the point kernel, of its pressure.
+
+        Raises
+        ------
+        ValueError
+            If they are of another quantity.
+        """
+        if self.record not in (DISPLACEMENT, PRESSURE):
+            raise ValueError(f"this response is of {self.quantity}; take its `values`")
+        return self.values
+
+
+def _check_shapes(times: Floats, probes: Floats, values: Floats) -> None:
     if times.ndim != 1 or not len(times):
         raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
     if probes.ndim != 2 or probes.shape[1] not in (2, 3):
@@ -104,10 +126,10 @@ def _check_shapes(times: Floats, probes: Floats, displacement: Floats) -> None:
             f"probes of a response have shape {probes.shape}; give (p, 2) or (p, 3) in metre"
         )
     expected = len(times), len(probes)
-    if displacement.shape != expected:
+    if values.shape != expected:
         raise ValueError(
-            f"displacement of a response has shape {displacement.shape}, and its times and probes "
-            f"are {expected}; give (t, p)"
+            f"values of a response have shape {values.shape}, and its times and probes are "
+            f"{expected}; give (t, p)"
         )
 
 
@@ -131,7 +153,7 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
     """
     n = len(response.times)
     weights = named(window, n)
-    amplitude = np.abs(np.fft.rfft(response.displacement * weights[:, None], axis=0))
+    amplitude = np.abs(np.fft.rfft(response.values * weights[:, None], axis=0))
     amplitude *= 2 / weights.sum()
     amplitude[0] /= 2
     return np.asarray(np.fft.rfftfreq(n, step(response.times))), amplitude
@@ -301,7 +323,7 @@ def fit_lines(
     if not ((frequencies >= 0) & (frequencies < nyquist)).all():
         raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
     kept = response.times >= response.times[0] + settle * np.ptp(response.times)
-    t, x = response.times[:, None], response.displacement
+    t, x = response.times[:, None], response.values
     span = float(np.ptp(t[kept]))
     distinct, which = _distinct(frequencies, 1 / span)
     angle = 2 * np.pi * t * distinct[1:]

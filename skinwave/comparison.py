@@ -20,7 +20,7 @@ class Agreement:
     Parameters
     ----------
     relative_l2 : (p,) float, misfit of the waveform at each probe, relative to the reference
-    scale : float, what the candidate was multiplied by first: 1 if both have the same unit,
+    scale : float, what the candidate was multiplied by first: 1 if both are of one quantity,
         else the factor that fits best over all probes
     shape_misfit : (p,) float, misfit of the steady waveform about its mean, relative to the
         reference, after the gain and the delay that fit best at each probe
@@ -69,8 +69,8 @@ def compare(
         raise ValueError("the responses have different probes; compare them at the same ones")
     if reference.times.shape != candidate.times.shape:
         raise ValueError("the responses have different times; compare them at the same ones")
-    x, y = reference.displacement, candidate.displacement
-    fits = reference.unit == candidate.unit
+    x, y = reference.values, candidate.values
+    fits = reference.quantity == candidate.quantity
     scale = 1.0 if fits else float((x * y).sum() / max((y * y).sum(), np.finfo(float).tiny))
     norm = np.linalg.norm(x, axis=0)
     delay, shape_misfit = _aligned(reference, candidate)
@@ -168,7 +168,7 @@ def _vertex(y: Floats) -> tuple[float, float]:
 
 def _moving(response: Response, settle: float = SETTLE) -> Floats:
     """The response (t, p) about its mean, after the transient in its first part."""
-    kept = response.displacement[int(settle * len(response.times)) :]
+    kept = response.values[int(settle * len(response.times)) :]
     return np.asarray(kept - kept.mean(axis=0))
 
 

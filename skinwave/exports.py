@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.stress import nodal_strain
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import step
@@ -16,18 +17,19 @@ from skinwave.plain_text import csv_table
 
 FIELD_FRAMES = 8  # of a period, written for ParaView
 FULL_SCALE = 32767
+IN_NAMES = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # of files
 
 
 def write_probes(stem: Path, response: Response) -> None:
     """`stem`.csv, a column a probe with its unit and place in the header, and `stem`.npz with
-    `t` s, `probes` m and `displacement` (t, p) in m or, of the point kernel, `pressure` in Pa.
+    `t` s, `probes` m and, by the name of its quantity, the values (t, p) in its unit.
     """
-    kind = "pressure" if response.unit == "Pa" else "displacement"
+    kind = response.quantity
     places = [f"({1e3 * x:g}, {1e3 * y:g}) mm" for x, y in response.probes]
     header = ["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)]
-    table = waveform_table(header, [response.times, *response.displacement.T])
+    table = waveform_table(header, [response.times, *response.values.T])
     stem.with_suffix(".csv").write_bytes(table)
-    arrays = {"t": response.times, "probes": response.probes, kind: response.displacement}
+    arrays = {"t": response.times, "probes": response.probes, kind: response.values}
     np.savez(stem.with_suffix(".npz"), **arrays)  # type: ignore[arg-type]
 
 
@@ -39,7 +41,7 @@ def waveform_table(header: Iterable[str], columns: Sequence[Floats]) -> bytes:
 
 def sampled(response: Response, probe: int) -> tuple[NDArray[np.int16], float]:
     """A probe's waveform about its mean in 16 bit, and what of it is the largest that they hold."""
-    motion = response.displacement[:, probe] - response.displacement[:, probe].mean()
+    motion = response.values[:, probe] - response.values[:, probe].mean()
     largest = float(np.abs(motion).max())
     return np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16), largest
 
@@ -52,7 +54,8 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     from scipy.io import wavfile
 
     samples, largest = sampled(response, probe)
-    unit, per = ("Pa", 1.0) if response.unit == "Pa" else ("um", 1e6)
+    per = response.record.per_unit
+    unit = response.record.shown.translate(IN_NAMES)
     x, y = 1e3 * response.probes[probe]
     path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{per * largest:.4g}_{unit}.wav"
     wavfile.write(path, round(1 / step(response.times)), samples)
@@ -62,8 +65,9 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
 def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
     """`column`.pvd and a file of each of `count` frames through a period; the .pvd.
 
-    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean, the point kernel a
-    surface with `pressure_pa` about its mean.
+    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean and, but for sheets,
+    whose mesh has another thickness, its `strain` (n, 6) in ParaView's order of components, XX, YY,
+    ZZ, XY, YZ, XZ; the point kernel a surface with `pressure_pa` about its mean.
     """
     frames = np.unique(np.arange(count) * len(view.times) // count)
     names, stem = [], folder_name(view.column)  # which was read from a file
@@ -88,6 +92,9 @@ def _grid(view: View, frame: int) -> Any:
     cells = np.insert(view.tets, 0, nodes, axis=1).ravel()
     grid = pv.UnstructuredGrid(cells, np.full(len(view.tets), kinds[nodes]), view.points)
     grid["displacement_m"] = view.motion[frame]
+    if not view.scene.body.of_kind.is_plate:
+        strain = nodal_strain(view.points, view.tets, view.motion[frame])
+        grid["strain"] = strain[:, [0, 1, 2, 3, 5, 4]].astype(np.float32)
     return grid
 
 

@@ -1,7 +1,7 @@
 """Motion of a whole body, with its expected error and all warnings."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ import fem
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
+from simple_model.quantities import DISPLACEMENT
 from skinwave.effort import Progress, SkinwaveWarning
 from skinwave.models.reduction import from_rest, oscillating, read_at
 from skinwave.pictures.motion import Waves, check_values, probe_response, waves
@@ -87,6 +88,7 @@ def assessed_probes(
     -------
     Response, displacement (t, p) in metre
     """
+    scene = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # what is assessed is motion
     found = probe_response(scene, moved)
     if scene.body.is_held:
         return told(scene, found, found.displacement, h, tolerance, solver)

@@ -4,7 +4,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import Effort
+from simple_model.quantities import DISPLACEMENT, VELOCITY
 from skinwave import outputs, record
 from skinwave.plain_text import csv_table
 from skinwave.run import Run
@@ -21,6 +22,7 @@ LINE_COLUMNS = (
     "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
     "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
 )  # fmt: skip
+DEPTH = "probe_depth_mm"
 RESERVED = ("figures", "overview", "propagation")  # what a study names itself
 DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # of Windows
 LONGEST, MOST_BYTES = 80, 200  # of a name, which gets an ending and is limited to 255 bytes
@@ -68,7 +70,8 @@ def fill(folder: Path, run: Run, *, by: str = "compute") -> None:
     """scene.toml, responses.npz, lines.csv, effort.json and record.json of one run, into an empty
     folder; `by` is how its model was computed, as in `record.of_model`.
     """
-    write_responses(folder / record.RESPONSES[0], {"displacement": run, run.model: run})
+    name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
+    write_responses(folder / record.RESPONSES[0], {name: run, run.model: run})
     write_lines(folder / "lines.csv", [run])
     write_effort(folder / "effort.json", run.response.effort)
     # Only then is it a result for whoever looks for scenes in a folder that was left half-written.
@@ -78,35 +81,54 @@ def fill(folder: Path, run: Run, *, by: str = "compute") -> None:
 
 
 def write_responses(path: Path, runs: Mapping[str, Run]) -> None:
-    """Times `t` in s, `probes` in m and, by name, displacement (t, p) in m or Pa."""
+    """Times `t` in s, `probes` in m and, by name, values (t, p) in the unit of their quantity."""
     first = next(iter(runs.values())).response
     arrays: dict[str, Any] = {"t": first.times, "probes": first.probes}
-    arrays |= {name: run.response.displacement for name, run in runs.items()}
+    arrays |= {name: run.response.values for name, run in runs.items()}
     with open(path, "wb") as file:
         np.savez(file, **arrays)
 
 
 def write_lines(path: Path, runs: Iterable[Run]) -> None:
     """Every line's amplitude per Tacton, body, model and probe."""
-    rows = (row for run in runs for row in line_rows(run))
-    path.write_bytes(csv_table(LINE_COLUMNS, rows))
+    runs = list(runs)
+    columns = line_columns(runs)
+    rows = (row for run in runs for row in line_rows(run, columns))
+    path.write_bytes(csv_table(columns, rows))
 
 
-def line_rows(run: Run) -> Iterator[tuple[object, ...]]:
+def line_columns(runs: Iterable[Run]) -> tuple[str, ...]:
+    """Columns of lines.csv: `LINE_COLUMNS`, with the depth of probes below the surface and those of
+    other quantities than displacement, velocity and pressure where there are any.
+    """
+    runs = list(runs)
+    more = dict.fromkeys(run.response.record.column for run in runs)
+    deep = [DEPTH] * any(not run.scene.reading.is_on_surface for run in runs)
+    where, amplitudes = LINE_COLUMNS[:5], LINE_COLUMNS[5:]
+    return (*where, *deep, *amplitudes, *(name for name in more if name not in amplitudes))
+
+
+def line_rows(run: Run, columns: Sequence[str] = LINE_COLUMNS) -> Iterator[tuple[object, ...]]:
     """Rows of lines.csv; the point kernel has a pressure where bodies have a displacement. Peaks
     that are no single line of the load have their kind for a name, such as "free vibration".
     """
+    asked = run.response.record
     found = [(name, f, run.table.amplitudes[name]) for name, f in run.listed.items()]
     found += [(peak.kind, peak.frequency, peak.amplitudes) for peak in run.unnamed]
     for name, frequency, amplitudes in found:
-        for (x, y), amplitude in zip(run.response.probes, amplitudes, strict=True):
-            where = (run.tacton, run.body, run.model, _short(1e3 * x), _short(1e3 * y), name)
-            if run.response.unit == "Pa":
-                yield (*where, _short(frequency), "", "", _short(amplitude))
-            else:
-                velocity = 2 * np.pi * frequency * amplitude
-                um, mm_s = _short(1e6 * amplitude), _short(1e3 * velocity)
-                yield (*where, _short(frequency), um, mm_s, "")
+        for (x, y), z, amplitude in zip(
+            run.response.probes, run.scene.depths, amplitudes, strict=True
+        ):
+            row: dict[str, object] = {
+                "tacton": run.tacton, "body": run.body, "model": run.model, "line": name,
+                "probe_x_mm": _short(1e3 * x), "probe_y_mm": _short(1e3 * y),
+                DEPTH: _short(1e3 * z), "frequency_hz": _short(frequency),
+                asked.column: _short(asked.per_unit * amplitude),
+            }  # fmt: skip
+            if asked is DISPLACEMENT:
+                velocity = VELOCITY.per_unit * 2 * np.pi * frequency * amplitude
+                row[VELOCITY.column] = _short(velocity)
+            yield tuple(row.get(column, "") for column in columns)
 
 
 def write_effort(path: Path, effort: Effort) -> None:

@@ -79,9 +79,16 @@ class Run:
         return own
 
     @property
+    def is_motion(self) -> bool:
+        """Whether it is the displacement of a body's surface."""
+        return self.scene.reading.is_plain and self.response.record.of_body
+
+    @property
     def is_skin(self) -> bool:
-        """Whether it is skin that moves, of which alone thresholds of detection are known."""
-        return self.response.unit == "m" and self.scene.body.is_skin
+        """Whether it is the surface of skin that moves, of which alone thresholds of detection are
+        known.
+        """
+        return self.is_motion and self.scene.body.is_skin
 
     @property
     def is_am(self) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model import MovingPressure, Tacton
+from simple_model.quantities import DISPLACEMENT, Quantity, quantity
 from skinwave.bodies import (
     BODIES,
     FLAT,
@@ -21,14 +22,50 @@ from skinwave.bodies import (
 )
 
 __all__ = [
-    "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE",
-    "Body", "Layer", "Placement", "Relief", "Scene",
-    "body_name", "kind_of", "solid_of", "with_body",
+    "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
+    "Body", "Layer", "Placement", "Reading", "Relief", "Scene",
+    "body_name", "check_motion", "kind_of", "solid_of", "with_body",
 ]  # fmt: skip
 
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
 MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """Name of the quantity that probes read, and the depth in metre of each; () for all at the
+    surface.
+    """
+
+    quantity: str = DISPLACEMENT.name
+    depths: tuple[float, ...] = ()
+
+    @property
+    def asked(self) -> Quantity:
+        """The record of the quantity."""
+        return quantity(self.quantity)
+
+    @property
+    def is_on_surface(self) -> bool:
+        """Whether all probes are at the surface."""
+        return not any(self.depths)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the probes read the normal displacement at the surface."""
+        return self.asked is DISPLACEMENT and self.is_on_surface
+
+    @property
+    def words(self) -> str:
+        """Quantity and depth in a few words."""
+        if self.is_on_surface:
+            return self.asked.words
+        shown = sorted({f"{1e3 * z:g}" for z in self.depths}, key=float)
+        return f"{self.asked.words} at a depth of {', '.join(shown)} mm"
+
+
+SURFACE = Reading()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,19 +78,30 @@ class Scene:
     pressure : MovingPressure, with its Tacton
     body : Body
     probes : (p, 2) positions in metre, where the surface is watched
+    depth : of the probes in metre below the surface, along its normal; one, or one a probe
+    quantity : name of one of `simple_model.quantities.QUANTITIES`, what the probes read
 
     Raises
     ------
     ValueError
-        If a probe or the path of the focus is off the body, or there is no probe.
+        If a probe or the path of the focus is off the body, there is no probe, or the body has no
+        such quantity or depth.
     """
 
     name: str = "scene"
     pressure: MovingPressure
     body: Body
     probes: tuple[tuple[float, float], ...] = PROBES
+    depth: float | tuple[float, ...] = 0.0
+    quantity: str = DISPLACEMENT.name
 
     def __post_init__(self) -> None:
+        self._check_probes()
+        self._check_reading()
+        if self.body.of_kind.is_bounded:
+            self._check_extent()
+
+    def _check_probes(self) -> None:
         if not self.probes:
             raise ValueError("points_mm is empty; give at least one probe")
         if (values := len(self.probes) * self.tacton.duration * SAMPLE_RATE) > MOST_VALUES:
@@ -62,8 +110,37 @@ class Scene:
                 f"{SAMPLE_RATE:g} Hz are {values:,.0f} values, the limit is {MOST_VALUES:,}; "
                 "give fewer probes or a shorter Tacton"
             )
-        if not self.body.of_kind.is_bounded:
-            return
+        if isinstance(self.depth, tuple) and len(self.depth) != len(self.probes):
+            raise ValueError(
+                f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one, "
+                "or one a probe"
+            )
+        for z in self.depths:
+            if not (np.isfinite(z) and z >= 0):
+                raise ValueError(
+                    f"depth_mm = {1e3 * z:g} of a probe must be a finite number, 0 or above"
+                )
+
+    def _check_reading(self) -> None:
+        asked, body = self.reading.asked, self.body
+        if not asked.of_body:
+            raise ValueError(
+                f"quantity '{self.quantity}' is that of the point kernel, which needs none; leave "
+                "it out"
+            )
+        if body.of_kind.is_plate and not (asked.is_normal and self.reading.is_on_surface):
+            raise ValueError(
+                f"a {body.kind} is modelled by an equivalent one of another thickness, which has "
+                f"the motion normal to its surface alone, not {asked.words} at a depth; take "
+                "displacement, velocity or acceleration at depth_mm = 0"
+            )
+        if (deepest := max(self.depths)) >= body.depth and body.of_kind.is_layer:
+            raise ValueError(
+                f"depth_mm = {1e3 * deepest:g} of a probe is below the body, which is "
+                f"{1e3 * body.depth:g} mm thick; move it up"
+            )
+
+    def _check_extent(self) -> None:
         half = np.array([self.body.width, self.body.height]) / 2
         for x, y in self.probes:
             if abs(x) > half[0] or abs(y) > half[1]:
@@ -88,6 +165,32 @@ class Scene:
     def probe_points(self) -> NDArray[np.float64]:
         """Probes as an array (p, 2) in metre."""
         return np.array(self.probes)
+
+    @property
+    def depths(self) -> tuple[float, ...]:
+        """Depth in metre of each probe."""
+        one = not isinstance(self.depth, tuple)
+        return (self.depth,) * len(self.probes) if one else self.depth  # type: ignore[return-value]
+
+    @property
+    def reading(self) -> Reading:
+        """Quantity of the probes, and their depths."""
+        return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
+
+
+def check_motion(scene: Scene, command: str) -> None:
+    """Refuse a scene for a command that is about the displacement of the surface.
+
+    Raises
+    ------
+    ValueError
+        If its probes read something else.
+    """
+    if not scene.reading.is_plain:
+        raise ValueError(
+            f"{command} is about the displacement of the surface, not {scene.reading.words}; leave "
+            "out depth_mm and quantity, or use skinwave run or sweep"
+        )
 
 
 def with_body(scene: Scene, body: Body, **pressure: Any) -> Scene:

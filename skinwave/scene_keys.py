@@ -8,7 +8,7 @@ from math import inf, isfinite, nextafter, pi
 from typing import Any
 
 from simple_model import ModulusTable, Rhythm, Signal
-from simple_model.choices import meant
+from simple_model.choices import choose, meant
 from simple_model.drive import DRIVES, DriveLaw
 from simple_model.focus import FOCI, FocalSpot
 from simple_model.material import Material, PronyTerm
@@ -16,6 +16,11 @@ from simple_model.modulus_laws import COLUMNS
 from simple_model.trajectory import Points
 from skinwave.material_file import material_of, values_of, written_table
 from skinwave.scene import Layer, Relief
+
+# Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
+# the base of the epidermis, Meissner's corpuscles in the papillae beside them, Pacini's in the deep
+# dermis and below. A place and a person may differ by half: give a number where it is known.
+RECEPTORS = {"surface": 0.0, "meissner": 0.7e-3, "merkel": 0.75e-3, "pacini": 2e-3}
 
 
 @dataclass(frozen=True)
@@ -240,6 +245,24 @@ def _word(name: str) -> SceneKey:
     return SceneKey(name, as_text, str)
 
 
+def _depth(key: str, value: Any) -> float | tuple[float, ...]:
+    if isinstance(value, list):
+        return tuple(_one_depth(key, each) for each in value)
+    return _one_depth(key, value)
+
+
+def _one_depth(key: str, value: Any) -> float:
+    if isinstance(value, str):
+        return RECEPTORS[choose(key, value, RECEPTORS)]
+    return _number(key, value) / 1e3
+
+
+def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
+    if isinstance(depth, tuple):
+        return [_in_units(z, 1e3) for z in depth]
+    return _in_units(depth, 1e3)
+
+
 PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
 MATERIAL = {
     "density_kg_m3": _scaled("density"),
@@ -321,7 +344,11 @@ SECTIONS = {
         "offset_mm": SceneKey("offset", _pair_in_mm, _write_pair),
         "lift_mm": _scaled("lift", 1e3),
     },
-    "probes": {"points_mm": SceneKey("probes", _points, _write_points)},
+    "probes": {
+        "points_mm": SceneKey("probes", _points, _write_points),
+        "depth_mm": SceneKey("depth", _depth, _write_depth),
+        "quantity": _word("quantity"),
+    },
 }
 
 

@@ -9,7 +9,7 @@ import fem
 from simple_model import Response
 from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
-from skinwave.models import MapFunction, Request, named
+from skinwave.models import MapFunction, Request, check_reading, named
 from skinwave.models.laws import check_laws
 from skinwave.models.prepared import answer, sample_times
 from skinwave.planning.plan import Plan, plan
@@ -28,7 +28,7 @@ def simulate(
     solver: str = "auto",
     mapped: MapFunction = map,
 ) -> Response:
-    """Simulate a scene: the motion of its probes, with its expected error.
+    """Simulate a scene: the quantity that its probes read, with its expected error.
 
     Where a request is not met, `effort.warnings` of the response say so, and each sentence is a
     `SkinwaveWarning` once. The error of a given h or model is estimated as in a plan, which for
@@ -55,7 +55,7 @@ def simulate(
 
     Returns
     -------
-    Response, (t, p) displacement in metre, or stimulation in Pa of the point kernel
+    Response, (t, p) of the scene's quantity, or stimulation in Pa of the point kernel
 
     Raises
     ------
@@ -190,6 +190,7 @@ def compute(
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     known.refuse(scene.body)
+    check_reading(known, scene)
     if known.needs_body:
         check_laws(scene.body, scene.pressure)
     request = Request(

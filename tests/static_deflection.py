@@ -23,7 +23,7 @@ def solve(scene: Scene, request: Request) -> Response:
     pressure = np.array([scene.pressure(scene.probe_points, t) for t in request.times])
     return Response(
         model="static-deflection", times=request.times, probes=scene.probe_points,
-        displacement=per_pressure(scene.body) * pressure,
+        values=per_pressure(scene.body) * pressure,
     )  # fmt: skip
 
 

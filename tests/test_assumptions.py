@@ -302,7 +302,7 @@ def test_little_loss_is_that_of_layers_too():
 
 def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
     times = np.arange(4.0)
-    told = Response(model="fem", times=times, probes=np.zeros((1, 2)), displacement=times[:, None])
+    told = Response(model="fem", times=times, probes=np.zeros((1, 2)), values=times[:, None])
     steps = [
         HierarchyStep(name=name, dropped=dropped, model="fem", response=response)
         for name, dropped, response in (
@@ -334,7 +334,7 @@ def test_line_changes_are_of_lines_that_count():
     times = np.arange(1000) / 10_000
     loud = np.sin(2 * np.pi * 140 * times)[:, None]
     first = skinwave.simulate(replace(SKIN, body=BODIES["none"]), "point-kernel")
-    before, after = (replace(first, displacement=a * loud, unit="m") for a in (1.0, 2.0))
+    before, after = (replace(first, values=a * loud, quantity="displacement") for a in (1.0, 2.0))
     changes = line_changes(SKIN, before, after)
     assert changes["f_AM"] == pytest.approx(6.02, abs=0.01)
 

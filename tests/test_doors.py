@@ -189,7 +189,7 @@ def deflected(by, scene, model="fem"):
     """A response of a scene that moves by so much."""
     times = np.arange(3) / 1e4
     motion = np.outer([0.0, -1.0, 0.5], np.ones(len(scene.probes))) * by
-    return Response(model=model, times=times, probes=scene.probe_points, displacement=motion)
+    return Response(model=model, times=times, probes=scene.probe_points, values=motion)
 
 
 def test_a_sheet_is_linear_up_to_half_its_thickness():

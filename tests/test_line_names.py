@@ -257,13 +257,13 @@ def test_amplitudes_of_resolved_lines_are_those_of_a_longer_response(load):
 # What a body adds
 
 
-def struck(frequency=87.0, decay=6.0, strength=0.3, unit="m"):
+def struck(frequency=87.0, decay=6.0, strength=0.3, quantity="displacement"):
     """A line of the load, and a free vibration that decays."""
     load = MovingPressure(tacton=Tacton(am_frequency=140))
     free = strength * np.exp(-decay * TIMES) * np.sin(2 * np.pi * frequency * TIMES)
     x = 1e-6 * (np.sin(2 * np.pi * 140 * TIMES) + 0.25 * np.cos(2 * np.pi * 280 * TIMES) + free)
     response = Response(
-        model="fem", times=TIMES, probes=np.zeros((1, 2)), displacement=x[:, None], unit=unit
+        model="fem", times=TIMES, probes=np.zeros((1, 2)), values=x[:, None], quantity=quantity
     )
     return load, response
 

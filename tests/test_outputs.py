@@ -49,8 +49,8 @@ def a_run(name="small"):
     scene = loads(corpus.SILENT_GROUND.replace('"small"', f'"{name}"'))
     times = np.arange(4) / 100
     response = Response(
-        model="point-kernel", times=times, probes=scene.probe_points, unit="Pa",
-        displacement=np.zeros((4, len(scene.probes))),
+        model="point-kernel", times=times, probes=scene.probe_points, quantity="pressure",
+        values=np.zeros((4, len(scene.probes))),
     )  # fmt: skip
     return Run(tacton=name, body="none", scene=scene, response=response)
 

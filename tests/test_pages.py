@@ -48,7 +48,7 @@ def response(model="point-kernel", **fields):
         [1.0, 0.5] if model == "point-kernel" else [0.5, 1.0]
     )
     probes = np.array([[0, 0], [5e-3, 0]])
-    return Response(model=model, times=times, probes=probes, displacement=motion, **fields)
+    return Response(model=model, times=times, probes=probes, values=motion, **fields)
 
 
 def relaxed(folder):

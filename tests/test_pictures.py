@@ -19,7 +19,7 @@ from in_browser import needs_browser
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from fem import PRESETS
+from fem import PRESETS, nodal_strain
 from simple_model import MovingPressure, Tacton, Trajectory, published
 from simple_model.flat_body import steady_lines
 from simple_model.tacton import pattern_period
@@ -357,6 +357,9 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     frame = int(np.argmin(np.abs(view.times - reader.time_values[3])))
     np.testing.assert_array_equal(grid["displacement_m"], view.motion[frame])
     np.testing.assert_allclose(grid.points, view.points)
+    strain = nodal_strain(view.points, view.tets, view.motion[frame])
+    xy, yz, xz = grid["strain"].T[3:]  # in ParaView's order
+    np.testing.assert_allclose([xy, xz, yz], strain.T[3:], rtol=1e-5, atol=1e-12)
 
 
 FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "sensation-1")

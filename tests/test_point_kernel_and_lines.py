@@ -27,7 +27,7 @@ def kernel(am=0.0, size=0.0, speed=0.0, drive="linear", probes=PROBES):
 
 def sampled(x):
     x = np.atleast_2d(x).T if np.ndim(x) == 1 else x
-    return Response(model="made", times=TIMES, probes=np.zeros((x.shape[1], 2)), displacement=x)
+    return Response(model="made", times=TIMES, probes=np.zeros((x.shape[1], 2)), values=x)
 
 
 def test_a_line_between_bins_is_read_exactly():

@@ -156,7 +156,9 @@ def test_delay_and_gain_are_removed_from_a_periodic_signal():
     t = np.arange(10_000) / 1e4
     wave = np.sin(2 * pi * 140 * t) + 0.4 * np.sin(2 * pi * 280 * t + 1)
     later = 3e-6 * (np.sin(2 * pi * 140 * (t - 1.23e-3)) + 0.4 * np.sin(2 * pi * 280 * (t - 1.23e-3) + 1))  # noqa: E501  # fmt: skip
-    found = compare(_response(t, wave, "Pa"), _response(t, 5e-6 + later, "m"), (140.0, 280.0))
+    found = compare(
+        _response(t, wave, "pressure"), _response(t, 5e-6 + later, "displacement"), (140.0, 280.0)
+    )
     assert found.delay == pytest.approx([1.23e-3] * 2, abs=2e-5)
     assert found.shape_misfit.max() < 0.02
     assert found.phase_delay == pytest.approx(np.full((2, 2), 1.23e-3), abs=1e-6)
@@ -169,8 +171,8 @@ def test_phase_delay_is_unwrapped_outwards_and_absent_where_nothing_moves():
     fall = np.exp(-probes[:, 0] / 0.03)
     kernel = np.sin(2 * pi * 200 * t)[:, None] * np.ones(9)
     waves = fall * np.sin(2 * pi * 200 * (t[:, None] - 1e-3 - probes[:, 0] / 5))
-    a = Response(model="point-kernel", times=t, probes=probes, displacement=kernel, unit="Pa")
-    b = Response(model="fem", times=t, probes=probes, displacement=1e-6 * waves)
+    a = Response(model="point-kernel", times=t, probes=probes, values=kernel, quantity="pressure")
+    b = Response(model="fem", times=t, probes=probes, values=1e-6 * waves)
     delay = compare(a, b, (200.0, 300.0)).phase_delay
     heard = fall > 0.1
     assert delay[0, heard] == pytest.approx(1e-3 + probes[heard, 0] / 5, abs=1e-6)
@@ -186,7 +188,7 @@ def test_harmonics_are_judged_in_the_plural():
         wave = np.sin(2 * pi * 140 * t) + 0.2 * np.sin(2 * pi * 280 * t)
         wave += third * np.sin(2 * pi * 420 * t)
         motion = 1e-6 * wave[:, None] * np.ones(5)
-        response = Response(model="fem", times=t, probes=scene.probe_points, displacement=motion)
+        response = Response(model="fem", times=t, probes=scene.probe_points, values=motion)
         run = Run(tacton="am", body="slab", scene=scene, response=response)
         return next(v for v in evaluate([run]) if v.claim == "M1")
 
@@ -248,8 +250,8 @@ def _run(scene, model, name="one"):
     return Run(tacton=name, body=body, scene=scene, response=compute(scene, model))
 
 
-def _response(t, wave, unit):
+def _response(t, wave, quantity):
     motion = wave[:, None] * np.array([1.0, 0.5])
     return Response(
-        model="fem", times=t, probes=np.array([[0, 0], [0.01, 0]]), displacement=motion, unit=unit
+        model="fem", times=t, probes=np.array([[0, 0], [0.01, 0]]), values=motion, quantity=quantity
     )

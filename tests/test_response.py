@@ -14,12 +14,12 @@ TIMES = np.arange(5) / 10_000
 
 
 def made(**changed):
-    parts = {"times": TIMES, "probes": np.zeros((2, 2)), "displacement": np.ones((5, 2))}
+    parts = {"times": TIMES, "probes": np.zeros((2, 2)), "values": np.ones((5, 2))}
     return Response(model="made", **(parts | changed))
 
 
 def test_the_callers_arrays_stay_the_callers():
-    mine = {"times": TIMES.copy(), "probes": np.zeros((2, 2)), "displacement": np.ones((5, 2))}
+    mine = {"times": TIMES.copy(), "probes": np.zeros((2, 2)), "values": np.ones((5, 2))}
     response = made(**mine)
     for array in mine.values():
         array += 1.0  # neither frozen nor shared
@@ -35,13 +35,13 @@ def test_the_callers_arrays_stay_the_callers():
         ({"times": TIMES[:, None]}, r"times of a response have shape \(5, 1\); give \(t,\)"),
         ({"probes": np.zeros(2)}, r"probes of a response have shape \(2,\); give \(p, 2\)"),
         ({"probes": np.zeros((2, 4))}, r"shape \(2, 4\); give \(p, 2\) or \(p, 3\)"),
-        ({"displacement": np.ones((2, 5))}, r"shape \(2, 5\), and its times and probes are \(5, 2"),
+        ({"values": np.ones((2, 5))}, r"shape \(2, 5\), and its times and probes are \(5, 2"),
         ({"probes": np.zeros((3, 2))}, r"are \(5, 3\); give \(t, p\)"),
-        ({"displacement": np.full((5, 2), np.nan)}, "displacement of a response must be finite"),
+        ({"values": np.full((5, 2), np.nan)}, "values of a response must be finite"),
         ({"probes": np.full((2, 2), np.inf)}, "probes of a response must be finite"),
         ({"times": TIMES**2}, "must rise in equal steps"),
         ({"times": -TIMES}, "must rise in equal steps"),
-        ({"unit": "mm"}, "unit 'mm' of a response is none of m, Pa"),
+        ({"quantity": "mm"}, "quantity 'mm' is unknown, use one of displacement, velocity"),
     ],
 )
 def test_a_response_that_cannot_be_is_refused_in_a_sentence(changed, sentence):

@@ -26,7 +26,7 @@ def run(body, drive="pressure_squared", **tacton):
     scene = Scene(pressure=pressure, body=body)
     times = np.arange(5000) / 1e4
     motion = 1e-6 * np.sin(2 * np.pi * 140 * times)[:, None] * np.ones(len(scene.probes))
-    response = Response(model="fem", times=times, probes=scene.probe_points, displacement=motion)
+    response = Response(model="fem", times=times, probes=scene.probe_points, values=motion)
     return Run(tacton="one", body=body.kind, scene=scene, response=response)
 
 
@@ -75,7 +75,7 @@ def at_the_focus(seconds, **tacton):
     times = np.arange(round(seconds * 1e4)) / 1e4
     angle = 2 * np.pi * tacton["am_frequency"] * times
     motion = 1e-6 * (3 + 2 * np.sin(angle) + np.cos(2 * angle))[:, None] * np.ones(5)
-    response = replace(one.response, times=times, displacement=motion)
+    response = replace(one.response, times=times, values=motion)
     pressure = replace(one.scene.pressure, tacton=Tacton(duration=seconds, **tacton))
     return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
 

@@ -154,7 +154,7 @@ def test_an_address_carries_every_control():
         "foci": 3, "sharing": "time_multiplexed",
         "pulses": "100/50, 40/110", "phases": "0, 20, 70", "ramp": 5.0, "x": -3.21, "y": 4.0,
         "drawn": 42.5, "paths": "circle/20/-15/0, line/10/15/0.5, point/0/0/-20",
-        "layers": "0.3/45, inf/5",
+        "layers": "0.3/45, inf/5", "depth": 0.7, "quantity": "stress_xz",
     }  # fmt: skip
     assert set(changed) == set(STARTS)
     assert all(changed[key] != STARTS[key] for key in STARTS)

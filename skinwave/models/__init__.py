@@ -65,7 +65,8 @@ class Model:
     default_size : element size in metre for a body; None without a mesh
     seconds, memory : predicted for a first response where a plan does not measure, s and bytes
     colour : str, of figures
-    unit : str, "m", or "Pa" of a stimulation
+    reads : whether it has the quantity that a scene asks for, at the depths of its probes
+    quantity : name of the one that it has whatever a scene asks for, as the point kernel has; or ""
     needs_body : bool
     is_reduced : bool, whether bodies are reduced once for all Tactons
     is_infinite : bool, whether it leaves out reflections from the sides
@@ -87,7 +88,8 @@ class Model:
     memory: float = 1e8
     colour: str = "#56B4E9"
     label: str = ""
-    unit: str = "m"
+    reads: "Callable[[Scene], bool]" = lambda scene: scene.reading.is_plain
+    quantity: str = ""
     needs_body: bool = True
     is_reduced: bool = False
     is_infinite: bool = False
@@ -114,6 +116,21 @@ def register(model: Model) -> Model:
         raise ValueError(f"'{model.name}' is registered already; choose another name")
     extensions.add(_MODELS, model.name, model, model.solve)
     return model
+
+
+def check_reading(model: Model, scene: "Scene") -> None:
+    """Refuse a scene whose quantity or depth a model does not have.
+
+    Raises
+    ------
+    ValueError
+        If it is so.
+    """
+    if not model.reads(scene):
+        raise ValueError(
+            f"{model.name} has no {scene.reading.words}; use --model fem, or ask for the "
+            "displacement at the surface"
+        )
 
 
 def names() -> tuple[str, ...]:

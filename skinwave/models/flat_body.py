@@ -1,8 +1,16 @@
 """Wavenumber integrals of a laterally infinite body: in time from rest, and the steady state."""
 
+import time
+from collections.abc import Callable
+
+import numpy as np
+
 import simple_model
-from simple_model import Response, steady_state
-from skinwave.bodies.analytic import exact_waves
+from meshes.tetmesh import Floats
+from simple_model import Effort, Response, steady_state
+from simple_model.flat_quantities import from_rest, quantity_field, steady, surface_field
+from simple_model.wavenumber_integral import Field
+from skinwave.bodies.analytic import exact_waves, stack
 from skinwave.models import Model, Request, register
 from skinwave.models.laws import has_table
 from skinwave.scene import Scene
@@ -10,12 +18,40 @@ from skinwave.scene import Scene
 
 def _from_rest(scene: Scene, request: Request) -> Response:
     compliance = exact_waves(scene.body, "flat-body")
+    if not scene.reading.is_plain:
+        return _read("flat-body", from_rest, scene, request)
     return simple_model.flat_body(compliance, scene.pressure, scene.probe_points, request.times)
 
 
 def _steady(scene: Scene, request: Request) -> Response:
     compliance = exact_waves(scene.body, "flat-body-harmonic")
+    if not scene.reading.is_plain:
+        return _read("flat-body-harmonic", steady, scene, request)
     return steady_state(compliance, scene.pressure, scene.probe_points, request.times)
+
+
+def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, request: Request) -> Response:
+    """Response of a quantity, the probes of one depth together."""
+    started, times = time.perf_counter(), request.times
+    asked, depths = scene.reading.asked, np.array(scene.depths)
+    values = np.empty((len(times), len(depths)))
+    for depth in np.unique(depths).tolist():
+        here = depths == depth
+        values[:, here] = waveforms(
+            _field(scene, depth), asked, scene.pressure, scene.probe_points[here], times
+        )
+    effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
+    return Response(
+        model=model, times=times, probes=scene.probe_points, quantity=asked.name, values=values,
+        effort=effort,
+    )  # fmt: skip
+
+
+def _field(scene: Scene, depth: float) -> Field:
+    body, asked = scene.body, scene.reading.asked
+    if body.of_kind.is_layer:
+        return quantity_field(asked, stack(body), depth)
+    return surface_field(asked, exact_waves(body, "flat-body"))
 
 
 FLAT_BODY = register(
@@ -29,6 +65,7 @@ FLAT_BODY = register(
         seconds=2.0,
         memory=3e8,
         colour="#009E73",
+        reads=lambda scene: True,
         is_infinite=True,
         takes_series=has_table,
     )
@@ -45,6 +82,7 @@ HARMONIC = register(
         seconds=2.0,
         memory=3e8,
         colour="#E69F00",
+        reads=lambda scene: True,
         is_infinite=True,
         is_steady=True,
     )

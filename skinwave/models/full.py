@@ -15,6 +15,7 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, path_samples, pressure_lines, synthesise
+from simple_model.material import Material
 from simple_model.sampling import resolving_step, shown
 from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
@@ -22,7 +23,7 @@ from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models import Request
 from skinwave.models.laws import relaxing, series_tolerance
-from skinwave.models.loads import surface_load, surface_motion
+from skinwave.models.loads import line_factor, probe_rows, surface_load
 from skinwave.scene import Body, Scene
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
@@ -108,7 +109,7 @@ def transient_answer(scene: Scene, request: Request) -> Response:
     build = meshed(body, request.h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
-    S = surface_motion(scene.body, build, scene.probe_points)
+    S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
     report("factorise", 0.0)
 
     @lru_cache(maxsize=4)
@@ -126,10 +127,36 @@ def transient_answer(scene: Scene, request: Request) -> Response:
         solver=fem.available()[0] if solver == "auto" else solver,
     )  # fmt: skip
     return Response(
-        model="fem-transient", times=times, probes=scene.probe_points,
-        displacement=CubicSpline(np.arange(steps + 1) * dt, stepped)(times),
+        model="fem-transient", times=times, probes=scene.probe_points, quantity=scene.quantity,
+        values=in_time(stepped, dt, times, scene, solids),
         effort=spent(effort, clock, build, request.h or default_size(scene.body)),
     )  # fmt: skip
+
+
+def in_time(
+    stepped: Floats, dt: float, times: Floats, scene: Scene, solids: tuple[Material, ...] = ()
+) -> Floats:
+    """Waveforms of a scene's quantity from the steps of a time integration: rates are those of the
+    cubic spline that is sampled.
+
+    Parameters
+    ----------
+    stepped : (n, p c) float, its components at rest in steps of dt from 0
+    dt : float, s
+    times : (t,) float, s
+    scene : Scene
+    solids : p materials of the probes, where stress relaxes
+
+    Returns
+    -------
+    (t, p) float, in the unit of the quantity
+    """
+    asked = scene.reading.asked
+    if asked.relaxes:
+        each = np.split(stepped, len(solids), axis=1)
+        stepped = np.hstack([fem.relaxed(x, dt, m) for x, m in zip(each, solids, strict=True)])
+    sampled = CubicSpline(np.arange(len(stepped)) * dt, stepped)(times, asked.rate)
+    return asked.waveforms(sampled, len(scene.probes))
 
 
 def marched(
@@ -198,7 +225,8 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
     build = meshed(scene.body, request.h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build)
-    S = surface_motion(scene.body, build, scene.probe_points)
+    S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
+    asked = scene.reading.asked
     with clock("lines"):
         lines, knots = load_lines(scene.pressure, threshold), path_samples(scene.pressure)
         count = len(np.unique(np.round(lines.frequencies, 9)))
@@ -210,7 +238,7 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
         frequencies, pressures = pressure_lines(scene.pressure, points, threshold)
         if not scene.body.is_held:  # under its mean an unconstrained body would drift
             frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
-        amplitudes = np.empty((len(frequencies), len(scene.probes)), np.complex128)
+        amplitudes = np.empty((len(frequencies), S.shape[0]), np.complex128)
         total = fem.EnergyBalance()
         report("lines", 0.0)
         answers = request.mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
@@ -219,14 +247,17 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
     energy = energy_balance(total)
+    amplitudes = amplitudes * line_factor(asked, 2j * np.pi * frequencies, solids, S.shape[0])
     below = shown(scene.pressure, frequencies, times)
     effort = Effort(
         dofs=len(ops.free), steps=len(frequencies), energy_imbalance=energy[0], radiated=energy[1],
         solver=fem.available(complex_valued=True)[0] if solver == "auto" else solver,
     )  # fmt: skip
     return Response(
-        model="fem-harmonic", times=times, probes=scene.probe_points,
-        displacement=synthesise(frequencies[below], amplitudes[below], times),
+        model="fem-harmonic", times=times, probes=scene.probe_points, quantity=scene.quantity,
+        values=asked.waveforms(
+            synthesise(frequencies[below], amplitudes[below], times), len(scene.probes)
+        ),
         effort=spent(effort, clock, build, request.h or default_size(scene.body)),
     )  # fmt: skip
 
@@ -239,7 +270,7 @@ def _line(
     frequency: float,
     pressure: fem.Complex,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
-    """Motion (p,) in metre of the probes at one line, and its mean power balance."""
+    """Components (p c,) at rest of the probes at one line, and its mean power balance."""
     force, free = P @ pressure, ops.free
     u = fem.harmonic(ops, force, frequency, solver=solver)
     line = force[None, free], u[:, free], np.array([frequency])

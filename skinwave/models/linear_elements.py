@@ -30,7 +30,7 @@ def vacuum_only(model: str, body: Body) -> None:
 def _reduced(scene: Scene, request: Request) -> Response:
     prepared = prepare(
         scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
-        tolerance=reduction_tolerance(request.tolerance),
+        tolerance=reduction_tolerance(request.tolerance), reading=scene.reading,
     )  # fmt: skip
     return answer(prepared, scene, request.report)
 
@@ -43,6 +43,7 @@ FEM = register(
         solve=_reduced,
         error=None,
         default_size=default_size,
+        reads=lambda scene: True,
         colour="#0072B2",
         is_reduced=True,
         fits_damping=True,
@@ -58,6 +59,7 @@ HARMONIC = register(
         refuse=partial(vacuum_only, "fem-harmonic"),
         error=None,
         default_size=default_size,
+        reads=lambda scene: True,
         colour="#CC79A7",
         is_steady=True,
     )
@@ -71,6 +73,7 @@ TRANSIENT = register(
         refuse=partial(vacuum_only, "fem-transient"),
         error=None,
         default_size=default_size,
+        reads=lambda scene: True,
         colour="#D55E00",
         is_stepped=True,
         fits_damping=True,

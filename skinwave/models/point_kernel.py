@@ -1,6 +1,7 @@
 """Point kernel under the scene's own load, and under that of the paper."""
 
 from simple_model import Response, point_kernel, point_kernel_published
+from simple_model.quantities import PRESSURE
 from skinwave.models import Model, Request, register
 from skinwave.scene import Scene
 
@@ -25,7 +26,8 @@ SAME_LOAD = register(
         solve=_same_load,
         error=lambda scene, h: ERROR,
         colour="#000000",
-        unit="Pa",
+        reads=lambda scene: True,
+        quantity=PRESSURE.name,
         needs_body=False,
     )
 )
@@ -39,7 +41,8 @@ PUBLISHED = register(
         solve=_published,
         error=lambda scene, h: ERROR,
         colour="#999999",
-        unit="Pa",
+        reads=lambda scene: True,
+        quantity=PRESSURE.name,
         needs_body=False,
     )
 )

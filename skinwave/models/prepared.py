@@ -4,29 +4,32 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 import fem
 from meshes import cache
 from meshes.tetmesh import Floats
-from simple_model import Effort, Response
+from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_width
+from simple_model.material import Material
 from simple_model.sampling import shown
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import surface_load, surface_motion
+from skinwave.models.loads import line_factor, probe_rows, surface_load
 from skinwave.models.reduction import (
     BAND,
     ReducedBody,
+    ReducedResponse,
     from_rest,
     read_at,
     reduce_body,
     respond,
     select_lines,
 )
-from skinwave.scene import SAMPLE_RATE, Body, Scene
+from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
@@ -49,13 +52,15 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
-    """Reduced body of probes (p, 2) in metre, whose displacement is `read` (p, r) of its
-    coordinates, in metre.
+    """Reduced body of probes (p, 2) in metre, which read a quantity: its components at rest are
+    `read` (p c, r) of the body's coordinates; `solids`, if any, are the materials of the probes.
     """
 
     probes: Floats
     read: Floats
     body: ReducedBody
+    reading: Reading = SURFACE
+    solids: tuple[Material, ...] = ()
 
     @property
     def effort(self) -> Effort:
@@ -72,6 +77,7 @@ def prepare(
     solver: str = "auto",
     tolerance: float = REDUCTION_TOLERANCE,
     symmetry: str = "",
+    reading: Reading = SURFACE,
 ) -> Prepared:
     """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
     cache, once per machine.
@@ -83,6 +89,7 @@ def prepare(
     progress, h, solver : as for `simulate`
     tolerance : relative error of the reduction
     symmetry : as in `bodies.build.build`: for all Tactons that have it
+    reading : what the probes read; with symmetry, of normal motion alone
 
     Returns
     -------
@@ -91,31 +98,47 @@ def prepare(
     clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
     (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
-    name = _entry_name(body, build, probes, solver, tolerance)
+    outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
+    own = None if reading.is_plain else outputs
+    name = _entry_name(body, build, probes, solver, tolerance, outputs=own)
     with clock("read from cache"):
         entry = cache.load(name)
     size, report = h or default_size(body), progress or silent
-    if entry and (found := _from_cache(entry, size, probes, clock)):
-        return found
-    with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
-        return _prepared_anew(body, build, size, probes, clock, report, solver, tolerance, name)
+    found = _from_cache(entry, size, probes, outputs.shape[0], clock) if entry else None
+    if not found:
+        with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
+            found = _prepared_anew(
+                body, build, size, probes, outputs, clock, report, solver, tolerance, name
+            )
+    return replace(found, reading=reading, solids=solids)
 
 
-def _entry_name(body: Body, build: Build, probes: Floats, solver: str, tolerance: float) -> str:
+def _entry_name(
+    body: Body,
+    build: Build,
+    probes: Floats,
+    solver: str,
+    tolerance: float,
+    *,
+    outputs: sparse.csr_array | None,
+) -> str:
     """Cache key of everything that a reduced body depends on."""
     mesh = build.mesh
     # A file may call other facets of the same mesh its top, or fix others.
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     rests = tuple(vars(build.support).values()) if build.support else ()
     used = fem.available()[0] if solver == "auto" else solver
+    read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
         build.fixed, build.absorbing, build.coat, build.drag, *rests, probes, BAND, tolerance, used,
-        versions(),
+        versions(), *read,
     )  # fmt: skip
 
 
-def _from_cache(entry: dict[str, Any], h: float, probes: Floats, clock: Clock) -> Prepared | None:
+def _from_cache(
+    entry: dict[str, Any], h: float, probes: Floats, outputs: int, clock: Clock
+) -> Prepared | None:
     """The reduced body of an entry; None if its arrays do not fit each other."""
     if not {*POLES, *ARRAYS, *OTHERS} <= set(entry):
         return None
@@ -126,7 +149,7 @@ def _from_cache(entry: dict[str, Any], h: float, probes: Floats, clock: Clock) -
         "values": (modes,), "inputs": (modes, unknowns), "outputs": (unknowns, modes),
         "damping": square, "radiation": square, "relaxing": (terms, *square),
         "relaxation_times": (terms,),
-        "read": (len(probes), unknowns), "load": (surface, unknowns), "points": (surface, 3),
+        "read": (outputs, unknowns), "load": (surface, unknowns), "points": (surface, 3),
     }  # fmt: skip
     if any(entry[field].shape != shape for field, shape in expected.items()):
         return None
@@ -150,6 +173,7 @@ def _prepared_anew(
     build: Build,
     h: float,
     probes: Floats,
+    outputs: sparse.csr_array,
     clock: Clock,
     report: Progress,
     solver: str,
@@ -160,7 +184,6 @@ def _prepared_anew(
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         P, points = surface_load(build)
-        outputs = surface_motion(body, build, _mirrored(probes, build.symmetry))
         reduced, model = reduce_body(
             body, build, operators, outputs, tolerance, surface=(P, points),
             loads=P @ typical_spots(body, points), solver=solver, report=report,
@@ -196,23 +219,23 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
 
     Returns
     -------
-    Response, displacement (t, p) in metre
+    Response, of what the reduced body's probes read
 
     Raises
     ------
     Diverged
         If the energy balance is violated.
     """
-    clock, times = Clock(), sample_times(scene)
+    clock, times, asked = Clock(), sample_times(scene), prepared.reading.asked
     if progress:
         progress("lines", 0.0)
     with clock("lines"):
-        motion = read_at(respond(prepared.body, scene.pressure), prepared.read)
+        motion = components(prepared, scene.pressure)
         # Lines are not weighed against the mean: that of an unconstrained body has no bound.
         strength, mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
         heard &= shown(scene.pressure, motion.frequencies, times)
-        displacement = from_rest(select_lines(motion, heard), times)
+        waveforms = from_rest(select_lines(motion, heard), times)
     effort = replace(
         prepared.effort,
         seconds={**prepared.effort.seconds, **clock.seconds},
@@ -222,7 +245,24 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
         peak_memory=peak_memory(),
     )
     return Response(
-        model="fem", times=times, probes=prepared.probes, displacement=displacement, effort=effort
+        model="fem", times=times, probes=prepared.probes, quantity=asked.name,
+        values=asked.waveforms(waveforms, len(prepared.probes)), effort=effort,
+    )  # fmt: skip
+
+
+def components(prepared: Prepared, pressure: MovingPressure) -> ReducedResponse:
+    """Response of the components that the probes of a reduced body read, with their rates and the
+    relaxation of stress.
+    """
+    motion = read_at(respond(prepared.body, pressure), prepared.read)
+    asked = prepared.reading.asked
+    if not (asked.rate or asked.relaxes):
+        return motion
+    s, poles = 2j * np.pi * motion.frequencies, motion.poles
+    return replace(
+        motion,
+        lines=motion.lines * line_factor(asked, s, prepared.solids, prepared.read.shape[0]),
+        start=motion.start * line_factor(asked, poles, prepared.solids, prepared.read.shape[0]),
     )
 
 

@@ -13,7 +13,6 @@ from itertools import islice
 from math import pi
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 import fem
 from fem import nonlinear
@@ -32,7 +31,7 @@ from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.effort import Clock
 from skinwave.models import Request
-from skinwave.models.full import TRANSIENT_RATE, marched, spent, step_count
+from skinwave.models.full import TRANSIENT_RATE, in_time, marched, spent, step_count
 from skinwave.models.loads import surface_load
 from skinwave.scene import Body, Scene
 
@@ -231,7 +230,7 @@ def _about_rest(
         energy_imbalance=imbalance, dt=dt,
     )  # fmt: skip
     return Response(
-        model=model, times=times, probes=scene.probe_points,
-        displacement=CubicSpline(np.arange(steps + 1) * dt, stepped)(times),
+        model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
+        values=in_time(stepped, dt, times, scene),
         effort=spent(effort, clock, made, h),
     )  # fmt: skip

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
+from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.numbers import significant
@@ -133,13 +134,18 @@ def sized(value: float, unit: str, digits: int = 3) -> str:
     return f"{significant(1e6 * value, digits)} µm"
 
 
+def measured(value: float, asked: Quantity, digits: int = 3) -> str:
+    """A value of a quantity in SI, with the unit that it is shown in."""
+    return f"{significant(asked.per_unit * value, digits)} {asked.shown}"
+
+
 def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     """One entry a model, with what 1 on the waveform axis stands for if that is one number."""
     handles, labels = [], []
     for run in runs:
         style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        scale = sized(_largest(run), run.response.unit)
+        scale = measured(_largest(run), run.response.record)
         labels.append(answered(run) + f", 1 = {scale}" * scales)
     kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
     if kinds:
@@ -163,7 +169,7 @@ def _largest(run: Run) -> float:
 
 def _centred(run: Run) -> Floats:
     """Motion (t, p) in the part that is shown, about its mean after the start."""
-    motion = run.response.displacement
+    motion = run.response.values
     return motion[_shown(run)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
 

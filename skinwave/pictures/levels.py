@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simple_model import sensation_level, threshold
+from simple_model.quantities import DISPLACEMENT
 from simple_model.threshold import BAND, HIGHEST, LOWEST
 from skinwave.pictures.figures import answered, colour, marker
 from skinwave.pictures.styles import Style
@@ -24,20 +25,21 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     """Amplitudes of the lines at one probe, named, over the threshold of detection by frequency;
     a panel for each run that moves a body; without the threshold where that is no skin.
     """
-    runs = [run for run in runs if run.response.unit == "m"]
+    runs = [run for run in runs if run.response.record.of_body]
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(5.2 * max(len(runs), 1), 4.4), layout="constrained")
         axes = figure.subplots(1, max(len(runs), 1), sharex=True, sharey=True, squeeze=False)[0]
         for ax, run in zip(axes, runs, strict=False):
             _draw(ax, run, probe)
         x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
-        axes[0].set_ylabel(f"displacement at ({x:g}, {y:g}) mm, µm peak")
+        asked = runs[0].response.record if runs else DISPLACEMENT
+        axes[0].set_ylabel(f"{asked.words} at ({x:g}, {y:g}) mm, {asked.shown} peak")
     return figure
 
 
 def strongest_probe(runs: Sequence[Run]) -> int:
     """The probe that moves most, over the largest of each run."""
-    level = [np.ptp(run.response.displacement, axis=0) for run in runs]
+    level = [np.ptp(run.response.values, axis=0) for run in runs]
     return int(np.argmax(sum(x / max(float(x.max()), 1e-300) for x in level)))
 
 
@@ -57,22 +59,24 @@ def sensation_levels(run: Run, probe: int) -> dict[str, float]:
 def _draw(ax: Axes, run: Run, probe: int) -> None:
     if run.is_skin:
         _draw_threshold(ax)
+    per = run.response.record.per_unit
     shown = _shown(run, probe)
     style: dict[str, Any] = {"color": colour(run.column), "marker": marker(run.column)}
     frequencies = np.array([run.listed[n] for n in shown])
-    heights = np.array([1e6 * run.table.amplitudes[n][probe] for n in shown])
+    heights = np.array([per * run.table.amplitudes[n][probe] for n in shown])
     ax.vlines(frequencies, 1e-4, heights, color=colour(run.column), lw=1.2)
     ax.plot(frequencies, heights, ls="none", **style)
     for kind in dict.fromkeys(peak.kind for peak in run.unnamed):
-        peaks = [(x.frequency, 1e6 * x.amplitudes[probe]) for x in run.unnamed if x.kind == kind]
+        peaks = [(x.frequency, per * x.amplitudes[probe]) for x in run.unnamed if x.kind == kind]
         ax.plot(*np.transpose(peaks), ls="none", mfc="none", label=kind, **style)
     for name in _named(run, shown):
         ax.annotate(
-            written(name), (run.listed[name], 1e6 * run.table.amplitudes[name][probe]), rotation=90,
+            written(name), (run.listed[name], per * run.table.amplitudes[name][probe]), rotation=90,
             xytext=(0, 7), textcoords="offset points", ha="center", va="bottom", fontsize="small",
         )  # fmt: skip
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
-    ax.set_ylim(2e-3, 3e3)
+    if run.response.record is DISPLACEMENT:
+        ax.set_ylim(2e-3, 3e3)
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
     ax.set_title(answered(run))
     ax.grid(alpha=0.25)

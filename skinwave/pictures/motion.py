@@ -36,12 +36,12 @@ class Waves:
 
 
 def probe_response(scene: Scene, moved: Waves) -> Response:
-    """Response at the probes of a scene, from its body's motion."""
+    """Displacement of the surface at the probes of a scene, from its body's motion."""
     times, points = sample_times(scene), scene.probe_points
     read = fem.probe_operator(moved.mesh, points) @ moved.basis
     return Response(
         model="fem", times=times, probes=points,
-        displacement=reduction.from_rest(moved.motion, times) @ read.T, effort=moved.effort,
+        values=reduction.from_rest(moved.motion, times) @ read.T, effort=moved.effort,
     )  # fmt: skip
 
 

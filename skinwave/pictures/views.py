@@ -17,7 +17,6 @@ from meshes import reading
 from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, sensation_level
 from simple_model.load_spectrum import pressure_lines
-from simple_model.response import UNITS
 from skinwave.fitting import effort_of, fitting
 from skinwave.models.reduction import oscillating
 from skinwave.models.speeds import repeated, shown_part, strongest_tone
@@ -34,6 +33,8 @@ ROOM = 5e-3  # m beside the path that waves can be watched in
 
 Singles = NDArray[np.float32]
 Motion = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t, q)
+
+UNITS = ("m", "Pa")  # of a body's displacement, and of the point kernel's pressure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,7 @@ from skinwave.planning.plan import plan
 from skinwave.planning.refinement import compared_with, convergence, quantity_of_interest
 from skinwave.planning.series import series_error
 from skinwave.planning.warnings import beyond_linear, of_elements
-from skinwave.scene import Body, Scene
+from skinwave.scene import Body, Reading, Scene
 
 Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
 
@@ -104,7 +104,8 @@ def coarser_body(
     """
     body = scene.body
     other = compared_with(body, h) if h else _coarser(body, default_size(body))
-    return other, _prepared(body, scene.probes, other, solver, reduction_tolerance(tolerance))
+    reduction = reduction_tolerance(tolerance)
+    return other, _prepared(body, scene.probes, other, solver, reduction, reading=scene.reading)
 
 
 def sentences(
@@ -147,6 +148,12 @@ def _coarser(body: Body, h: float) -> float:
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies
 def _prepared(
-    body: Body, probes: tuple[tuple[float, float], ...], h: float, solver: str, tolerance: float
+    body: Body,
+    probes: tuple[tuple[float, float], ...],
+    h: float,
+    solver: str,
+    tolerance: float,
+    *,
+    reading: Reading,
 ) -> Prepared:
-    return prepare(body, np.array(probes), h=h, solver=solver, tolerance=tolerance)
+    return prepare(body, np.array(probes), h=h, solver=solver, tolerance=tolerance, reading=reading)

@@ -45,6 +45,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
             )
         except ArithmeticError:  # next to no loss
             f, a = _lines_of_load(scene, tolerance)
+    a = a * scene.reading.asked.factor(2j * np.pi * f)[:, None]
     power = np.abs(a) ** 2 * np.where(f > 0, 0.5, 1.0)[:, None]
     return f, power / np.maximum(power.sum(axis=0), 1e-300)
 

@@ -28,6 +28,8 @@ def symmetry(scene: Scene) -> str:
     """Symmetry axes: across their middle planes the load is its own mirror image at all times."""
     if not scene.body.of_kind.is_symmetric or scene.body.placement != FLAT:
         return ""
+    if not scene.reading.asked.is_normal:  # others change sign, or are recovered across it
+        return ""
     if not isinstance(scene.pressure.profile, str):  # which may have no symmetry
         return ""
     path = scene.tacton.trajectory

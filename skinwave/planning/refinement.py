@@ -22,8 +22,14 @@ from skinwave.bodies.hands import FINE_PALM
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.effort import Progress
-from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
-from skinwave.models.reduction import oscillating, read_at, respond
+from skinwave.models.prepared import (
+    Prepared,
+    answer,
+    components,
+    prepare,
+    reduction_tolerance,
+)
+from skinwave.models.reduction import oscillating
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
@@ -132,6 +138,7 @@ def refined(
         prepared = prepare(
             body, scene.probe_points, progress, h=size,
             tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=solver,
+            reading=scene.reading,
         )  # fmt: skip
         return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))
 
@@ -225,13 +232,12 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
 
     Returns
     -------
-    waveforms (t, p) in metre; of an unconstrained body the lines (f, p) without the mean, because
-    rigid-body drift would hide the rest
+    waveforms (t, p) in its unit; of an unconstrained body the lines (f, p c) of its components
+    without the mean, because rigid-body drift would hide the rest
     """
     if scene.body.is_held:
-        return found.displacement
-    motion = oscillating(respond(prepared.body, scene.pressure))
-    return read_at(motion, prepared.read).lines
+        return found.values
+    return oscillating(components(prepared, scene.pressure)).lines
 
 
 def convergence(

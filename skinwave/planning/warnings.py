@@ -7,6 +7,7 @@ from fem.viscoelastic import LOSS_BAND
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.focus import spot_width
+from simple_model.quantities import DISPLACEMENT
 from skinwave.models import named
 from skinwave.planning.estimates import mean_gain, response_spectrum
 from skinwave.planning.extent import mean_sag
@@ -48,10 +49,11 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     its probes or, clamped, in the middle under its mean load. The rigid-body motion of an
     unconstrained sheet is no deflection.
     """
-    body, u = scene.body, response.displacement
-    linear = response.unit == "m" and not named(response.model).is_nonlinear
+    body, moves = scene.body, response.record is DISPLACEMENT
+    linear = response.record.of_body and not named(response.model).is_nonlinear
     if not (body.of_kind.is_plate and linear):
         return ()
+    u = response.displacement if moves else np.zeros((1, 1))
     bent = u if body.is_held else u - u.mean(axis=1, keepdims=True)
     clamped = body.sides == "clamped"
     factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth

@@ -16,6 +16,7 @@ import numpy as np
 from meshes import reading
 from simple_model import Response, published
 from simple_model.choices import choose
+from simple_model.quantities import QUANTITIES
 from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
@@ -30,7 +31,7 @@ from skinwave.pictures.motion import Waves, waves
 from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Scene, body_name, with_body
+from skinwave.scene import BODIES, Scene, body_name, check_motion, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
 from skinwave.studies import paper15
@@ -112,6 +113,7 @@ def make(
     ValueError
         If a model refuses the scene.
     """
+    check_motion(scene, "a report")
     shown = shown_scenes(scene, beside)
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs = []
@@ -176,7 +178,7 @@ def _plan(
     table = asdict(replace(required, prepared=None)) | {"tolerance": PLANNED}
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     trust: dict[str, Any] = {"command": command, "model": required.model}
-    drawn = [run.response.displacement for run in runs if run.scene == scene]
+    drawn = [run.response.values for run in runs if run.scene == scene]
     if drawn and scene.body.of_kind.discretise:
         planned = _planned_answer(scene, required, solver).displacement
         size = float(np.linalg.norm(planned)) or 1.0
@@ -255,11 +257,11 @@ def _run(path: Path) -> Run:
     try:
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
             raise ValueError("it has arrays of other things than numbers")
-        name = next(n for n in arrays if n not in ("t", "probes", "displacement"))
+        name = next(n for n in arrays if n not in ("t", "probes", *QUANTITIES))
         model = _kernel_of(path, scene, name)
         response = Response(
-            model=model, times=arrays["t"], probes=arrays["probes"], displacement=arrays[name],
-            unit=named(model).unit,
+            model=model, times=arrays["t"], probes=arrays["probes"], values=arrays[name],
+            quantity=named(model).quantity or scene.quantity,
             effort=effort_of(effort, "effort.json"),
             expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
         )  # fmt: skip

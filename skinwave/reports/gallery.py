@@ -122,7 +122,7 @@ def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]
         progress(f"draw {name}", 0.0)
         figure = tacton_figure(name, runs, gallery.style)
         parts.append(gallery.figure(f"waveforms-{len(parts)}", figure, _waveforms(runs)))
-        if any(run.response.unit == "m" for run in runs):
+        if any(run.response.record.of_body for run in runs):
             figure = levels_figure(runs, strongest_probe(runs), gallery.style)
             parts.append(gallery.figure(f"sensation-{len(parts)}", figure, f"{name}. {SENSATION}"))
     return parts
@@ -134,7 +134,7 @@ def _waveforms(runs: Sequence[Run]) -> str:
     text = "Waveforms and spectra. Rows are probes."
     if {PUBLISHED.name, SAME_LOAD.name} <= set(columns):
         text += f" {LOADS}"
-    if SAME_LOAD.name in columns and any(run.response.unit == "m" for run in runs):
+    if SAME_LOAD.name in columns and any(run.response.record.of_body for run in runs):
         text += f" {PROPAGATED}"
     return text
 

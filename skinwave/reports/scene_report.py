@@ -90,7 +90,7 @@ def _first_screen(album: Album, gallery: Gallery) -> list[str]:
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
     """Runs of one Tacton with both point kernels, computed anew, as they are formulas."""
-    bodies = [run for run in runs if run.response.unit == "m"]
+    bodies = [run for run in runs if run.is_motion]
     return [*beside_kernels(bodies[0])[:2], *bodies] if bodies else runs
 
 
@@ -182,7 +182,7 @@ def _lines(runs: Sequence[Run]) -> str:
     rows += _unnamed_rows(runs, probe)
     header = ["line", "frequency, Hz"]
     for run in runs:
-        header += [f"{answered(run)}, {'Pa' if run.response.unit == 'Pa' else 'µm'} peak"]
+        header += [f"{answered(run)}, {run.response.record.shown} peak"]
         header += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
     heading = document.Markup("<h3>Lines at ({:g}, {:g}) mm</h3>").format(x, y)
@@ -218,7 +218,7 @@ def _unnamed_rows(runs: Sequence[Run], probe: int) -> list[list[str]]:
 
 
 def _size(run: Run, amplitude: float) -> str:
-    return significant(amplitude if run.response.unit == "Pa" else 1e6 * amplitude)
+    return significant(run.response.record.per_unit * amplitude)
 
 
 def _level(level: float | None) -> str:
@@ -256,12 +256,12 @@ def _comparison(album: Album) -> list[str]:
 
 
 def _effort(album: Album) -> str:
-    efforts = {run.body: run.response.effort for run in album.runs if run.response.unit == "m"}
+    efforts = {run.body: run.response.effort for run in album.runs if run.response.record.of_body}
     return tables.effort_table(efforts, len(tactons(album)))
 
 
 def _trust(album: Album) -> list[str]:
-    efforts = [(run.body, run.response.effort) for run in album.runs if run.response.unit == "m"]
+    efforts = [(run.body, run.response.effort) for run in album.runs if run.response.record.of_body]
     found = [
         f"{label(body)}: relative error of the energy balance {effort.energy_imbalance:.0e} "
         "(refused beyond 1e-2); estimated relative error of the reduced-order model "

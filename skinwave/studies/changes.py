@@ -49,7 +49,7 @@ def changes(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagat
     """Tacton -> body -> effect of propagation, with maps where they cost next to nothing."""
     found: dict[str, dict[str, Propagation]] = {}
     for name, group in groups.items():
-        kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
+        kernel, bodies = _kernel(group), [run for run in group if run.is_motion]
         for run in bodies:
             if kernel is not None:
                 found.setdefault(name, {})[run.column] = propagation(run, kernel, *quick_maps(run))
@@ -59,7 +59,7 @@ def changes(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagat
 def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
     """The Tacton of the first screen; None where no body was run beside both kernels."""
     group = groups.get(first_of(groups), [])
-    kernel, bodies = _kernel(group), [run for run in group if run.response.unit == "m"]
+    kernel, bodies = _kernel(group), [run for run in group if run.is_motion]
     published = next((r for r in group if r.model == PUBLISHED.name), None)
     if kernel is None or published is None or not bodies:
         return None

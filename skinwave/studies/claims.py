@@ -165,7 +165,7 @@ def _am_highest_measured(runs: list[Run]) -> Assessment:
     beaten = [run.tacton for run in runs if _others(run).max() >= 0]
     if beaten:
         sentence += f"; f_AM is exceeded in {', '.join(beaten)}"
-    if runs[0].response.unit == "m":  # a vibrometer reads velocity; the point kernel has none
+    if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has none
         velocity = max(_others(run, velocity=True).max() for run in runs)
         sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
         value = max(value, velocity)

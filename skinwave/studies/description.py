@@ -33,7 +33,7 @@ def modelled(runs: Iterable[Run]) -> list[str]:
     for run in runs:
         groups.setdefault((run.body, run.model), []).append(run)
     paragraphs = [_answered(group) for group in groups.values()]
-    on_bodies = [run for group in groups.values() for run in group if run.response.unit == "m"]
+    on_bodies = [run for group in groups.values() for run in group if run.is_motion]
     notes = [run.scene.pressure.law.note for run in on_bodies if run.is_am]
     paragraphs += [note for note in dict.fromkeys(notes) if note]
     return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
@@ -55,7 +55,7 @@ def _answered(runs: list[Run]) -> str:
     pressure, model = runs[0].scene.pressure, named(runs[0].model)
     load = f"drive law {pressure.drive}, {spot_of(pressure)}"
     text = f"{_sentence(answered(runs[0]))}: {model.words}; {load}."
-    return text if runs[0].response.unit == "Pa" else f"{text} {_sentence(_body(runs))}"
+    return text if not runs[0].is_motion else f"{text} {_sentence(_body(runs))}"
 
 
 def _sentence(text: str) -> str:

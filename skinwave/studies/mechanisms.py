@@ -136,8 +136,8 @@ def _scene(name: str, tacton: Tacton, body: Body, drive: str) -> Scene:
 def steady(response: Response) -> Response:
     """The later half of a response, after the transient."""
     times, half = response.times, len(response.times) // 2
-    later = response.displacement[half:]
-    return replace(response, times=times[half:] - times[half], displacement=later)
+    later = response.values[half:]
+    return replace(response, times=times[half:] - times[half], values=later)
 
 
 def _lines(

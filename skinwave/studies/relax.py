@@ -24,7 +24,7 @@ from skinwave.models import named
 from skinwave.planning.assessment import sentences
 from skinwave.processes import apart
 from skinwave.run import ASSESSED
-from skinwave.scene import Scene
+from skinwave.scene import Scene, check_motion
 from skinwave.simulation import compute
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
@@ -130,8 +130,10 @@ def hierarchy_of(
     Raises
     ------
     ValueError
-        If the scene has no body, or the device cannot be.
+        If the scene has no body, its probes read something else than the displacement of the
+        surface, or the device cannot be.
     """
+    check_motion(scene, "relax")
     names = droppable(scene)
     check_rate(update_rate)
     if "continuous path" in names:

@@ -43,7 +43,7 @@ def write(folder: Path, found: Hierarchy) -> None:
     (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
     (folder / "relax.csv").write_bytes(csv_table(LINE_COLUMNS, _line_rows(found)))
     answered = [r for r in found.every if r.response]
-    arrays = {r.name: r.response.displacement for r in answered if r.response}
+    arrays = {r.name: r.response.values for r in answered if r.response}
     first = next(r.response for r in answered if r.response)
     arrays |= {"t": first.times, "probes": first.probes}
     np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]

@@ -41,7 +41,7 @@ def write_single(folder: Path, run: Run) -> None:
     """The folder of one run, with its page."""
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
-    group = beside_kernels(run) if run.response.unit == "m" else []
+    group = beside_kernels(run) if run.is_motion else []
     first = shown({run.tacton: group}, quick_maps)
     parts = [
         *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),

@@ -52,7 +52,7 @@ def pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
     kernel, published = found.get(SAME_LOAD.name), found.get(PUBLISHED.name)
     if kernel is None:
         return []
-    bodies = [run for run in found.values() if run.response.unit == "m"]
+    bodies = [run for run in found.values() if run.is_motion]
     first = [("drive law and focus", published, kernel)] if published else []
     return first + [("propagation", kernel, run) for run in bodies]
 

@@ -19,7 +19,7 @@ from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
 from skinwave.models import named, names
 from skinwave.models.flat_body import FLAT_BODY
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
 from skinwave.processes import apart
@@ -237,8 +237,10 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     os.environ["SKINWAVE_CACHE"] = ""  # a cold run
     started = time.perf_counter()
     if named(candidate.model).is_reduced:
-        discretisation = {"tolerance": candidate.tolerance} if candidate.tolerance else {}
-        prepared = prepare(scene.body, scene.probe_points, h=candidate.h, **discretisation)  # type: ignore[arg-type]
+        prepared = prepare(
+            scene.body, scene.probe_points, h=candidate.h, reading=scene.reading,
+            tolerance=candidate.tolerance or REDUCTION_TOLERANCE,
+        )  # fmt: skip
         response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
         return response, ready - started, time.perf_counter() - ready, peak_memory()

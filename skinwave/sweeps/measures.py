@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import Response, named_lines, point_kernel, sensation_level
+from simple_model.quantities import DISPLACEMENT
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
 from skinwave.run import ASSESSED, Run
@@ -37,18 +38,31 @@ def columns(cases: Iterable[DesignPoint]) -> dict[str, str]:
     """
     found = {"index": "whole"} | dict.fromkeys(TEXTS, "text")
     of_lines: dict[str, str] = {}
+    of_probes: dict[str, str] = {}
     for case in cases:
         for key, value in case.keys.items():
             found.setdefault(key, "text" if isinstance(value, str) else "number")
-        for name in _columned(case.scene) if case.scene else ():
+        if case.scene is None:
+            continue
+        others = _others(case.scene)
+        of_probes |= {f"{what}_{unit}": "numbers" for unit in others for what in ("peak", "rms")}
+        for name in _columned(case.scene):
             of_lines[f"{name}_hz"] = "number"
             of_lines |= {f"{name}_{unit}": "numbers" for unit in ("um", "db", "kernel_pa", "ratio")}
+            of_lines |= dict.fromkeys((f"{name}_{unit}" for unit in others), "numbers")
     return (
         found
         | dict.fromkeys(NUMBERS, "number")
         | dict.fromkeys(AT_PROBES, "numbers")
+        | of_probes
         | dict(sorted(of_lines.items()))
     )
+
+
+def _others(scene: Scene) -> list[str]:
+    """Ending of the columns of a quantity other than the displacement."""
+    asked = scene.reading.asked
+    return [] if asked is DISPLACEMENT else [asked.column]
 
 
 def _columned(scene: Scene) -> Iterable[str]:
@@ -75,7 +89,7 @@ def commanded(case: DesignPoint) -> dict[str, Any]:
 def measured(scene: Scene, response: Response) -> dict[str, Any]:
     """Columns of a row that a response gives: its amplitudes, comparison with the kernel, cost."""
     kernel = response
-    if response.unit == "m":
+    if response.record.of_body:
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
     run = Run(tacton=scene.name, body=scene.body.kind, scene=scene, response=response)
     frequencies, found = run.frequencies, run.lines
@@ -89,9 +103,11 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
             with np.errstate(divide="ignore", invalid="ignore"):
                 row[f"{name}_ratio"] = abs(agreement.scale) * found[name] / published[name]
     row |= _kernel(kernel, agreement) | _effort(response)
-    if response.unit == "m":
-        row |= _motion(response, agreement) | {f"{n}_um": 1e6 * a for n, a in found.items()}
-        row |= _above_threshold(run) if scene.body.is_skin else {}
+    if response.record.of_body:
+        unit = "um" if response.record is DISPLACEMENT else response.record.column
+        row |= _motion(response, agreement, unit)
+        row |= {f"{n}_{unit}": response.record.per_unit * a for n, a in found.items()}
+        row |= _above_threshold(run) if run.is_skin else {}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in row.items()}  # fmt: skip
 
@@ -108,10 +124,11 @@ def _kernel(kernel: Response, agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _motion(response: Response, agreement: Agreement) -> dict[str, Any]:
+def _motion(response: Response, agreement: Agreement, unit: str) -> dict[str, Any]:
+    per = response.record.per_unit
     return {
-        "peak_um": 1e6 * _peak(response),
-        "rms_um": 1e6 * moving_rms(response),
+        f"peak_{unit}": per * _peak(response),
+        f"rms_{unit}": per * moving_rms(response),
         "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
         "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
     }
@@ -143,5 +160,5 @@ def _effort(response: Response) -> dict[str, Any]:
 
 
 def _peak(response: Response) -> Any:
-    kept = response.displacement[int(SETTLE * len(response.times)) :]
+    kept = response.values[int(SETTLE * len(response.times)) :]
     return np.abs(kept).max(axis=0)

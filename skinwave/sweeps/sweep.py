@@ -19,7 +19,7 @@ from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolera
 from skinwave.planning.assessment import assessed
 from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
-from skinwave.scene import Body, Scene
+from skinwave.scene import Body, Reading, Scene
 from skinwave.simulation import answered, check_options
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import columns, commanded, measured
@@ -162,7 +162,11 @@ def _check(model_options: ModelOptions) -> None:
         raise ValueError(f"tolerance = {model_options.tolerance} is outside 0 < tolerance < 1")
 
 
-Solid = tuple[Body, tuple[tuple[float, float], ...]]  # a body and its probes
+Solid = tuple[Body, tuple[tuple[float, float], ...], Reading]  # a body, its probes, their reading
+
+
+def _key(scene: Scene) -> Solid:
+    return scene.body, scene.probes, scene.reading
 
 
 def _solid(case: DesignPoint, model_options: ModelOptions) -> Solid | None:
@@ -174,7 +178,7 @@ def _solid(case: DesignPoint, model_options: ModelOptions) -> Solid | None:
         or not scene.body.of_kind.discretise
     ):
         return None
-    return scene.body, scene.probes
+    return _key(scene)
 
 
 def _shared_meshes(
@@ -212,9 +216,9 @@ def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
     """The mesh that the hardest scene of a body requires; cached on disk for all workers."""
     try:
         if model_options.h:
-            _prepared(scene.body, scene.probes, model_options.h, model_options)
+            _prepared(_key(scene), model_options.h, model_options)
             coarser = compared_with(scene.body, model_options.h)
-            _prepared(scene.body, scene.probes, coarser, model_options)
+            _prepared(_key(scene), coarser, model_options)
             return Mesh(h=model_options.h, coarser=coarser)
         found = refined(scene, scene.body, model_options.tolerance, solver=model_options.solver)
         return Mesh(h=found.h, coarser=found.compared)
@@ -223,11 +227,13 @@ def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
 
 
 @lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
-def _prepared(
-    body: Body, probes: tuple[tuple[float, float], ...], h: float, model_options: ModelOptions
-) -> Prepared:
+def _prepared(solid: Solid, h: float, model_options: ModelOptions) -> Prepared:
+    body, probes, reading = solid
     tolerance = reduction_tolerance(model_options.tolerance)
-    return prepare(body, np.array(probes), h=h, solver=model_options.solver, tolerance=tolerance)
+    return prepare(
+        body, np.array(probes), h=h, solver=model_options.solver, tolerance=tolerance,
+        reading=reading,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,9 +296,9 @@ def _on_mesh(scene: Scene, model_options: ModelOptions, mesh: Mesh) -> Response:
     """Response of a reduced body, with its expected relative error."""
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
-    prepared = _prepared(scene.body, scene.probes, mesh.h, model_options)
+    prepared = _prepared(_key(scene), mesh.h, model_options)
     assert mesh.coarser is not None
-    coarse = _prepared(scene.body, scene.probes, mesh.coarser, model_options)
+    coarse = _prepared(_key(scene), mesh.coarser, model_options)
     return assessed(
         scene, answer(prepared, scene), prepared, mesh.h, model_options.tolerance,
         model_options.solver, compared=(mesh.coarser, coarse),

@@ -148,7 +148,7 @@ def durations() -> Case:
     short, long = _answered(1e-4, am=140.0), _answered(10.0, am=140.0)
     seconds = [long.displacement[k * 10_000 : (k + 1) * 10_000] for k in (1, 9)]
     first, last = (
-        float(lines(replace(long, times=np.arange(10_000) / 10_000, displacement=u), [140.0])[0, 0])
+        float(lines(replace(long, times=np.arange(10_000) / 10_000, values=u), [140.0])[0, 0])
         for u in seconds
     )
     drift = abs(seconds[1][:, 0].mean() - seconds[0][:, 0].mean()) / first

@@ -13,6 +13,7 @@ from urllib.parse import parse_qsl, urlencode
 from simple_model import MovingPressure
 from simple_model.choices import choose
 from simple_model.drive import DRIVES
+from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from simple_model.tacton import SHARINGS, SUPERPOSITIONS
 from simple_model.trajectory import SHAPES
 from skinwave.scene import BODIES
@@ -52,6 +53,7 @@ NUMBERS = {
     "ramp": Number(label="Ramp", unit="ms", low=0, high=100, step=1, start=0),
     "x": Number(label="Point x", unit="mm", low=-50, high=50, step=0.1, start=10),
     "y": Number(label="Point y", unit="mm", low=-50, high=50, step=0.1, start=0),
+    "depth": Number(label="Depth of the point", unit="mm", low=0, high=10, step=0.1, start=0),
 }
 RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
 OWN_BODY = "from the scene"
@@ -62,6 +64,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "profile": ("gaussian", "main_lobe"),
     "body": (*BODIES, OWN_BODY),
     "sharing": SHARINGS,
+    "quantity": tuple(name for name, asked in QUANTITIES.items() if asked.of_body),
 }
 STARTS = {
     **{key: number.start for key, number in NUMBERS.items()},
@@ -71,6 +74,7 @@ STARTS = {
     "profile": MovingPressure.profile,
     "body": "skin-slab",
     "sharing": "simultaneous",
+    "quantity": DISPLACEMENT.name,
     "pulses": "",
     "phases": "",
     "paths": "",
@@ -84,6 +88,7 @@ NAMES = {key: number.label for key, number in NUMBERS.items()} | {
     "profile": "Focus profile",
     "body": "Body",
     "sharing": "Several foci",
+    "quantity": "Quantity at the point",
     "pulses": "Rhythm, ms",
     "phases": "Phases, %",
     "paths": "Paths",

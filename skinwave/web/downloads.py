@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from simple_model.choices import choose
+from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from skinwave.exports import sampled, waveform_table
 from skinwave.processes import apart
@@ -68,12 +69,11 @@ async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:
 def csv_of(answers: Sequence[Answer]) -> bytes:
     """Time in s and a column for each response, with its unit and place in the header."""
     x, y = 1e3 * answers[0].response.probes[0]
-    kinds = {"Pa": "pressure", "m": "displacement"}
     header = ["time, s"] + [
-        f"{kinds[a.response.unit]} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
+        f"{a.response.quantity} at ({x:g}, {y:g}) mm, {a.response.unit} ({a.response.model})"
         for a in answers
     ]
-    columns = [answers[0].response.times, *(a.response.displacement[:, 0] for a in answers)]
+    columns = [answers[0].response.times, *(a.response.values[:, 0] for a in answers)]
     return waveform_table(header, columns)
 
 
@@ -111,7 +111,7 @@ def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
 
 def _body_of(scene: Scene, answer: Answer) -> str:
     """The name of the body whose response this is."""
-    if answer.response.unit == "Pa":
+    if not answer.response.record.of_body:
         return "none"
     return body_name(scene.body)
 
@@ -130,12 +130,16 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
 
     figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
     for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
-        unit, per = ("Pa", 1.0) if answer.response.unit == "Pa" else ("µm", 1e6)
+        asked = answer.response.record
+        seen = DISPLACEMENT if asked.of_body else asked  # on the map
         edge, line_style = 1e3 * REACH, {"lw": 1, "color": colour(_column(scene, answer))}
         image = row[0].imshow(
-            per * answer.map.rms, extent=(-edge, edge, -edge, edge), origin="lower", cmap="cividis"
+            seen.per_unit * answer.map.rms,
+            extent=(-edge, edge, -edge, edge),
+            origin="lower",
+            cmap="cividis",
         )
-        figure.colorbar(image, ax=row[0], label=f"RMS, {unit}")
+        figure.colorbar(image, ax=row[0], label=f"RMS, {seen.shown}")
         for line in drawn_paths(scene.tacton):
             row[0].plot(*(1e3 * line.T), color="#56B4E9")
         for line in influenced(scene.tacton, scene.pressure.height):
@@ -146,8 +150,8 @@ def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
         row[0].set(xlabel="x, mm", ylabel="y, mm", title=label(_column(scene, answer)))
         shown = answer.response.times <= 0.06
         row[1].plot(1e3 * answer.response.times[shown],
-                    per * answer.response.displacement[shown, 0], **line_style)  # fmt: skip
-        row[1].set(xlabel="time, ms", ylabel=unit, title="waveform at the point")
-        row[2].plot(answer.frequencies, per * answer.spectrum, **line_style)
-        row[2].set(xlabel="frequency, Hz", ylabel=unit, title="spectrum", xlim=(0, 600))
+                    asked.per_unit * answer.response.values[shown, 0], **line_style)  # fmt: skip
+        row[1].set(xlabel="time, ms", ylabel=asked.shown, title="waveform at the point")
+        row[2].plot(answer.frequencies, asked.per_unit * answer.spectrum, **line_style)
+        row[2].set(xlabel="frequency, Hz", ylabel=asked.shown, title="spectrum", xlim=(0, 600))
     return drawn(figure, kind, 150)

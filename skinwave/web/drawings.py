@@ -59,6 +59,7 @@ def ends(largest: float, unit: str) -> list[str]:
 def rows(kernel: Answer, waves: Answer | None) -> list[dict[str, str]]:
     """The named lines as a table: frequency, amplitudes and level above threshold."""
     by_wave = {line.name: line for line in waves.lines} if waves else {}
+    per = waves.response.record.per_unit if waves else 1.0
     by_kernel = {line.name: line for line in kernel.lines}
     names = dict.fromkeys([line.name for line in (waves.lines if waves else ())]
                           + [line.name for line in kernel.lines])  # fmt: skip
@@ -71,7 +72,7 @@ def rows(kernel: Answer, waves: Answer | None) -> list[dict[str, str]]:
             "name": written(name),
             "frequency": f"{line.frequency:.1f}",
             "pressure": f"{pa.amplitude:.3g}" if pa else "",
-            "displacement": f"{1e6 * um.amplitude:.3g}" if um else "",
+            "displacement": f"{per * um.amplitude:.3g}" if um else "",
             "level": "" if level is None or not np.isfinite(level) else f"{level:+.0f}",
         })  # fmt: skip
     return found

@@ -10,6 +10,7 @@ import jinja2
 from trame_vuetify.module import v3
 
 from simple_model.drive import DRIVES
+from simple_model.quantities import QUANTITIES
 from skinwave.web import controls, drawings
 from skinwave.web.plots import SPANS
 from skinwave.web.session import Session
@@ -40,6 +41,10 @@ ITEMS: dict[str, list[Any]] = {  # of dropdowns
     "profile_items": [
         {"title": "Gaussian, of the half width and force of the array's", "value": "gaussian"},
         {"title": "main lobe (sinc²), as published", "value": "main_lobe"},
+    ],
+    "quantity_items": [
+        {"title": f"{QUANTITIES[name].words}, {QUANTITIES[name].shown}", "value": name}
+        for name in controls.CHOICES["quantity"]
     ],
     "sharing_items": [
         {"title": "all at once, at 1/n of the pressure each", "value": "simultaneous"},

@@ -124,7 +124,8 @@ def named_lines(scene: Scene, response: Response) -> tuple[LineAtPoint, ...]:
     """
     table = line_table(scene.pressure, response, candidates=ASSESSED, most=MOST_LINES,
                        highest=HIGHEST, settle=UNTRUSTED)  # fmt: skip
-    is_skin = response.unit == "m" and scene.body.is_skin
+    surface = scene.reading.is_plain and response.record.of_body
+    is_skin = surface and scene.body.is_skin
     peaks = table.unnamed[:MOST_PEAKS]
     amplitudes = [(n, f, float(table.amplitudes[n][0])) for n, f in table.frequencies.items()]
     amplitudes += [(f"{x.kind}, {x.frequency:.0f} Hz", x.frequency, float(x.amplitudes[0]))

@@ -13,6 +13,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, threshold
+from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, pressure_threshold
 from skinwave.pictures.styles import LABELS
@@ -95,34 +96,45 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> PlotlyFigure:
     for answer, style in _styled(curves):
         times = answer.response.times
         shown = (times >= span[0]) & (times <= span[1] + 0.5 * step(times))
-        t, y = thinned(times[shown], answer.response.displacement[shown, 0])
+        t, y = thinned(times[shown], answer.response.values[shown, 0])
         data.append({"x": numbers(1e3 * t), "y": numbers(_in_unit(answer) * y), **style})
     return {
         "title": "Waveform at the point", "data": data, "kept": f"{span}", "legend": True,
         "x": {"said": "time, ms", "range": [1e3 * float(end) for end in span]},
-        **_axes(data, "into the body, µm"),
+        **_axes(data, _second(curves)),
     }  # fmt: skip
 
 
-def spectrum_plot(curves: Curves, highest: float = 600.0) -> PlotlyFigure:
-    """The spectra at the selected point, their lines named, and the detection threshold."""
+def spectrum_plot(
+    curves: Curves, highest: float = 600.0, *, with_threshold: bool = True
+) -> PlotlyFigure:
+    """The spectra at the selected point, their lines named, and the detection threshold, which is
+    that of a displacement of the surface.
+    """
     data, waves = [], curves.waves
     for answer, style in _styled(curves):
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
-    data.append(_threshold_curve(highest, of_waves=waves is not None))
+    if with_threshold or waves is None:
+        data.append(_threshold_curve(highest, of_waves=waves is not None))
     named = waves if waves is not None and not curves.stale else curves.kernel
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
         "names": _names(named, highest),
-        **_axes(data, "displacement, µm", _tallest(waves, highest), ROOM),
+        **_axes(data, _second(curves), _tallest(waves, highest, with_threshold), ROOM),
     }  # fmt: skip
 
 
+def _second(curves: Curves) -> str:
+    """Words of the axis of waves."""
+    asked = curves.waves.response.record if curves.waves else DISPLACEMENT
+    return f"{asked.words}, {asked.shown}"
+
+
 def _in_unit(answer: Answer) -> float:
-    return 1e6 if answer.response.unit == "m" else 1.0
+    return answer.response.record.per_unit
 
 
 def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
@@ -138,16 +150,18 @@ def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
                  "opacity": STALE if curves.stale else 1.0}  # fmt: skip
         found.append((curves.waves, style))
     for answer in curves.pinned:
-        of_kernel = answer.response.unit == "Pa"
+        of_kernel = not answer.response.record.of_body
         name = KERNEL if of_kernel else waves_name(answer)
         style = {"role": "pinned", "name": f"A: {name}", "dash": "dot" if of_kernel else "dash"}
         found.append((answer, style))
-    return [(a, style | {"axis": "y2" if a.response.unit == "m" else "y"}) for a, style in found]
+    return [(a, style | {"axis": "y2" if a.response.record.of_body else "y"}) for a, style in found]
 
 
 def waves_name(answer: Answer, stale: bool = False) -> str:
     """The name of waves in every legend, with their unit."""
-    return f"waves ({answer.response.model}), µm" + (" — being computed" if stale else "")
+    return f"waves ({answer.response.model}), {answer.response.record.shown}" + (
+        " — being computed" if stale else ""
+    )
 
 
 def _threshold_curve(highest: float, *, of_waves: bool) -> dict[str, Any]:
@@ -160,13 +174,14 @@ def _threshold_curve(highest: float, *, of_waves: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _tallest(waves: Answer | None, highest: float) -> float | None:
-    """Least range of the axis of displacement: the lines, and the minimum of the threshold."""
+def _tallest(waves: Answer | None, highest: float, with_threshold: bool) -> float | None:
+    """Least range of the axis of waves: the lines, and the minimum of the threshold."""
     if waves is None:
         return None
     f = np.linspace(50, highest, 60)
     shown = waves.spectrum[waves.frequencies <= highest]
-    return 1e6 * max(float(shown.max()), 1.3 * float(threshold(f).min()))
+    least = 1.3 * float(threshold(f).min()) if with_threshold else 0.0
+    return _in_unit(waves) * max(float(shown.max()), least)
 
 
 def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
@@ -179,7 +194,7 @@ def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
     return [
         {
             "x": round(line.frequency, 2), "y": float(f"{_in_unit(answer) * line.amplitude:.4g}"),
-            "axis": "y2" if answer.response.unit == "m" else "y",
+            "axis": "y2" if answer.response.record.of_body else "y",
             "said": [written(line.name)] + (
                 [f"{line.sensation:+.0f} dB"] if line.sensation is not None
                 and np.isfinite(line.sensation) else []

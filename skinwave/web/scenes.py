@@ -53,7 +53,8 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     )
     return Scene(
         name="skinwave web", pressure=pressure, body=body,
-        probes=((values["x"] / 1e3, values["y"] / 1e3),),
+        probes=((values["x"] / 1e3, values["y"] / 1e3),), depth=values["depth"] / 1e3,
+        quantity=values["quantity"],
     )  # fmt: skip
 
 
@@ -135,6 +136,8 @@ def values_of(scene: Scene) -> Values:
         "ramp": 1e3 * rhythm.ramp if rhythm else 0.0,
         "x": round(1e3 * x, 6),
         "y": round(1e3 * y, 6),
+        "depth": round(1e3 * scene.depths[0], 6),
+        "quantity": scene.quantity,
     }
 
 

@@ -40,6 +40,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "body_layers": [],
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
+        "lines_unit": "µm",
         "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -51,6 +52,7 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
         "spectrum_plot": third_plot(state, scene, curves),
+        "lines_unit": scene.reading.asked.shown,
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
@@ -80,7 +82,8 @@ def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
             return guided.dispersion_plot(scene, state.highest)
         except ValueError as error:  # a body that is too deep, say
             state.problem = str(error)
-    return plots.spectrum_plot(curves, state.highest)
+    plain = scene.reading.is_plain
+    return plots.spectrum_plot(curves, state.highest, with_threshold=plain)
 
 
 def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
@@ -164,7 +167,7 @@ def foci(state: Any, scene: Scene) -> None:
 def _map(answer: Answer | None) -> dict[str, Any]:
     if answer is None:
         return {"picture": "", "threshold": "", "ends": []}
-    found, unit = answer.map, answer.response.unit
+    found, unit = answer.map, "m" if answer.response.record.of_body else "Pa"
     return {
         "picture": drawings.picture(found),
         "threshold": drawings.drawn(found.threshold),

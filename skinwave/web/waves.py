@@ -48,6 +48,7 @@ from skinwave.models.reduction import (
 )
 from skinwave.planning.assessment import sentences
 from skinwave.scene import Body, Scene
+from skinwave.simulation import compute
 from skinwave.web.model import (
     FAINTEST_LEVEL,
     SIDE,
@@ -102,6 +103,7 @@ class BodyResponses:
         """The response in a scene of one probe, with the motion of the whole body if `moving`;
         raises what `simulate` does.
         """
+        _readable(scene)
         if is_tabulated(scene.body):
             gaussian_only(scene.pressure)
             height = scene.pressure.height
@@ -138,6 +140,22 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
     return replace(answer, response=replace(response, effort=effort))
 
 
+def _readable(scene: Scene) -> None:
+    """Refuse other quantities than the displacement of the surface where there is no wavenumber
+    integral: the reduced body at hand has only that.
+
+    Raises
+    ------
+    ValueError
+        If the scene asks for one.
+    """
+    if not (scene.reading.is_plain or is_tabulated(scene.body)):
+        raise ValueError(
+            f"{scene.reading.words} of a {scene.body.kind} is not computed here; take a slab, the "
+            "displacement of the surface, or skinwave run"
+        )
+
+
 def gaussian_only(pressure: MovingPressure) -> None:
     """Refuse a focal profile for which there is no table, any but a Gaussian.
 
@@ -155,11 +173,8 @@ def gaussian_only(pressure: MovingPressure) -> None:
 
 def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     """Motion from rest of a scene's probe, and RMS motion of the area."""
-    pressure, times = scene.pressure, sample_times(scene)
-    response = Response(
-        model="flat-body", times=times, probes=scene.probe_points,
-        displacement=flat_motion(table, pressure, scene.probe_points[0], times)[:, None],
-    )  # fmt: skip
+    pressure = scene.pressure
+    response = _at_point(table, scene) if scene.reading.is_plain else compute(scene, "flat-body")
     f, w = path_amplitudes(_steady(pressure))
     away = np.linalg.norm(places()[:, None] - path_samples(pressure), axis=2)
     fine = np.linspace(0, FURTHEST, FINER * len(table.distances))
@@ -177,6 +192,15 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
         upwards[:, : SIDE**2] = -motion
         seen = moving_of(shape, pressure, f, upwards)
     return answer_of(scene, response, motion_map(scene, f, motion), seen)
+
+
+def _at_point(table: Table, scene: Scene) -> Response:
+    """Displacement of the surface at a scene's probe."""
+    times, probes = sample_times(scene), scene.probe_points
+    return Response(
+        model="flat-body", times=times, probes=probes,
+        values=flat_motion(table, scene.pressure, probes[0], times)[:, None],
+    )  # fmt: skip
 
 
 def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Floats) -> Floats:
@@ -283,7 +307,7 @@ def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
     times, motion = sample_times(scene), respond(body.body, scene.pressure)
     response = Response(
         model="fem", times=times, probes=scene.probe_points, effort=body.body.effort,
-        displacement=from_rest(read_at(motion, _probe(body, scene.probe_points)), times),
+        values=from_rest(read_at(motion, _probe(body, scene.probe_points)), times),
     )  # fmt: skip
     if scene.tacton.rhythm:
         motion = respond(body.body, _steady(scene.pressure))

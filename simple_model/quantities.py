@@ -1,0 +1,185 @@
+"""Quantities that a response may be of: motion, strain and stress, at the surface or below it.
+
+Each is a few linear components of a field of the body, so that every model reads it by one operator
+(rows of the field at each probe), a factor of frequency for rates and relaxing stress and, of
+quantities that are not linear, a function of the components at each time:
+
+    q(t) = invariant(synthesis of s^rate mu(s)/mu rows(material) field(s))
+
+Axes are those of the scene, z upwards, out of the body; the normal displacement is positive into
+it, the way a pressure pushes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from simple_model.choices import choose
+from simple_model.material import Material
+from simple_model.tensors import (
+    COMPONENTS,
+    energy_root,
+    hooke,
+    largest_shear,
+    squared,
+    von_mises,
+)
+from simple_model.trajectory import Floats
+
+NORMAL, VECTOR, STRAIN = "normal displacement", "displacement", "strain"  # fields
+Rows = Callable[[Material], Floats]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Quantity:
+    """Quantity of a response.
+
+    Parameters
+    ----------
+    name, symbol, words : str, in scenes and files; in formulas, as TeX; in sentences
+    unit : str, SI
+    shown, per_unit : str and float, the unit on axes and in tables, and what 1 in SI is in it
+    column : str, of lines.csv
+    field : NORMAL, VECTOR or STRAIN, the field of a body that it is read from; "" of none
+    rows : its components (c, k) of the field (k,) at rest, of a material
+    rate : int, order of the derivative in time
+    relaxes : bool, whether it goes with the complex modulus
+    invariant : components (..., c) -> values (...), of quantities that are not linear
+    """
+
+    name: str
+    symbol: str
+    words: str
+    unit: str
+    shown: str
+    per_unit: float = 1.0
+    column: str
+    field: str = NORMAL
+    rows: Rows = lambda material: np.eye(1)
+    rate: int = 0
+    relaxes: bool = False
+    invariant: Callable[[Floats], Floats] | None = None
+
+    @property
+    def of_body(self) -> bool:
+        """Whether it is of a body; the point kernel's pressure is of none."""
+        return bool(self.field)
+
+    @property
+    def is_normal(self) -> bool:
+        """Whether it is of the motion normal to the surface alone."""
+        return self.field == NORMAL
+
+    def factor(self, s: Any, modulus: Any = 1.0) -> Any:
+        """Factor of its components at complex frequencies s in rad/s.
+
+        `modulus` is the complex modulus there over that at rest.
+        """
+        return np.asarray(s) ** self.rate * (modulus if self.relaxes else 1.0)
+
+    def waveforms(self, components: Floats, probes: int) -> Floats:
+        """Values (t, p) of components (t, p c), those of a probe next to each other."""
+        each = components.reshape(len(components), probes, -1)
+        return self.invariant(each) if self.invariant else each[..., 0]
+
+
+QUANTITIES: dict[str, Quantity] = {}
+
+
+def register(quantity: Quantity) -> Quantity:
+    """Add a quantity to those that scenes may ask for.
+
+    Raises
+    ------
+    ValueError
+        If there is one of that name.
+    """
+    if quantity.name in QUANTITIES:
+        raise ValueError(f"'{quantity.name}' is registered already; choose another name")
+    QUANTITIES[quantity.name] = quantity
+    return quantity
+
+
+def quantity(name: str) -> Quantity:
+    """The quantity of a name; raises a ValueError if there is none."""
+    return QUANTITIES[choose("quantity", name, QUANTITIES)]
+
+
+def _chosen(rows: Rows, component: int) -> Rows:
+    return lambda material: rows(material)[[component]]
+
+
+def _identity(size: int) -> Rows:
+    return lambda material: np.eye(size)
+
+
+DISPLACEMENT = register(
+    Quantity(
+        name="displacement", symbol="u_n", words="displacement into the body", unit="m",
+        shown="µm", per_unit=1e6, column="displacement_um",
+    )
+)  # fmt: skip
+VELOCITY = register(
+    Quantity(
+        name="velocity", symbol="v_n", words="velocity into the body", unit="m/s", shown="mm/s",
+        per_unit=1e3, column="velocity_mm_s", rate=1,
+    )
+)  # fmt: skip
+ACCELERATION = register(
+    Quantity(
+        name="acceleration", symbol="a_n", words="acceleration into the body", unit="m/s2",
+        shown="m/s²", column="acceleration_m_s2", rate=2,
+    )
+)  # fmt: skip
+PRESSURE = register(
+    Quantity(
+        name="pressure", symbol="q", words="pressure of the point kernel", unit="Pa", shown="Pa",
+        column="pressure_pa", field="",
+    )
+)  # fmt: skip
+for _k, _axis in enumerate("xyz"):
+    register(
+        Quantity(
+            name=f"displacement_{_axis}", symbol=f"u_{_axis}", words=f"displacement along {_axis}",
+            unit="m", shown="µm", per_unit=1e6, column=f"displacement_{_axis}_um", field=VECTOR,
+            rows=_chosen(_identity(3), _k),
+        )
+    )  # fmt: skip
+for _k, _pair in enumerate(COMPONENTS):
+    register(
+        Quantity(
+            name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}",
+            words=f"strain {_pair}", unit="1", shown="µm/m", per_unit=1e6,
+            column=f"strain_{_pair}_um_m", field=STRAIN, rows=_chosen(_identity(6), _k),
+        )
+    )  # fmt: skip
+    register(
+        Quantity(
+            name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}",
+            words=f"stress {_pair}", unit="Pa", shown="Pa", column=f"stress_{_pair}_pa",
+            field=STRAIN, rows=_chosen(hooke, _k), relaxes=True,
+        )
+    )  # fmt: skip
+LARGEST_SHEAR = register(
+    Quantity(
+        name="largest_shear_strain", symbol=r"\gamma_{max}", words="largest shear strain", unit="1",
+        shown="µm/m", per_unit=1e6, column="largest_shear_strain_um_m", field=STRAIN,
+        rows=_identity(6), invariant=largest_shear,
+    )
+)  # fmt: skip
+VON_MISES = register(
+    Quantity(
+        name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress",
+        unit="Pa", shown="Pa", column="von_mises_stress_pa", field=STRAIN, rows=hooke, relaxes=True,
+        invariant=von_mises,
+    )
+)  # fmt: skip
+ENERGY_DENSITY = register(
+    Quantity(
+        name="energy_density", symbol="W", words="elastic strain energy density at the moduli at "
+        "rest", unit="J/m3", shown="mJ/m³", per_unit=1e3, column="energy_density_mj_m3",
+        field=STRAIN, rows=energy_root, invariant=squared,
+    )
+)  # fmt: skip

@@ -1,0 +1,201 @@
+"""Strain and stress recovered from ten-node tetrahedra, at points inside and on the surface."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import j0, j1
+
+import fem
+import meshes
+from fem.stress import strain_operator, stress_operator
+from simple_model.tensors import energy_root, hooke, largest_shear, von_mises
+
+WIDTH = 4.5e-3  # m, standard deviation of the pressure
+POISSON = [0.3, 0.4999]
+
+
+def solid(poisson):
+    return fem.Material(density=1000, shear_modulus=25e3, poisson=poisson)
+
+
+def tensor(matrix):
+    return np.array([matrix[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))])
+
+
+@pytest.mark.parametrize("poisson", POISSON)
+def test_linear_displacement_has_its_strain_and_stress_everywhere(poisson):
+    """Patch test, on distorted elements, inside, on the surface and in a corner."""
+    mesh = meshes.block((0.02, 0.02, 0.012), 3e-3)
+    rng = np.random.default_rng(0)
+    corners = np.unique(mesh.tets[:, :4])
+    shift = np.zeros_like(mesh.points)
+    shift[corners] = rng.uniform(-3e-4, 3e-4, (len(corners), 3))
+    ends = mesh.tets[:, meshes.tetmesh.EDGES]
+    shift[mesh.tets[:, 4:]] = (shift[ends[:, :, 0]] + shift[ends[:, :, 1]]) / 2
+    mesh = replace(mesh, points=mesh.points + shift)
+    slope = rng.standard_normal((3, 3))
+    low, high = mesh.points.min(axis=0) + 4e-4, mesh.points.max(axis=0) - 4e-4
+    points = np.vstack([rng.uniform(low, high, (12, 3)), mesh.points[corners[[0, 57]]]])
+    material, u = solid(poisson), (mesh.points @ slope.T).ravel()
+    expected = tensor((slope + slope.T) / 2)
+    found = (strain_operator(mesh, material, points) @ u).reshape(-1, 6)
+    np.testing.assert_allclose(found, np.tile(expected, (14, 1)), rtol=0, atol=1e-9)
+    stress = (stress_operator(mesh, material, points) @ u).reshape(-1, 6)
+    lam, mu = material.first_lame, material.shear_modulus
+    exact = tensor(lam * np.trace(slope) * np.eye(3) + mu * (slope + slope.T))
+    assert np.abs(stress - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_displacement_inside_a_body_is_interpolated():
+    mesh = meshes.block((0.02, 0.02, 0.012), 4e-3)
+    points = np.random.default_rng(1).uniform([-9e-3, -9e-3, -11e-3], [9e-3, 9e-3, 0], (9, 3))
+    quadratic = [lambda p: p[:, 0] * p[:, 2], lambda p: p[:, 1] ** 2, lambda p: p[:, 2] - p[:, 0]]
+    u, expected = (np.stack([f(p) for f in quadratic], axis=1) for p in (mesh.points, points))
+    found = fem.displacement_operator(mesh, points) @ u.ravel()
+    np.testing.assert_allclose(found.reshape(-1, 3), expected, rtol=0, atol=1e-15)
+    with pytest.raises(ValueError, match=r"point \(0, 0, 1\) mm is not in the body"):
+        fem.locate(mesh, [[0, 0, 1e-3]])
+
+
+def boussinesq(poisson, r, z, width=WIDTH):
+    """Stresses rr, tt, zz and, z upwards, rz at a depth z below exp(-r^2 / 2 width^2) in Pa.
+
+    Johnson, Contact Mechanics (1985), section 3.2, by Love's function under Hankel's transform:
+    sigma_zz = -int q (1 + k z) e^(-k z) J0(k r) k dk and likewise the others.
+    """
+
+    def hankel(kernel):
+        def integrand(k):
+            return width**2 * np.exp(-((k * width) ** 2) / 2 - k * z) * k * kernel(k)
+
+        return quad(integrand, 0, 9 / width, limit=200)[0]
+
+    def ring(k):
+        return j1(k * r) / (k * r) if r else 0.5
+
+    free = 1 - 2 * poisson
+    return (
+        -hankel(lambda k: (1 - k * z) * j0(k * r) - (free - k * z) * ring(k)),
+        -hankel(lambda k: 2 * poisson * j0(k * r) + (free - k * z) * ring(k)),
+        -hankel(lambda k: (1 + k * z) * j0(k * r)),
+        hankel(lambda k: k * z * j1(k * r)),
+    )
+
+
+FOCI = [(a * 5e-3, b * 5e-3) for a in (1, -1) for b in (1, -1)]
+
+
+def four_foci(poisson, point):
+    """Stress at a point below four foci, mirror images of each other: the sum of four."""
+    total = np.zeros((3, 3))
+    for x, y in FOCI:
+        r, angle = np.hypot(point[0] - x, point[1] - y), np.arctan2(point[1] - y, point[0] - x)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        rr, tt, zz, rz = boussinesq(poisson, r, -point[2])
+        total += turn @ np.array([[rr, 0, rz], [0, tt, 0], [rz, 0, zz]]) @ turn.T
+    return total
+
+
+@pytest.fixture(scope="module")
+def half_space():
+    """A quarter of a block that is large beside the foci."""
+    along = meshes.Grading(radius=12e-3, growth=1.5, coarsest=0.02)
+    mesh = meshes.block((0.16, 0.16, 0.08), 2e-3, grading=along)
+    return meshes.half(meshes.half(mesh, "x"), "y")
+
+
+@pytest.mark.parametrize("poisson", POISSON)
+def test_stress_below_a_focus_is_that_of_boussinesq(half_space, poisson):
+    """At the surface too: sigma_zz = -p without shear; all within 3 % of the largest pressure."""
+    mesh, material = half_space, solid(poisson)
+    ops = fem.assemble(mesh, material, fixed={"clamped": "xyz", "mirror_x": "x", "mirror_y": "y"})
+    away = fem.facet_points(mesh)[:, None, :2] - FOCI
+    pressure = np.exp(-(away**2).sum(axis=2) / 2 / WIDTH**2).sum(axis=1)
+    u = fem.static(ops, fem.load_operator(mesh) @ pressure)
+    around = [(5e-3, 5e-3), (7.3e-3, 5e-3), (9e-3, 8e-3)]
+    points = [(x, y, -z) for x, y in around for z in (0.0, 0.7e-3, 2e-3, 5e-3)]
+    found = (stress_operator(mesh, material, points) @ u).reshape(-1, 6)
+    exact = np.array([tensor(four_foci(poisson, point)) for point in points])
+    largest = pressure.max()
+    np.testing.assert_allclose(found, exact, rtol=0, atol=0.03 * largest)
+    on_top = np.array([np.exp(-((np.array(points[0][:2]) - f) ** 2).sum() / 2 / WIDTH**2)
+                       for f in FOCI]).sum()  # fmt: skip
+    np.testing.assert_allclose(exact[0, [2, 4, 5]], [-on_top, 0, 0], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("poisson", POISSON)
+def test_a_thick_cylinder_under_pressure_is_lames(poisson):
+    """Plane strain, inner radius 1, outer 2: sigma_rr, sigma_tt = (A -+ B / r^2) p, A = 1/3,
+    B = 4/3 (Timoshenko and Goodier, Theory of Elasticity (1970), section 28).
+    """
+    mesh = meshes.extrude(np.linspace(0, 1, 7), np.linspace(0, 1, 9), np.linspace(-0.3, 0, 3))
+    along, turn, z = mesh.points.T
+    r, angle = 1 + along, turn * np.pi / 2
+    bent = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
+    mesh = replace(mesh, points=bent)
+    material = fem.Material(density=1, shear_modulus=1.0, poisson=poisson)
+    ops = fem.assemble(mesh, material, fixed={"front": "y", "back": "x", "top": "z", "bottom": "z"})
+    P = fem.load_operator(mesh, "left")
+    u = fem.static(ops, P @ np.ones(P.shape[1]))
+    radii = np.array([1.01, 1.2, 1.5, 1.9])
+    points = np.column_stack([radii * np.cos(0.7), radii * np.sin(0.7), 0 * radii - 0.15])
+    found = (stress_operator(mesh, material, points) @ u).reshape(-1, 6)
+    c, s = np.cos(0.7), np.sin(0.7)
+    rr = found @ [c * c, s * s, 0, 2 * c * s, 0, 0]
+    tt = found @ [s * s, c * c, 0, -2 * c * s, 0, 0]
+    hoop, radial = (1 / 3 + 4 / 3 / radii**2), (1 / 3 - 4 / 3 / radii**2)
+    np.testing.assert_allclose(tt, hoop, rtol=0.02)
+    np.testing.assert_allclose(rr, radial, rtol=0, atol=0.02)
+    np.testing.assert_allclose(found[:, 2], 2 / 3 * poisson, rtol=0, atol=0.02)
+
+
+def test_strain_jumps_between_materials_and_is_not_smoothed():
+    """Two layers in series under one pressure, without lateral strain: stress over modulus each."""
+    mesh = meshes.extrude(np.linspace(0, 1, 4), np.linspace(0, 1, 4), np.linspace(-1, 0, 5))
+    middle = mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+    mesh = replace(mesh, region=(middle < -0.5).astype(int))
+    materials = {0: fem.Material(density=1, shear_modulus=1.0, poisson=0.3),
+                 1: fem.Material(density=1, shear_modulus=3.0, poisson=0.4999)}  # fmt: skip
+    sides = {"left": "x", "right": "x", "front": "y", "back": "y", "bottom": "z"}
+    ops = fem.assemble(mesh, materials, fixed=sides)
+    P = fem.load_operator(mesh)
+    u = fem.static(ops, P @ np.ones(P.shape[1]))
+    points = [(0.4, 0.6, z) for z in (-0.05, -0.45, -0.55, -0.95)]
+    found = (strain_operator(mesh, materials, points) @ u).reshape(-1, 6)[:, 2]
+    stiff = [m.first_lame + 2 * m.shear_modulus for m in materials.values()]
+    np.testing.assert_allclose(found, [-1 / stiff[0]] * 2 + [-1 / stiff[1]] * 2, rtol=1e-8)
+    stress = (stress_operator(mesh, materials, points) @ u).reshape(-1, 6)[:, 2]
+    np.testing.assert_allclose(stress, -1.0, rtol=1e-8)
+
+
+def test_invariants_are_those_of_the_principal_axes():
+    rng = np.random.default_rng(2)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    principal = np.diag([3e-3, -1e-3, 0.5e-3])
+    strain = tensor(turn @ principal @ turn.T)
+    assert largest_shear(strain) == pytest.approx(4e-3)
+    material = solid(0.3)
+    stress = hooke(material) @ strain
+    a, b, c = np.diag(principal) * 2 * material.shear_modulus
+    mises = np.sqrt(((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) / 2)
+    assert von_mises(stress) == pytest.approx(mises)
+    own = np.diag(principal)
+    energy = material.first_lame * own.sum() ** 2 / 2 + material.shear_modulus * own @ own
+    assert ((energy_root(material) @ strain) ** 2).sum() == pytest.approx(energy)
+
+
+def test_strain_at_nodes_is_that_of_a_linear_displacement():
+    mesh = meshes.block((0.02, 0.02, 0.012), 6e-3)
+    slope = np.random.default_rng(3).standard_normal((3, 3))
+    found = fem.nodal_strain(mesh.points, mesh.tets, mesh.points @ slope.T)
+    expected = tensor((slope + slope.T) / 2)
+    np.testing.assert_allclose(found, np.tile(expected, (len(mesh.points), 1)), atol=1e-12)
+
+
+def test_four_nodes_are_refused():
+    mesh = meshes.block((1.0, 1.0, 1.0), 0.5, order=1)
+    with pytest.raises(ValueError, match="ten-node"):
+        strain_operator(mesh, solid(0.3), [[0, 0, -0.2]])
