@@ -1,6 +1,8 @@
 """Shared, small: a cache of their own, and a body that no element fits well."""
 
 import os
+from concurrent.futures import Future
+from contextlib import contextmanager
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core each
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -39,6 +41,26 @@ def scene(tmp_path, monkeypatch):
     path = tmp_path / "short.toml"
     path.write_text(SMALL)
     return path
+
+
+class Here:
+    """An executor that calls at once, in this process."""
+
+    def submit(self, function, *given, **options):
+        done = Future()
+        done.set_result(function(*given, **options))
+        return done
+
+
+@pytest.fixture
+def in_one_process(monkeypatch):
+    """Comparisons without a process beside this one, where that is not what is tested."""
+
+    @contextmanager
+    def here():
+        yield Here()
+
+    monkeypatch.setattr("skinwave.studies.study.helper", here)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from argparse import Namespace
 
 import numpy as np
 import pytest
-from corpus import SMALL
+from corpus import GOOD, SILENT_GROUND, SMALL
 
 from skinwave.cli import main, parser
 from skinwave.commands.common import progress_of
@@ -74,7 +74,7 @@ def test_plan_gives_a_reason_for_every_row(scene, capsys):
     printed = capsys.readouterr().out
     assert "flat-body" in printed
     assert "highest line" in printed
-    scene.write_text(SMALL.replace("[body]", "[body]\nsides = 'clamped'"))
+    scene.write_text(GOOD)  # its sides are clamped
     assert main(["plan", str(scene), "--json"]) == 0
     required = json.loads(capsys.readouterr().out)
     assert required["model"] == "fem"
@@ -176,8 +176,10 @@ def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal)
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 def test_ctrl_c_leaves_what_is_finished(tmp_path, monkeypatch):
+    """Kernels on no body first, then paper and skin: the second is interrupted."""
     monkeypatch.setenv("SKINWAVE_CACHE", "")  # or no body is left to reduce
-    command = [sys.executable, "-m", "skinwave", "compare", "--h", "8"]
+    (tmp_path / "none.toml").write_text(SILENT_GROUND)
+    command = [sys.executable, "-m", "skinwave", "compare", "none.toml", "--h", "8"]
     command += ["--out", str(tmp_path / "cut")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stderr is not None
@@ -188,9 +190,10 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path, monkeypatch):
         process.stderr.read()
     assert process.returncode == 1
     page = (tmp_path / "cut/index.html").read_text()
-    assert "Interrupted: 30 of 60 runs" in page
-    assert len(list((tmp_path / "cut").glob("*/point-kernel/responses.npz"))) == 15
-    assert [path.name for path in tmp_path.iterdir()] == ["cut"]
+    assert "Interrupted: 2 of 4 runs" in page
+    found = sorted((tmp_path / "cut").glob("*/*/responses.npz"))
+    assert [path.parent.name for path in found] == ["point-kernel", "point-kernel-published"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut", "none.toml"]
 
 
 def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, monkeypatch):

@@ -151,6 +151,7 @@ def test_a_report_says_the_same(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SLAB)
     monkeypatch.setattr("skinwave.reports.album.shown_scenes", lambda scene, _: {"slab": scene})
+    monkeypatch.setattr("skinwave.reports.scene_report.pictures", lambda *given: [])
     assert main(["report", "scene.toml", "--h", "8", "--quiet"]) == 0
     shown = on_the_page(tmp_path / "scene-report/index.html")
     assert [x.split(" (slab")[0] for x in shown] == list(said)

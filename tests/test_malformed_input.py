@@ -107,11 +107,9 @@ def test_no_mesh_is_refused_in_one_line(name):
 
 
 REAL = [
-    ["run", "missing.toml"],
     ["run", "wrong.toml"],
     ["compare", "good.toml", "--h", "1e-9"],
     ["run", "good.toml", "--model", "fem", "--h", "nan", "--out", "new/below"],
-    ["run", "good.toml", "--out", "kept"],
     ["tradeoff", "none.toml"],
 ]
 
@@ -133,6 +131,7 @@ NAMES = ["..", "../../beside", "figures", "$\\\\frac{$", "zero \\u0000 byte", "n
 MORE = ["", "/tmp/absolute", "overview", "lines.csv", "掌", "two\\nlines"]
 
 
+@pytest.mark.usefixtures("in_one_process")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_scene_of_any_name_is_compared_within_its_folder(folder, name):
     text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")

@@ -395,6 +395,7 @@ def page(folder, *given):
 @pytest.mark.parametrize("command", ["run", "relax", "tradeoff", "verify", "report", "rerun",
                                      "relax paper-vs-skin",
                                      pytest.param("compare", marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.usefixtures("in_one_process")
 def test_folders_of_every_command_are_marked_and_replaced(folder, monkeypatch, drawn, command):
     """Every command that writes a folder; what is slow is not computed here."""
     found = Namespace(effects=list, steps=[], every=[], accepted=[], failed=[])
@@ -411,7 +412,8 @@ def test_folders_of_every_command_are_marked_and_replaced(folder, monkeypatch, d
         lambda folder, scene, *p, **o: files.write_run(folder / "none", a_run()) or [],
     )
     name, *scene = [*command.split(), "none.toml"][:2]
-    asked = {"verify": ["--quick"], "compare": ["none.toml", "--h", "8"]}.get(name, scene)
+    (folder / "slab.toml").write_text(corpus.GOOD)  # one small body, not those of the paper
+    asked = {"verify": ["--quick"], "compare": ["slab.toml", "--h", "8"]}.get(name, scene)
     if name == "rerun":
         assert main([*RUN, "--out", "first"]) == 0
         asked = ["first"]

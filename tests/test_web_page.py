@@ -46,13 +46,22 @@ def visit(browser, address):
     return opened(browser, address)
 
 
+def begun(page, query):
+    page.evaluate("q => window.trame.trigger('restart', [q])", query)
+    state_becomes(page, "query", query)
+    return page
+
+
 @pytest.fixture
 def page(visit):
     """The page as it is at the beginning."""
-    page = visit[0]
-    page.evaluate("q => window.trame.trigger('restart', [q])", "")
-    state_becomes(page, "query", "")
-    return page
+    return begun(visit[0], "")
+
+
+@pytest.fixture
+def bare(visit):
+    """The page without a body, whose waves are computed with every move."""
+    return begun(visit[0], "body=none")
 
 
 def state(page, key):
@@ -166,12 +175,15 @@ def test_it_opens_with_the_skin_slab_and_its_body_first(page):
 
 
 @pytest.mark.parametrize("key", [key for key in NUMBERS if key not in ("ramp", "drawn")])
-def test_a_slider_and_a_field_turn_each_number(page, key):
+def test_a_slider_and_a_field_turn_each_number(bare, key):
+    page = bare
     number, row = NUMBERS[key], page.locator(f".sw-row:has(#{key}-field)")
     way = -1 if number.start == number.high else 1
     row.locator("[role=slider]").press("ArrowRight" if way > 0 else "ArrowLeft")
     expected = number.start + way * number.step
-    state_becomes(page, "query", controls.to_query(STARTS | {key: round(expected, 6)}))
+    state_becomes(
+        page, "query", controls.to_query(STARTS | {"body": "none", key: round(expected, 6)})
+    )
     assert float(page.locator(f"#{key}-field").input_value()) == pytest.approx(expected)
     page.locator(f"#{key}-field").fill(f"{number.low + 3 * number.step:g}")
     query_has(page, f"{key}={number.low + 3 * number.step:g}")
@@ -181,8 +193,9 @@ def test_a_slider_and_a_field_turn_each_number(page, key):
     assert page.locator(f"#{key}-field").get_attribute("aria-invalid") == "true"
 
 
-def test_a_number_can_be_typed_digit_by_digit(page):
+def test_a_number_can_be_typed_digit_by_digit(bare):
     """Though its beginning, 1 mm, is refused."""
+    page = bare
     field = page.locator("#height-field")
     field.fill("")
     field.press_sequentially("1")
@@ -194,7 +207,8 @@ def test_a_number_can_be_typed_digit_by_digit(page):
     page.wait_for_selector("#height-error", state="detached")
 
 
-def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(page):
+def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(bare):
+    page = bare
     choose(page, "ratio", "0.25:0.75")
     query_has(page, "ratio=0.25:0.75")
     choose(page, "drive", "linear")
@@ -238,7 +252,8 @@ def drawn_by(page, selector, dx):
     page.mouse.up()
 
 
-def test_the_rhythm_is_edited_on_its_timeline(page):
+def test_the_rhythm_is_edited_on_its_timeline(bare):
+    page = bare
     assert page.locator("#timeline .sw-handle").count() == 0
     page.locator("#pulse-add").click()
     query_has(page, "pulses=100/100")
@@ -289,7 +304,8 @@ def test_the_rhythm_is_edited_on_its_timeline(page):
     state_becomes(page, "pulses", "110/150")
 
 
-def test_foci_follow_paths_of_their_own(page, tmp_path):
+def test_foci_follow_paths_of_their_own(bare, tmp_path):
+    page = bare
     page.locator("#foci-field").fill("2")
     query_has(page, "foci=2")
     page.locator("#follow-own").click()
@@ -325,6 +341,7 @@ def test_foci_follow_paths_of_their_own(page, tmp_path):
     page.wait_for_selector("#paths-error", state="detached")
     page.locator("#pulses-field").fill("100/50")
     query_has(page, "pulses=100/50")
+    choose(page, "body", "skin-slab")
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     photographed(page, "own-paths")
     kept = state(page, "query")
@@ -383,7 +400,8 @@ def at_rest(element):
     return now
 
 
-def test_a_click_or_a_key_on_the_map_selects(page):
+def test_a_click_or_a_key_on_the_map_selects(bare):
+    page = bare
     area = page.locator("#kernel-map")
     for x, y in ((12.3, -7.8), (-31.4, 22.2)):
         frame = at_rest(area.locator("rect"))
@@ -396,7 +414,8 @@ def test_a_click_or_a_key_on_the_map_selects(page):
     page.wait_for_function("x => window.trame.state.get('x') > x + 0.9", arg=before)
 
 
-def test_every_press_on_the_map_counts_however_fast(page):
+def test_every_press_on_the_map_counts_however_fast(bare):
+    page = bare
     page.locator("#kernel-map").evaluate(
         """map => {
           for (const [key, count] of [['Right', 9], ['Up', 7], ['Left', 2]])
@@ -562,7 +581,8 @@ def test_a_page_has_one_heading_of_the_first_level_and_can_be_zoomed(page):
     assert not re.search("maximum-scale|minimum-scale|user-scalable", viewport)
 
 
-def test_zooming_into_the_commanded_tacton_shows_its_carrier(page):
+def test_zooming_into_the_commanded_tacton_shows_its_carrier(bare):
+    page = bare
     frame = page.locator("#commanded_plot").bounding_box()
     middle = frame["y"] + frame["height"] / 2
     page.mouse.move(frame["x"] + 200, middle)
@@ -622,7 +642,8 @@ def test_the_body_moves_in_three_dimensions(page):
     page.wait_for_selector("#wave-map")
 
 
-def test_what_is_saved_opens_again(page, tmp_path):
+def test_what_is_saved_opens_again(bare, tmp_path):
+    page = bare
     page.locator("#am-field").fill("95")
     query_has(page, "am=95")
     for item, start in (("scene-toml", b"name ="), ("waveform-csv", b'"time'),
@@ -716,7 +737,7 @@ def test_a_lost_connection_is_said_and_comes_back(browser):
     context = browser.new_context()
     page = context.new_page()
     page.set_default_timeout(PATIENCE)
-    page.goto(address + "&am=71")
+    page.goto(address + "&am=71&body=none")
     page.wait_for_function(READY)
     ended(process)
     page.wait_for_selector("#sw-lost")
