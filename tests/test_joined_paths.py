@@ -98,15 +98,15 @@ def test_bodies_answer_them_by_lines_as_by_time_steps(more):
     small = [replace(p, size=0.6 * p.size, centre=(0.4 * p.centre[0], 0.4 * p.centre[1]))
              for p in STRAIGHT[:3]]  # fmt: skip
     scene = Scene(
-        pressure=together(small, duration=0.03, **more),
-        body=Body(width=0.03, height=0.03, depth=0.006), probes=((0.0, 0.0), (0.005, 0.001)),
+        pressure=together(small, duration=0.02, **more),
+        body=Body(width=0.03, height=0.03, depth=0.01), probes=((0.0, 0.0), (0.005, 0.001)),
     )  # fmt: skip
-    x = compute(scene, "fem", h=0.006).displacement
-    y = compute(scene, "fem-transient", h=0.006, dt=2.5e-5).displacement
+    x = compute(scene, "fem", h=0.01).displacement
+    y = compute(scene, "fem-transient", h=0.01, dt=2.5e-5).displacement
     assert (np.linalg.norm(x - y, axis=0) < 2e-3 * np.linalg.norm(y, axis=0)).all()
     mean = np.mean([
-        compute(replace(scene, pressure=alone(path, duration=0.03, **more)), "fem",
-                 h=0.006).displacement for path in small
+        compute(replace(scene, pressure=alone(path, duration=0.02, **more)), "fem",
+                 h=0.01).displacement for path in small
     ], axis=0)  # fmt: skip
     assert np.linalg.norm(x - mean) < 2e-3 * np.linalg.norm(mean)
 

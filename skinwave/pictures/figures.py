@@ -45,11 +45,22 @@ def png(figure: Figure, dpi: int = 110) -> bytes:
 def drawn(figure: Figure, kind: str, dpi: int = 110) -> bytes:
     """The figure as a file in memory: "png", "svg" or "pdf", whose text stays text."""
     buffer = BytesIO()
+    figure.dpi = dpi
     with warnings.catch_warnings(), mpl.rc_context(TEXT):
         # A name in letters that the font lacks is shown as boxes.
         warnings.filterwarnings("ignore", "Glyph")
+        _lay_out(figure)
         figure.savefig(buffer, format=kind, dpi=dpi)
     return buffer.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Margins as its layout has them, for files of all kinds: `savefig` computes them for each, and
+    draws the figure once more to do so.
+    """
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.tri import Triangulation
 
 from meshes.tetmesh import Floats
 from simple_model.threshold import BAND
@@ -58,8 +57,7 @@ def sampler(view: View, raster: Raster) -> Callable[[Floats], Floats]:
 
 def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
     """Linear interpolation of values (s,) of a view's surface to places (..., 2)."""
-    x, y = view.places.T
-    found: Any = Triangulation(x, y, view.triangles).get_trifinder()(places[..., 0], places[..., 1])
+    found = view.finder(places[..., 0], places[..., 1])
     corners = view.places[view.triangles[found]]  # (..., 3, 2)
     edges = corners[..., 1:, :] - corners[..., :1, :]
     inside = (places - corners[..., 0, :])[..., None]

@@ -6,6 +6,7 @@ Motion is about its mean: a steady push bends a sheet far more than its vibratio
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +103,14 @@ class View:
     def pushed(self) -> Singles:
         """Motion (f, s) of the upper surface into the body, in the unit."""
         return -self.motion[:, self.surface, 2]
+
+    @cached_property
+    def finder(self) -> Any:
+        """Function of x and y (...) in metre: which triangle is there, -1 for none."""
+        from matplotlib.tri import Triangulation
+
+        x, y = self.places.T
+        return Triangulation(x, y, self.triangles).get_trifinder()
 
     @property
     def peak(self) -> float:
