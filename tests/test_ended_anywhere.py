@@ -77,11 +77,11 @@ def prepared(folder):
     subprocess.run(run, cwd=folder, check=True, **QUIET)
 
 
-def hand(path):
-    """Write the surface of a palm, m."""
+def hand(path, h=2e-3):
+    """Write the surface of a palm, m, of triangles of this size."""
     import pyvista
 
-    found = palm.surface(meshes.Palm(), 2e-3)
+    found = palm.surface(meshes.Palm(), h)
     corners = np.insert(found.triangles, 0, 3, axis=1)
     pyvista.PolyData(found.points, corners.ravel()).save(path)
 
