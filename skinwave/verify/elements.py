@@ -161,13 +161,23 @@ def _followed(mesh: TetMesh, poisson: float, bar: float, where: str = "") -> Che
 
 def held_outside(mesh: TetMesh, poisson: float, field: Floats, force: Floats) -> Floats:
     """Displacement (3 n,) of the mesh with the field prescribed on its boundary."""
+    return solver_held_outside(mesh, poisson)(field, force)
+
+
+def solver_held_outside(mesh: TetMesh, poisson: float) -> Callable[[Floats, Floats], Floats]:
+    """The same for any field and force, by one factor."""
     fixed = np.zeros(mesh.points.shape, bool)
     fixed[np.unique(meshes.boundary_facets(mesh.tets))] = True
     K = fem.assemble(mesh, unit(poisson), fixed=np.zeros(mesh.points.shape, bool)).K
     inner = np.flatnonzero(~fixed.ravel())
-    u = np.where(fixed.ravel(), field, 0.0)
-    u[inner] = fem.factorise(K[inner][:, inner]).solve((force - K @ u)[inner])
-    return u
+    factor = fem.factorise(K[inner][:, inner])
+
+    def solve(field: Floats, force: Floats) -> Floats:
+        u = np.where(fixed.ravel(), field, 0.0)
+        u[inner] = factor.solve((force - K @ u)[inner])
+        return u
+
+    return solve
 
 
 def _gap(found: Floats, exact: Floats) -> float:

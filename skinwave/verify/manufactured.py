@@ -1,6 +1,6 @@
 """Manufactured solutions: convergence orders of ten-node tetrahedra up to nu = 0.4999."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ import fem
 import meshes
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from skinwave.verify.case import Case, Plot, below, order, slope
-from skinwave.verify.elements import DisplacementField, held_outside, unit
+from skinwave.verify.elements import DisplacementField, solver_held_outside, unit
 from skinwave.verify.references import Floats
 
 DIRECTION = np.array([1.0, 2.0, 3.0])
@@ -25,6 +25,9 @@ class Manufactured:
     u: DisplacementField
     gradient: DisplacementField
     force: DisplacementField
+
+
+Field = Callable[[float, float], Manufactured]  # by Lame's parameters
 
 
 def divergence_free(mu: float, lam: float) -> Manufactured:
@@ -64,7 +67,7 @@ def no_locking() -> Case:
     errors = []
     for poisson in ratios:
         material = unit(poisson)
-        errors.append(_errors(10, material, balanced(1.0, material.first_lame)))
+        errors += _errors(10, material, [balanced(1.0, material.first_lame)])
     values, slopes = np.array(errors).T
     at = [1 / (1 - 2 * poisson) for poisson in ratios]
     return Case(
@@ -84,67 +87,83 @@ def no_locking() -> Case:
 
 
 def manufactured(
-    kind: str,
-    poisson: float,
-    field: Callable[[float, float], Manufactured],
-    cells: tuple[int, ...],
-    ceilings: tuple[float, float],
+    poisson: float, cells: tuple[int, ...], fields: Mapping[str, tuple[Field, tuple[float, float]]]
 ) -> Case:
-    """Errors in L2 and H1 on three meshes of the unit cube."""
-    material = unit(poisson)
-    problem = field(material.shear_modulus, material.first_lame)
-    errors = np.array([_errors(n, material, problem) for n in cells])
-    sizes = 1 / np.array(cells)
-    named = {"L2": errors[:, 0], "H1 seminorm": errors[:, 1]}
-    lines = {name: (sizes, values) for name, values in named.items()}
-    lines |= {
-        f"slope {p:g}": (sizes, e[-1] * (sizes / sizes[-1]) ** p)
-        for p, e in zip(ORDERS, named.values(), strict=True)
+    """Errors in L2 and H1 on three meshes of the unit cube, whose factors all fields share.
+
+    Parameters
+    ----------
+    poisson : Poisson's ratio
+    cells : of each mesh, a side
+    fields : name -> the field, and what its errors in L2 and H1 may be on the finest mesh
+
+    Returns
+    -------
+    Case
+    """
+    material, sizes = unit(poisson), 1 / np.array(cells)
+    problems = [field(1.0, material.first_lame) for field, _ in fields.values()]
+    errors = np.array([_errors(n, material, problems) for n in cells])  # (meshes, fields, norms)
+    norms = ("L2", "H1 seminorm")
+    named = {
+        (name, norm): errors[:, k, j]
+        for k, name in enumerate(fields)
+        for j, norm in enumerate(norms)
     }
-    checks = [
-        order(f"order in {name}", sizes, e, p, 0.1)
-        for p, (name, e) in zip(ORDERS, named.items(), strict=True)
-    ]
-    checks += [
-        below(f"relative error in {name}, finest mesh", e[-1], ceiling)
-        for ceiling, (name, e) in zip(ceilings, named.items(), strict=True)
-    ]
+    lines = {f"{name}, {norm}": (sizes, e) for (name, norm), e in named.items()}
+    guides = {
+        f"slope {p:g}": (sizes, errors[-1, 0, j] * (sizes / sizes[-1]) ** p)
+        for j, p in enumerate(ORDERS)
+    }
+    checks = []
+    for name, (_, ceilings) in fields.items():
+        for p, ceiling, norm in zip(ORDERS, ceilings, norms, strict=True):
+            e = named[name, norm]
+            checks.append(order(f"{name}: order in {norm}", sizes, e, p, 0.1))
+            what = f"{name}: relative error in {norm}, finest mesh"
+            checks.append(below(what, e[-1], ceiling))
+    last = (f"{what} {slope(sizes[-2:], e[-2:]):.2f}" for what, (_, e) in lines.items())
     return Case(
-        title=f"Manufactured field, {kind}, nu = {poisson:g}",
+        title=f"Manufactured fields, {' and '.join(fields)}, nu = {poisson:g}",
         source=f"{MANUFACTURED}; orders: Ciarlet, The Finite Element Method for Elliptic "
         "Problems (1978), section 3.2; near 1/2 Stenberg, Math Comp 42:9 (1984)",
         mesh=f"unit cube, {', '.join(map(str, cells))} cells a side, six tetrahedra a cell",
         checks=tuple(checks),
         plot=Plot(
-            x="h / side", y="relative error", lines=lines, drawn=tuple(list(lines)[2:]), log=True
+            x="h / side", y="relative error", lines=lines | guides, drawn=tuple(guides), log=True
         ),
-        note=f"Last pair of meshes: order {slope(sizes[-2:], errors[-2:, 0]):.2f} in L2, "
-        f"{slope(sizes[-2:], errors[-2:, 1]):.2f} in H1.",
+        note=f"Orders of the last pair of meshes: {'; '.join(last)}.",
     )
 
 
-def _errors(n: int, material: fem.Material, problem: Manufactured) -> tuple[float, float]:
-    """Relative errors in L2 and in the H1 seminorm, by the 14-point rule."""
+def _errors(
+    n: int, material: fem.Material, problems: Sequence[Manufactured]
+) -> list[tuple[float, float]]:
+    """Relative errors in L2 and in the H1 seminorm of each field, by the 14-point rule."""
     mesh = meshes.extrude(*[np.linspace(0, 1, n + 1)] * 3)
+    solve = solver_held_outside(mesh, material.poisson)
     barycentric, weights = tetrahedron_rule(5)
     N, D = shape_functions(barycentric, 10), shape_derivatives(barycentric, 10)
     corners = mesh.points[mesh.tets[:, :4]]
     edges = corners[:, 1:] - corners[:, :1]
     W = np.linalg.det(edges)[:, None] / 6 * weights
     x = np.einsum("qa,eai->eqi", barycentric, corners)
-    local = np.einsum("eq,qa,eqi->eai", W, N, problem.force(x), optimize=True)
-    force = np.zeros_like(mesh.points)
-    np.add.at(force, mesh.tets, local)
-    found = held_outside(mesh, material.poisson, problem.u(mesh.points).ravel(), force.ravel())
-    u = found.reshape(-1, 3)[mesh.tets]
-    slopes = np.einsum("eai,qal,ejl->eqij", u, D, np.linalg.inv(edges), optimize=True)
 
     def size(values: Floats) -> float:
         return float(np.sqrt((W * (values.reshape(*W.shape, -1) ** 2).sum(axis=-1)).sum()))
 
-    exact, gradient = problem.u(x), problem.gradient(x)
-    value = size(np.einsum("qa,eai->eqi", N, u) - exact) / size(exact)
-    return value, size(slopes - gradient) / size(gradient)
+    errors = []
+    for problem in problems:
+        local = np.einsum("eq,qa,eqi->eai", W, N, problem.force(x), optimize=True)
+        force = np.zeros_like(mesh.points)
+        np.add.at(force, mesh.tets, local)
+        found = solve(problem.u(mesh.points).ravel(), force.ravel())
+        u = found.reshape(-1, 3)[mesh.tets]
+        slopes = np.einsum("eai,qal,ejl->eqij", u, D, np.linalg.inv(edges), optimize=True)
+        exact, gradient = problem.u(x), problem.gradient(x)
+        value = size(np.einsum("qa,eai->eqi", N, u) - exact) / size(exact)
+        errors.append((value, size(slopes - gradient) / size(gradient)))
+    return errors
 
 
 def _psi(x: Floats) -> Floats:
