@@ -13,7 +13,7 @@ def solve(scene: Scene, request: Request) -> Response:
     time.sleep(SECONDS)
     return Response(
         model="waiting", times=request.times, probes=scene.probe_points,
-        displacement=1e-9 * scene.pressure(scene.probe_points, request.times),
+        values=1e-9 * scene.pressure(scene.probe_points, request.times),
     )  # fmt: skip
 
 
