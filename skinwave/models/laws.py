@@ -16,6 +16,7 @@ from skinwave.bodies.parts import solid_of
 
 SERIES_SHARE = 0.1  # of a waveform's tolerance: relative error that a series may have
 STRONG = 1e-2  # of the strongest line of a load: lines that a table must reach
+OCTAVE = 2.0  # below its first frequency, as far as its Prony series continues it
 
 
 def own_laws(body: Body) -> tuple[Material, ...]:
@@ -35,7 +36,7 @@ def has_table(body: Body) -> bool:
 
 def check_laws(body: Body, pressure: MovingPressure) -> None:
     """Refuse a body with a modulus law that is not passive or not causal, or with a table that some
-    strong line of the load is outside of; its mean may be.
+    strong line of the load is outside of by more than an octave below; its mean may be.
 
     Raises
     ------
@@ -47,7 +48,7 @@ def check_laws(body: Body, pressure: MovingPressure) -> None:
         if isinstance(solid.law, ModulusTable):
             first, last = solid.law.frequencies[0], solid.law.frequencies[-1]
             lowest, highest = _slowest_and_fastest(pressure)
-            if lowest < first * (1 - 1e-9) or highest > last * (1 + 1e-9):
+            if lowest < first / OCTAVE or highest > last * (1 + 1e-9):
                 raise ValueError(
                     f"a table of complex moduli is from {first:g} to {last:g} Hz, and the load has "
                     f"lines of {100 * STRONG:g} % of its strongest from {lowest:g} to {highest:g} "
