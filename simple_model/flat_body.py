@@ -45,6 +45,7 @@ PADDING = 2.0  # the transform's period over the duration; what wraps round is d
 WRAPPED = 1e-5
 AT_ONCE = 2**19  # pairs of frequency and distance: some ten megabytes
 FEW_DISTANCES = 40  # are integrated one by one, without a spline
+ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
 
 
@@ -291,10 +292,10 @@ def _recorded(
             for q, x in zip(gains, away, strict=True)
         )
 
-    used = np.argwhere(field.weights(np.ones((1, 2))).any(axis=-1))
-    u = np.zeros((len(w), len(probes), used[-1, 0] + 1), np.complex128)
+    weighted = field.weights(ANYWHERE).any(axis=-1)  # not where x, y or x^2 - y^2 is 0
+    u = np.zeros((len(w), len(probes), len(weighted)), np.complex128)
     for i, probe in enumerate(probes):
-        for component, integral in used:
+        for component, integral in np.argwhere(weighted):
             loaded = partial(load, probe=probe, component=component, integral=integral)
             u[:, i, component] += (g[integral] * transform(loaded, w, dt, parts)).sum(axis=1)
     return u

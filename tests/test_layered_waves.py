@@ -23,9 +23,11 @@ from simple_model import (
 from simple_model.compliance import half_space, layered, slab, thin_sheet
 from simple_model.flat_body import steady_lines
 from simple_model.flat_motion import point_motion
+from simple_model.flat_quantities import from_rest, quantity_field
 from simple_model.layered import transfer
 from simple_model.load_spectrum import load_lines
 from simple_model.material import PRESETS
+from simple_model.quantities import quantity
 from simple_model.wavenumber_integral import point_response
 
 WIDTH = 4.35e-3
@@ -309,6 +311,22 @@ def test_motion_from_rest_settles_and_is_alike_by_either_way():
     surface = flat_motion(SKIN, load, probes, times)[..., 2]
     waves = flat_body(layered(SKIN), load, probes, times).displacement
     assert np.abs(surface - waves).max() < 1e-6 * np.abs(waves).max()
+
+
+@pytest.mark.parametrize("name", ["strain_xx", "strain_yy", "strain_xy", "stress_xx"])
+def test_every_strain_is_alike_on_a_circle_and_on_its_recording(name):
+    path, asked = Trajectory(shape="circle", size=0.02, speed=6.0), quantity(name)
+    period = 1 / path.drawing_frequency
+    recorded = timed_path(lambda t: path.at_phase(t / period % 1), period)
+    field, probes = quantity_field(asked, SKIN, 0.7e-3), [[0.004, 0.0], [0.012, 0.003]]
+    one, other = (
+        from_rest(
+            field, asked, MovingPressure(tacton=Tacton(duration=0.02, trajectory=each)), probes,
+            np.arange(100) / 5000,
+        )
+        for each in (path, recorded)
+    )  # fmt: skip
+    assert np.abs(one - other).max() < 2e-3 * np.abs(one).max()
 
 
 def test_a_depth_outside_the_stack_is_refused():
