@@ -43,7 +43,7 @@ def viscoelastic(
     K, M = stiffness(np.ones(len(materials))), mass(rho)
 
     def portion(share: Floats) -> sparse.csr_array:
-        """The same, which is a multiple of K if all materials have one share."""
+        """Stiffness of shares, a multiple of K if all materials have one share."""
         if not np.ptp(share):
             return share[0] * K if share[0] else sparse.csr_array(K.shape)
         summed = stiffness(share)

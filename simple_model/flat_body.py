@@ -292,10 +292,10 @@ def _recorded(
             for q, x in zip(gains, away, strict=True)
         )
 
-    weighted = field.weights(ANYWHERE).any(axis=-1)  # not where x, y or x^2 - y^2 is 0
-    u = np.zeros((len(w), len(probes), len(weighted)), np.complex128)
+    weights = field.weights(ANYWHERE)  # not where x, y or x^2 - y^2 is 0
+    u = np.zeros((len(w), len(probes), len(weights)), np.complex128)
     for i, probe in enumerate(probes):
-        for component, integral in np.argwhere(weighted):
+        for component, integral in np.argwhere(weights.any(axis=-1)):
             loaded = partial(load, probe=probe, component=component, integral=integral)
             u[:, i, component] += (g[integral] * transform(loaded, w, dt, parts)).sum(axis=1)
     return u

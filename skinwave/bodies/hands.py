@@ -1,6 +1,6 @@
 """Elastic support and layers of hands: what a parametric palm and a body in a file share."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from fem.load_and_probe import facet_geometry
 from meshes import TetMesh, boundary_facets, corner_volumes
 from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
-from skinwave.bodies.coat import coarsest_size
+from skinwave.bodies.coat import coarsest_size, coat, meshed_strata
+from skinwave.bodies.discretised import Discretised, in_layers
 
 HAND_CELL = 5e-3  # m: within 1.2 % of elements of 3 mm at every probe, at a third of the cost
 FINE_PALM = 2e-3  # m: elements of a palm with thin layers, 300,000 dofs; finer ones on request only
@@ -24,6 +25,26 @@ STIFFEST = 1e6
 def hand_size(body: Body) -> float:
     """Default element size of a hand, metre, whatever its depth."""
     return min(HAND_CELL, max(coarsest_size(body), FINE_PALM))
+
+
+def in_its_layers(
+    body: Body, h: float, mesh: TetMesh, rest: Callable[[TetMesh], fem.Support]
+) -> Discretised:
+    """Hand in its layers, those that its elements do not resolve as a coat.
+
+    Parameters
+    ----------
+    body : Body
+    h : metre, size of its elements
+    mesh : with its facets
+    rest : the support of a mesh
+
+    Returns
+    -------
+    Discretised
+    """
+    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
+    return Discretised(mesh=mesh, materials=materials, coat=coat(body, h), support=rest)
 
 
 def support(

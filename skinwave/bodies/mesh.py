@@ -10,9 +10,8 @@ from meshes import MeshError, TetMesh, body_from_file, boundary_facets, quadrati
 from meshes.facets import seen_from_above
 from meshes.tetmesh import Ints
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.coat import coat, meshed_strata
-from skinwave.bodies.discretised import Discretised, in_layers
-from skinwave.bodies.hands import depths, hand_size, support
+from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.hands import hand_size, in_its_layers, support
 
 NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
 
@@ -35,13 +34,7 @@ def discretise(body: Body, h: float) -> Discretised:
     if not _is_rest(mesh):
         facets["bottom"] = mesh.facets["bottom"]
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets=facets)
-    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
-    return Discretised(
-        mesh=mesh,
-        materials=materials,
-        coat=coat(body, h),
-        support=lambda mesh: _support(body, mesh),
-    )
+    return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
 
 
 def _support(body: Body, mesh: TetMesh) -> fem.Support:

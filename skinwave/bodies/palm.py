@@ -12,9 +12,8 @@ from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.coat import coat, meshed_strata
-from skinwave.bodies.discretised import Discretised, in_layers
-from skinwave.bodies.hands import depths, hand_size, support
+from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.hands import hand_size, in_its_layers, support
 
 COARSEST = 2.0  # elements far from the middle, over those of h
 RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
@@ -37,13 +36,7 @@ def discretise(body: Body, h: float) -> Discretised:
     coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
     mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
-    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
-    return Discretised(
-        mesh=mesh,
-        materials=materials,
-        coat=coat(body, h),
-        support=lambda mesh: _support(body, mesh),
-    )
+    return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
 
 
 def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
