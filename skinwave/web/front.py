@@ -48,6 +48,7 @@ class Front:
         self.turns = Turns()
         self._folder = ""  # of temporary files
         self._spare: asyncio.Task[PageProcess] | None = None
+        self._opening: set[asyncio.Task[PageProcess]] = set()
         self._unclaimed: dict[str, PageProcess] = {}
         self._there: dict[PageProcess, asyncio.Task[None]] = {}  # until each has ended
         self._ending = False
@@ -81,19 +82,21 @@ class Front:
             query = asked(await request.text())
         except (ValueError, RecursionError, LookupError, web.HTTPRequestEntityTooLarge):
             return _refused(UNREAD, 400)
-        if said := self.turns.wait(name := _name(request)):
+        if said := UNSTARTED if self._ending else self.turns.wait(name := _name(request)):
             return _refused(said, 503)
         self.turns.begin(name)
         page = None
+        opening = asyncio.create_task(self._opened({"scene": self.scene, "query": query}))
+        self._opening.add(opening)
         try:
-            page = await self._begun({"scene": self.scene, "query": query})
+            page = await opening
         except FAILURES:
             return _refused(UNSTARTED, 503)
         finally:
+            self._opening.discard(opening)
             self.turns.opening -= 1
             if page is None:
                 self.turns.there -= 1
-        self._there[page] = asyncio.create_task(self._until_gone(page))
         self._unclaimed[session := uuid.uuid4().hex] = page
         asyncio.get_running_loop().call_later(PATIENCE, self._forget, session)
         return web.json_response(
@@ -122,6 +125,12 @@ class Front:
             kill(behind.process)
             if page.prepared:
                 await page.close()
+        return page
+
+    async def _opened(self, asked: dict[str, Any]) -> PageProcess:
+        """A process that shows what is asked, and is waited for from now on."""
+        page = await self._begun(asked)
+        self._there[page] = asyncio.create_task(self._until_gone(page))
         return page
 
     async def _begun(self, asked: dict[str, Any]) -> PageProcess:
@@ -156,6 +165,9 @@ class Front:
     async def _end(self, _: web.Application) -> None:
         """End all processes; pages that talk to them are closed with that."""
         self._ending = True
+        for opening in self._opening:
+            opening.cancel()
+        await asyncio.gather(*self._opening, return_exceptions=True)
         ends = list(self._there.values())
         for page in self._there:
             kill(page.process)

@@ -43,15 +43,19 @@ async def started(folder: str) -> PageProcess:
         If it does not start, or says something else than its port and password.
     """
     own = tempfile.mkdtemp(dir=folder)
-    process = relay = None
-    try:
-        # In a session of its own: Ctrl-C in a terminal is for the server alone, which ends it.
-        process = await asyncio.create_subprocess_exec(
+    # In a session of its own: Ctrl-C in a terminal is for the server alone, which ends it. In a
+    # task of its own: asyncio leaves the pipes of a process open that it was cancelled in starting.
+    starting = asyncio.create_task(
+        asyncio.create_subprocess_exec(
             *COMMAND, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
             env={**RETURNED, **os.environ, **SAFE_PATH, "WSLINK_READY_MSG": "",
                  **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), own)},
-        )  # fmt: skip
+        )
+    )  # fmt: skip
+    relay = None
+    try:
+        process = await asyncio.shield(starting)
         assert process.stdout is not None
         relay = asyncio.create_task(_relayed(process))
         line = await asyncio.wait_for(process.stdout.readline(), PATIENCE)
@@ -60,8 +64,8 @@ async def started(folder: str) -> PageProcess:
             process=process, port=int(port), password=password, folder=own, relay=relay
         )
     except BaseException:
-        if process is not None:
-            kill(process)
+        with contextlib.suppress(OSError):
+            kill(process := await starting)
             await _ended(process)
         if relay is not None:
             relay.cancel()
