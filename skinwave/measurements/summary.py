@@ -23,7 +23,7 @@ def sentences(found: Inspection) -> list[str]:
 
 def _what(measured: Measurement) -> str:
     count, runs = len(measured.places), len(measured.values)
-    said = f"{measured.record.name} at {count} place{'s' * (count > 1)}"
+    said = f"{measured.record.name.capitalize()} at {count} place{'s' * (count > 1)}"
     said += f", {runs} repetition{'s' * (runs > 1)}"
     axis = measured.axis
     if measured.is_spectrum:
@@ -32,7 +32,7 @@ def _what(measured: Measurement) -> str:
         return f"{said}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz{apart}."
     lasts = len(axis) / measured.rate if len(axis) > 1 else 0.0
     return (
-        f"{said}: {len(axis):,} samples at {significant(measured.rate, 5)} Hz, "
+        f"{said}: {len(axis):,} samples at {measured.rate:,.6g} Hz, "
         f"{significant(lasts)} s, so that lines {significant(1 / lasts) if lasts else '-'} Hz "
         "apart are resolved."
     )

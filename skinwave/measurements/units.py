@@ -24,7 +24,7 @@ MOTION = {
         "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY,
     },
 }  # fmt: skip
-_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "\N{SUPERSCRIPT MINUS}": "-"})
+_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-"})
 _FACTOR = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(.*)", re.IGNORECASE)
 _LEVELS = re.compile(r"dB\w*(/.*)?", re.IGNORECASE)
 
@@ -103,4 +103,4 @@ def length(text: str, unit: str) -> float:
 def _split(unit: str) -> tuple[float, str]:
     """Factor and name of a unit such as "20 mm/s"; the factor is 1 if there is none."""
     found = _FACTOR.fullmatch(unit.strip().strip("[]()"))
-    return (float(found[1]), plain(found[2])) if found else (1.0, plain(unit))
+    return (float(found[1]), plain(found[2])) if found and found[2] else (1.0, plain(unit))
