@@ -131,6 +131,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "convert": ["small.toml", "out.csv"],
         "mesh": ["body.stl", "--h", "20", "--out", "body.vtu"],
         "doctor": [],
+        "measured": ["wave.csv", "--out", "measured"],
         "cache": [],
         "report": ["out", "--quiet"],
         "film": ["out", "--out", "film.gif"],

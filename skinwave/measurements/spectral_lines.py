@@ -76,8 +76,8 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
     runs, count, places = values.shape
     if count < 32:
         raise ValueError(f"{count} samples are too few for a spectrum; measure 32 or more")
-    x = detrend(np.moveaxis(values, 0, 1).reshape(count, runs * places), axis=0)
-    density = densities(x, runs, rate)
+    x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
+    density = densities(detrend(x, axis=0), runs, rate)
     floor, bin_ = floor_of(density, runs), rate / count
     fit, chance = NONE, np.empty(0)
     for _ in range(PASSES):
@@ -88,7 +88,8 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
             break
         start, chance = np.append(fit.frequencies, new * bin_), np.append(chance, surely)
         fit = fitted(x, start, rate, _at(floor, start / bin_, runs), len(new))
-        if len(start) >= MOST:
+        fit, chance = _pruned(x, fit, chance, rate, floor, runs, alarm)
+        if len(chance) >= MOST:
             break
     return LineSpectrum(
         lines=_lines(fit, chance, runs),
@@ -148,6 +149,30 @@ def _side_lobe(bins: int) -> float:
     return 1.0 if bins < 2 else LEAK / (np.pi * bins * (bins**2 - 1)) ** 2
 
 
+def _pruned(
+    x: Floats, fit: LineFit, chance: Floats, rate: float, floor: Floats, runs: int, alarm: float
+) -> tuple[LineFit, Floats]:
+    """The lines that still rise above the noise beside all others, fitted without the rest.
+
+    What a fit of one line leaves before its neighbour is known may look like a line.
+    """
+    if not len(chance):
+        return fit, chance
+    count, places = len(x), floor.shape[1]
+    bins = np.clip(np.round(fit.frequencies * count / rate), 1, len(floor) - 1).astype(int)
+    squared = np.abs(fit.amplitudes.reshape(len(chance), runs, places)) ** 2
+    ratio = np.ones(floor.shape)
+    ratio[bins] = squared.mean(axis=1) * count / (2 * rate) / floor[bins]
+    tests = floor[LOWEST:-1].size
+    sure = tests * tail(ratio, runs, len(floor))[bins].min(axis=1) < alarm
+    if sure.all():
+        return fit, chance
+    if not sure.any():
+        return NONE, np.empty(0)
+    start = fit.frequencies[sure]
+    return fitted(x, start, rate, _at(floor, start * count / rate, runs)), chance[sure]
+
+
 def _at(floor: Floats, positions: Floats, runs: int) -> Floats:
     """Noise (l, r p) at bins, the same for all repetitions of a place."""
     bins = np.clip(np.round(positions), 1, len(floor) - 1).astype(int)
@@ -156,6 +181,8 @@ def _at(floor: Floats, positions: Floats, runs: int) -> Floats:
 
 def _lines(fit: LineFit, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
     """Lines by frequency."""
+    if not len(chance):
+        return ()
     squared = np.abs(fit.amplitudes.reshape(len(fit.frequencies), runs, -1)) ** 2
     return tuple(
         SpectralLine(
