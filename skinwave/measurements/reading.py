@@ -89,7 +89,7 @@ def read(
 
 
 def reader_of(path: Path) -> Reader:
-    """What reads a file of such a name; raises a ValueError if nothing does."""
+    """Reader of a file of such a name; raises a ValueError if nothing does."""
     for reader in READERS:
         if path.suffix.lower() in reader.suffixes:
             return reader

@@ -16,7 +16,7 @@ EXAMPLE = "--quantity velocity --unit mm/s"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Given:
-    """What the user says of a file: each replaces what the file says, None or "" leaves it.
+    """Options of a user: each replaces what the file says, None or "" leaves it.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Given:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """What a file holds.
+    """Content of a file.
 
     Parameters
     ----------

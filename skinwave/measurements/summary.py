@@ -17,7 +17,7 @@ MOST_NAMED = 5
 
 
 def sentences(found: Inspection) -> list[str]:
-    """What the measurement is, its noise and clipping, a sentence each."""
+    """Sentences on what was measured, on noise and clipping."""
     return [_what(found.measured), *_noise(found), _clipping(found), *_constant(found)]
 
 

@@ -44,7 +44,7 @@ def quantity_of(unit: str) -> str:
 
 
 def per_unit(unit: str, kind: str) -> float:
-    """What 1 in SI is in a unit of a quantity; of "20 mm/s", what 1 in a file is, 1/0.02.
+    """Divisor of a unit of a quantity: values over it are in SI; of "20 mm/s" it is 50.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def in_si(values: np.ndarray, per: float) -> np.ndarray:
 
 
 def scale(unit: str, units: dict[str, float], what: str) -> float:
-    """What 1 in SI is in a unit of times, frequencies or lengths.
+    """Divisor of a unit of times, frequencies or lengths.
 
     Raises
     ------
