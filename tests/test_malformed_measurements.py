@@ -131,7 +131,7 @@ BINARIES = {
         "a.wav", lambda d: wav(np.zeros(9, np.int16), d), [], "give --quantity velocity --unit mm/s"
     ),
     "wav of nan": (
-        "a.wav", lambda d: wav(np.full(9, np.nan, np.float32), d), ["--unit", "m/s"], "be finite"
+        "a.wav", lambda d: wav(np.full(9, np.nan, np.float32), d), ["--unit", "m/s"], "nan and inf"
     ),
     "wav of one sample": (
         "a.wav", lambda d: wav(np.zeros(1, np.int16), d), ["--unit", "m/s"], "has 1 samples"

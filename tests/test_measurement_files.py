@@ -41,6 +41,30 @@ def test_columns_without_a_header_and_white_space(tmp_path):
     assert_same_motion(found, MM_S[:1])
 
 
+TWO = [[[0.0015, 0.002], [0.003, 0.004]]]  # m/s
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t [s] v(0,0) [mm/s] v(5,0) [mm/s]\n0 1.5 2\n0.5 3 4\n",
+        "Time (s);Left (mm/s);Right (mm/s)\n0,0;1,5;2\n0,5;3;4\n",
+        "time,left,right\nms,mm/s,mm/s\n0,1.5,2\n500,3,4\n",
+        "Source File:\ta.pvd\nSignal:\tVelocity\n\nTime\tA\tB\n[ s ]\t[ mm/s ]\t[ mm/s ]\n"
+        "0\t1.5\t2\n0.5\t3\t4\n",
+        '# note\n"t [s]","v(0,0) [m/s]","v(5,0) [m/s]"\n"0","0.0015","0.002"\n0.5,0.003,"0.004"\n',
+        "t_ms,velocity_mm_s,velocity_mm_s\n0,1.5,2\n500,3,4\n",
+        "t [s],x [mm],y [mm],v [mm/s]\n0,0,0,1.5\n0.5,0,0,3\n0.5,5,0,4\n0,5,0,2\n",
+    ],
+)
+def test_headers_of_many_programs(tmp_path, text):
+    (tmp_path / "a.txt").write_text(text)
+    found = read(tmp_path / "a.txt")
+    assert found.quantity == "velocity"
+    assert found.values.tolist() == TWO
+    assert found.times.tolist() == [0, 0.5]
+
+
 @pytest.mark.parametrize("binary", [0, 1])
 def test_universal_file_of_waveforms(tmp_path, binary):
     path = tmp_path / "a.uff"
@@ -199,7 +223,17 @@ def test_units_of_motion():
             per_unit(unit, "velocity")
 
 
-def test_places_are_pairs_in_millimetre():
+def test_places_are_pairs_in_millimetre(tmp_path):
+    for text in (
+        "x [mm],y [mm]\n0,0\n5,-2.5\n",
+        "0 0\n5 -2.5\n",
+        "x_m,y_m,z_m\n0,0,1\n0.005,-0.0025,1",
+    ):
+        (tmp_path / "a.csv").write_text(text)
+        assert np.array_equal(places_of(str(tmp_path / "a.csv")), [[0, 0], [0.005, -0.0025]])
+    (tmp_path / "a.csv").write_text("x [mm],z [mm]\n0,0\n")
+    with pytest.raises(ValueError, match="needs the columns x \\[mm\\], y \\[mm\\]"):
+        places_of(str(tmp_path / "a.csv"))
     assert np.array_equal(places_of("0,0 (5,-2.5)"), [[0, 0], [0.005, -0.0025]])
     for wrong in ("", "5", "a,b", "1,2,3", "nan,0"):
         with pytest.raises(ValueError, match="mm"):

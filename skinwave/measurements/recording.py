@@ -11,6 +11,7 @@ from simple_model.trajectory import Floats
 from skinwave.measurements import units
 from skinwave.measurements.measurement import Measurement
 
+LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
 EXAMPLE = "--quantity velocity --unit mm/s"
 
 
@@ -90,6 +91,10 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
     quantity, unit = _quantity(found, given)
     sign, said = _sign(found, given)
     values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
+    if values.size and not np.abs(values).max() < LARGEST:
+        raise ValueError(
+            f"values reach {np.abs(values).max():g} in SI; leave out nan and inf, and check --unit"
+        )
     times = _times(found, given)
     places, placed = _places(found, given)
     return Measurement(
