@@ -83,6 +83,17 @@ def test_weak_lines_beside_strong_ones_are_not_side_lobes():
     assert [line.amplitudes[0] for line in found] == pytest.approx(a, rel=0.01)
 
 
+def test_errors_are_larger_beside_what_is_no_steady_line():
+    """A decaying line, whose skirts disturb the fit of another far more than the noise does."""
+    rng = np.random.default_rng(10)
+    x = 6 * np.sin(2 * np.pi * 200 * T) * np.exp(-3 * T) + np.sin(2 * np.pi * 60 * T)
+    found = spectral_lines((x + 1e-3 * rng.normal(size=len(T)))[None, :, None], RATE).lines
+    assert len(found) == 2
+    bound = np.sqrt(3 * 1e-6 * 2 / RATE / np.pi**2)
+    assert 10 * bound < found[0].error < 0.02
+    assert abs(found[0].frequency - 60) < 3 * found[0].error
+
+
 def lines(*frequencies):
     return [SpectralLine(frequency=f, error=2e-3, amplitudes=np.ones(1), false_alarm=0.0)
             for f in frequencies]  # fmt: skip

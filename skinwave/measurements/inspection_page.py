@@ -59,7 +59,7 @@ def write(folder: Path, found: Inspection) -> None:
         document.picture(drawn, caption, "measured"),
         document.section("Lines", *lines),
         document.section(
-            "What is missing", *map(document.paragraph, found.missing or ["Nothing."])
+            "Missing or assumed", *map(document.paragraph, found.missing or ["Nothing."])
         ),
     ]
     title = f"{measured.name}: what was measured"

@@ -92,16 +92,18 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
         if len(chance) >= MOST:
             break
     return LineSpectrum(
-        lines=_lines(fit, chance, runs),
+        lines=_lines(fit, _errors(fit, rate, floor, runs), chance, runs),
         frequencies=np.arange(len(density)) * bin_,
         density=density,
         floor=floor,
     )
 
 
-def densities(x: Floats, runs: int, rate: float) -> Floats:
-    """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions."""
-    window = hann(len(x), sym=False)[:, None]
+def densities(x: Floats, runs: int, rate: float, window: Floats | None = None) -> Floats:
+    """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions, with a window
+    (t, 1), that of Hann if none is given.
+    """
+    window = hann(len(x), sym=False)[:, None] if window is None else window
     spectra = np.abs(np.fft.rfft(x * window, axis=0)) ** 2
     density = 2 * spectra / (rate * np.sum(window**2))
     return density.reshape(len(density), runs, -1).mean(axis=1)
@@ -179,7 +181,21 @@ def _at(floor: Floats, positions: Floats, runs: int) -> Floats:
     return np.tile(floor[bins], (1, runs))
 
 
-def _lines(fit: LineFit, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
+def _errors(fit: LineFit, rate: float, floor: Floats, runs: int) -> Floats:
+    """Standard errors in Hz in the noise that least squares meet: what is left without a window,
+    where transients and drifting lines leave more than with one.
+    """
+    if not len(fit.frequencies):
+        return fit.errors
+    bins = fit.frequencies * len(fit.rest) / rate
+    bare = floor_of(densities(fit.rest, runs, rate, np.ones((len(fit.rest), 1))), runs)
+    noise = _at(floor, bins, runs)
+    weight = np.abs(fit.amplitudes) ** 2 / noise
+    excess = np.sum(weight * _at(bare, bins, runs) / noise, axis=1) / np.sum(weight, axis=1)
+    return fit.errors * np.sqrt(np.maximum(excess, 1.0))
+
+
+def _lines(fit: LineFit, errors: Floats, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
     """Lines by frequency."""
     if not len(chance):
         return ()
@@ -187,7 +203,7 @@ def _lines(fit: LineFit, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
     return tuple(
         SpectralLine(
             frequency=float(fit.frequencies[k]),
-            error=float(fit.errors[k]),
+            error=float(errors[k]),
             amplitudes=np.sqrt(squared[k].mean(axis=0)),
             false_alarm=float(chance[k]),
         )

@@ -28,7 +28,8 @@ def _what(measured: Measurement) -> str:
     axis = measured.axis
     if measured.is_spectrum:
         step = np.diff(axis)
-        apart = f" in steps of {significant(step.mean())} Hz" if len(step) else ""
+        even = len(step) and np.ptp(step) < 1e-3 * step.mean()
+        apart = f" in steps of {significant(step.mean())} Hz" if even else ""
         return f"{said}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz{apart}."
     lasts = len(axis) / measured.rate if len(axis) > 1 else 0.0
     return (
@@ -121,7 +122,7 @@ def text(found: Inspection) -> str:
         said += ["", *("  ".join(row).rstrip() for row in padded), ""]
     elif found.spectrum is not None:
         said.append("No line rises above the noise floor.")
-    return "\n".join([*said, *(f"missing: {sentence}" for sentence in found.missing)])
+    return "\n".join([*said, *(f"note: {sentence}" for sentence in found.missing)])
 
 
 def summary(found: Inspection) -> dict[str, Any]:
