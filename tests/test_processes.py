@@ -141,6 +141,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "map": ["small.toml", "--step", "10", "--quiet"],
         "tradeoff": ["small.toml", "--quiet"],
         "verify": ["--quick", "--quiet"],
+        "validate": ["--quiet"],
     }  # fmt: skip
     assert set(COMMANDS) == {*asked, "web"}  # which has a test of its own
     for name, arguments in asked.items():

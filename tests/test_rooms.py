@@ -27,6 +27,7 @@ INNER = {
     "measurements": {"bodies", "models", "planning", "pictures"},
     "pictures": {"bodies", "models", "planning"},
     "verify": {"bodies", "models", "planning", "pictures"},
+    "validate": {"bodies", "models", "planning", "pictures", "measurements"},
     "uncertainty": {"bodies", "models", "planning", "pictures", "sweeps"},
     "studies": {"bodies", "models", "planning", "pictures", "measurements"},
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},

@@ -21,6 +21,7 @@ from skinwave.commands import (
     same,
     sweep,
     tradeoff,
+    validate,
     verify,
     web,
 )
@@ -29,6 +30,6 @@ from skinwave.commands import map as map_command
 MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
     verify, report, film, web, rerun, same, doctor, cache,
-    measured,
+    measured, validate,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

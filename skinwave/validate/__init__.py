@@ -1,1 +1,1 @@
-"""Models beside published measurements: what each source found, what a model predicts, how far apart."""
+"""Models beside published measurements: what sources found, what is predicted, how far apart."""

@@ -63,7 +63,11 @@ class Compared:
             said = _inside(self.published)
         else:
             of = "spread" if self.published.has_spread else "value, of which no spread is published"
-            by = f"by a factor of {significant(self.miss, 2)}" if self.miss < inf else "without bound"
+            by = (
+                f"by a factor of {significant(self.miss, 2)}"
+                if self.miss < inf
+                else "without bound"
+            )
             said = f"{self.outcome} the published {of}, {by}"
         return f"{said}; the preset was made from it" if self.is_built else said
 

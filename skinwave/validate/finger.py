@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import fem
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import MovingPressure, Tacton
 from simple_model.trajectory import Floats
 from skinwave.bodies import Body
 from skinwave.bodies.build import Build, build, operators
@@ -21,6 +21,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 UP = "-x"  # of the example, its palm
 SIZE = 6e-3  # m, of elements
 FREQUENCIES = (200.0, 300.0, 400.0)  # Hz
+FINGER_LENGTH = 0.070  # m
 LOADED = 0.010  # m from the tip, where the focus is
 PLACES = np.arange(0.020, 0.171, 0.010)  # m from the tip, those of SkinSource's sensors
 TIP = 8  # of SkinSource's locations, force normal to the skin at the tip of digit III
@@ -32,7 +33,8 @@ PEOPLE = (1, 2, 3, 4)
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Decay:
     """Amplitude (f, p) of the normal motion over the largest, at frequencies (f,) in Hz and
-    distances (p,) in m from the finger's tip, of a hand or person by `name`.
+    distances (p,) in m from the finger's tip, of a hand or person by `name`; of a hand the
+    mean edge of the finger's elements in m, and its dofs.
     """
 
     name: str
@@ -40,12 +42,28 @@ class Decay:
     distances: Floats
     amplitudes: Floats
     dofs: int = 0
+    edge: float = 0.0
 
     @property
     def lengths(self) -> Floats:
         """1/e lengths (f,) in m, fitted to the logarithm; above 0 where it decays."""
         slopes = np.polyfit(self.distances, np.log(self.amplitudes).T, 1)[0]
         return np.asarray(-1 / slopes)
+
+
+def check_hand(file: Path) -> None:
+    """Refuse a hand that is not there, before any work.
+
+    Raises
+    ------
+    ValueError
+        If it is so.
+    """
+    if not file.is_file():
+        raise ValueError(
+            f"{file} is not there, and the example hand is in the repository only; give a file of "
+            "a hand, --hand FILE, or leave it out"
+        )
 
 
 def of_hand(file: Path, report: Progress, frequencies: tuple[float, ...] = FREQUENCIES) -> Decay:
@@ -64,32 +82,29 @@ def of_hand(file: Path, report: Progress, frequencies: tuple[float, ...] = FREQU
     Raises
     ------
     ValueError
-        If there is no such file, or it is no body.
+        If it is no body.
     """
-    if not file.is_file():
-        raise ValueError(
-            f"{file} is not there, and the example hand is in the repository only; give a file of a "
-            "hand, --hand FILE, or leave it out"
-        )
     report("mesh the hand", 0.0)
     body = Body(kind="mesh", file=str(file), up=UP)
     made = build(body, SIZE)
     tip = _tip(made)
     inwards = -tip / np.linalg.norm(tip)
-    distances = PLACES[PLACES < np.linalg.norm(tip) + 0.04]
+    distances = PLACES[np.linalg.norm(tip) + 0.04 > PLACES]
     report("assemble", 0.1)
     matrices = operators(made)
     P, points = surface_load(made)
-    spot = Trajectory(centre=tuple(tip + LOADED * inwards))
-    load = MovingPressure(tacton=Tacton(trajectory=spot), peak_pressure=1.0)
+    load = MovingPressure(tacton=Tacton(), peak_pressure=1.0)(
+        points - [*(tip + LOADED * inwards), 0.0], 0.0
+    )
     S = surface_motion(body, made, tip + distances[:, None] * inwards)
     found = []
     for k, f in enumerate(frequencies):
         report(f"solve {f:g} Hz", 0.2 + 0.8 * k / len(frequencies))
-        found.append(np.abs(S @ fem.harmonic(matrices, P @ load(points, 0.0), [f])[0]))
+        found.append(np.abs(S @ fem.harmonic(matrices, P @ load, [f])[0]))
     return Decay(
         name="the hand, finite elements", frequencies=np.array(frequencies), distances=distances,
         amplitudes=_relative(np.array(found)), dofs=len(matrices.free),
+        edge=_edge(made, tip),
     )  # fmt: skip
 
 
@@ -101,6 +116,16 @@ def _tip(made: Build) -> Floats:
     axis = np.linalg.svd(seen - seen.mean(axis=0), full_matrices=False)[2][0]
     along = seen @ axis
     return seen[np.argmax(along if along.max() > -along.min() else -along)]
+
+
+def _edge(made: Build, tip: Floats) -> float:
+    """Mean edge in m of the elements between the tip and the knuckle."""
+    corners = made.mesh.points[made.mesh.tets[:, :4]]
+    towards = tip / np.linalg.norm(tip)
+    along = corners.mean(axis=1)[:, :2] @ towards
+    own = corners[along > np.linalg.norm(tip) - FINGER_LENGTH]
+    first, second = np.triu_indices(4, 1)
+    return float(np.linalg.norm(own[:, first] - own[:, second], axis=2).mean())
 
 
 def of_skinsource(folder: Path, sensors: tuple[int, ...] = SENSORS) -> list[Decay]:

@@ -50,7 +50,7 @@ def sweep(body: Body, perimeter: float) -> Sweep:
 
 
 def _deflection(body: Body, perimeter: float, speed: float) -> Floats:
-    """Deflection (t,) in m/Pa of a point of the path over a turn, constant pressure at the focus."""
+    """Deflection (t,) in m/Pa of a point of the path over a turn at a constant pressure."""
     circle = Trajectory(shape="circle", size=perimeter / np.pi, speed=speed)
     turn = 1 / circle.drawing_frequency
     pressure = MovingPressure(tacton=Tacton(trajectory=circle), peak_pressure=1.0)
@@ -60,7 +60,7 @@ def _deflection(body: Body, perimeter: float, speed: float) -> Floats:
 
 
 def top(x: Floats, y: Floats) -> float:
-    """Where the parabola through the three highest neighbouring points is highest; nan at an end."""
+    """Top of the parabola through the highest point and its neighbours; nan at an end."""
     k = int(np.argmax(y))
     if not 0 < k < len(x) - 1:
         return float("nan")
@@ -84,7 +84,10 @@ def compare_sweeps(sweeps: Mapping[str, tuple[Sweep, ...]]) -> list[Compared]:
     for name, of_body in sweeps.items():
         for each in of_body:
             size = f"{1e3 * each.perimeter:g} mm around"
-            for what, optimum in (("", each.optimum), (" peak to peak", each.optimum_peak_to_peak)):
-                here = replace(OPTIMUM, name=f"{OPTIMUM.name}{what}, {size}")
+            for what, optimum in (
+                ("largest", each.optimum),
+                ("peak to peak", each.optimum_peak_to_peak),
+            ):
+                here = replace(OPTIMUM, name=f"{OPTIMUM.name}, {what}, {size}")
                 rows += compared(here, name, [optimum])
     return rows

@@ -7,6 +7,7 @@ preset but where `built` says so: there agreement is no evidence.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -95,11 +96,17 @@ def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[f
     return float(w / k.real), float(1 / abs(k.imag))
 
 
+def _length(frequency: float, modulus: float, viscosity: float) -> float:
+    return rayleigh_wave(modulus, viscosity, frequency)[1]
+
+
 def spread_of(
     of: Callable[[float, float], float], first: tuple[float, float], second: tuple[float, float]
 ) -> tuple[float, float]:
     """Lowest and highest value of a function of two numbers, each mean +- standard deviation."""
-    found = [of(first[0] + a * first[1], second[0] + b * second[1]) for a in (-1, 1) for b in (-1, 1)]
+    found = [
+        of(first[0] + a * first[1], second[0] + b * second[1]) for a in (-1, 1) for b in (-1, 1)
+    ]
     return min(found), max(found)
 
 
@@ -107,12 +114,10 @@ _GRID = (0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0)
 _HANDS = ("palm", "palm-stiff", "palm-layers")
 _ARMS = ("forearm", "forearm-layers")
 _BACK = (
-    "No preset is of the back of a hand: it is hairy skin on bone and tendons, and is compared with "
-    "the forearm's and the palm's"
+    "No preset is of the back of a hand: it is hairy skin on bone and tendons, and is compared "
+    "with the forearm's and the palm's"
 )
-_DIGITISED = (
-    f"digitised in {MODAL_HAND}, waveAdmittance.m, where the last value, at 700 Hz, is kept above it"
-)
+_DIGITISED = f"digitised in {MODAL_HAND}, waveAdmittance.m, which keeps its value at 700 Hz above"
 _POTTS = Published(
     name="Potts: speed", site="back of the hand", quantity=SPEED, frequencies=_GRID,
     values=(6, 8, 9, 9, 10, 11, 11, 8), conditions="shear wave in vivo",
@@ -128,7 +133,7 @@ _FINGER = Published(
 )  # fmt: skip
 _PLATEAU = Published(
     name="Manfredi: speed, abstract", site="finger", quantity=SPEED, frequencies=(300.0,),
-    values=(7,), conditions="plateau of the speed; the abstract names no frequency, 300 Hz is taken",
+    values=(7,), conditions="plateau of the speed; at 300 Hz, as the abstract names no frequency",
     source=MANFREDI, how=ABSTRACT, bodies=_HANDS, built=("palm-stiff",),
     remark="Contradicts the values digitised from the same paper, which fall from 18 to 5 m/s",
 )  # fmt: skip
@@ -157,23 +162,23 @@ _MANFREDI_EXPONENT = replace(
     values=(1.15, 1.1, 1.15, 1.25, 1.15, 1.2, 1.25),
     conditions="amplitude ~ distance^-n; ours is fitted from 10 to 40 mm of a focal spot, which is "
     "assumed",
-    remark="The file has no distances, and a wave with loss follows no power law: n depends on where "
-    "it is fitted",
+    remark="The file has no distances, and a wave with loss follows no power law: n depends on "
+    "where it is fitted",
 )  # fmt: skip
 SKINSOURCE = Published(
     name="SkinSource: 1/e length", site="finger to wrist", quantity=LENGTH,
     frequencies=(50.0, 100.0, 200.0, 300.0, 400.0), values=(np.nan,) * 5,
     lows=tuple(1e-3 * x for x in (49, 47, 42, 35, 34)),
     highs=tuple(1e-3 * x for x in (105, 83, 81, 52, 49)),
-    conditions="normal acceleration along the dorsal line away from the tip of digit III, force of a "
-    "shaker there; four people",
+    conditions="normal acceleration along the dorsal line away from the tip of digit III, force of "
+    "a shaker there; four people",
     source="Tummala et al. (2024), doi 10.1109/HAPTICS59260.2024.10520852, data by doi "
     "10.5281/zenodo.10547601", how=COMPUTED, bodies=_HANDS,
     remark="Below 200 Hz the amplitude is not monotone, the finger moves as a linkage; our bodies "
     "have no joints and no dorsal side, and their length is that of a plane wave",
 )  # fmt: skip
 OPTIMUM = Published(
-    name="Frier: focus of the largest deflection", site="palm", quantity=FOCUS_SPEED,
+    name="Frier: optimum", site="palm", quantity=FOCUS_SPEED,
     frequencies=(np.nan,), values=(np.nan,), lows=(5.0,), highs=(8.0,),
     conditions="circling focus, vibrometer and user study: the optimum is a speed, that of surface "
     "waves", source="Frier et al., EuroHaptics 2018, doi 10.1007/978-3-319-93445-7_24",
@@ -187,7 +192,7 @@ def voigt_lengths() -> Published:
     """1/e lengths that Zhang's constants give, with the spread of the two."""
     found = [
         (rayleigh_wave(_MODULUS[0], _VISCOSITY[0], f)[1],
-         *spread_of(lambda mu, eta, f=f: rayleigh_wave(mu, eta, f)[1], _MODULUS, _VISCOSITY))
+         *spread_of(partial(_length, f), _MODULUS, _VISCOSITY))
         for f in _VOIGT_AT
     ]  # fmt: skip
     values, lows, highs = (tuple(column) for column in zip(*found, strict=True))
@@ -212,18 +217,20 @@ NOT_COMPARED = (
      "the abstract names no frequency, and no preset is of pigs"),
     ("Feng et al. (2022), forearm, Young's moduli 4 MPa, 40 kPa, 15 kPa",
      "moduli of layers by broadband Rayleigh waves",
-     "the layers of forearm-layers are these; the speeds that they were fitted to were not readable"),
+     "forearm-layers has these moduli; the speeds that they were fitted to were not readable"),
     ("Aglyamov et al. (2015), PMC4472317", "motion of a two-layer gel under radiation pressure",
      "its figures were not readable, and the gel was probably under liquid"),
     ("Shah et al. (2019), Appl. Sci. 9:4329",
      "a motor on the forearm, detected at 40 mm above 150 Hz, below thresholds beyond 80 mm",
      "a motor in contact loads the skin; its force is not known"),
-    ("Pitre et al. (2019), PMC7043857", "surface motion faster than the shear wave beside the source",
+    ("Pitre et al. (2019), PMC7043857",
+     "surface motion faster than the shear wave beside the source",
      "no number was readable"),
     ("dusting28/Project_ModalHand", "whole hand below 100 to 200 Hz: jointed rigid parts and waves",
      "every body here rests on a support, and none has joints: it cannot show this"),
-    ("Dandu et al., in ShearWaveDecay.m of the same", "distance of half the energy, 89 to 24 mm from "
-     "40 to 640 Hz", "which energy, and within which part of the hand, the file does not say"),
+    ("Dandu et al., in ShearWaveDecay.m of the same",
+     "distance of half the energy, 89 to 24 mm from 40 to 640 Hz",
+     "which energy, and within which part of the hand, the file does not say"),
     ("Reardon et al. (2023), doi 10.1126/sciadv.adf2037",
      "shear shock patterns that extend more than ten times as far as the focus",
      "how extent was defined was not readable; see the zigzag below"),
@@ -236,18 +243,22 @@ def at(published: Published, frequency: float) -> tuple[float, float] | None:
     return published.between(int(known[0])) if len(known) else None
 
 
+ALL = "All sources"  # begins the name of a set of them
+
+
 def all_sources(quantity: Quantity) -> Published:
     """Lowest and highest value of all sources of a quantity, whatever the site, as one set."""
     f = np.array(_GRID[1:])
     lows, highs = between_sources(quantity, f)
     return Published(
-        name=f"All sources: {quantity.name}", site="back of the hand, finger, forearm",
+        name=f"{ALL}: {quantity.name}", site="back of the hand, finger, forearm",
         quantity=quantity, frequencies=_GRID[1:], values=(np.nan,) * len(f),
         lows=tuple(lows.tolist()), highs=tuple(highs.tolist()),
         conditions="lowest to highest of the sources here that have the frequency, of all sites",
-        source="the sets of this page", how=COMPUTED, built=("forearm", "palm-stiff"),
+        source="the sets of this page", how=COMPUTED,
         bodies=("forearm", "palm", "palm-stiff", "skin-slab", "palm-layers", "forearm-layers"),
-        remark="Sites and methods differ, so that this is wider than people are at one site",
+        remark="Sites and methods differ, so that this is wider than people are at one site; the "
+        "two speeds that forearm and palm-stiff were made from are among them",
     )  # fmt: skip
 
 

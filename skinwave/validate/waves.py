@@ -1,10 +1,11 @@
-"""Speed, 1/e length and decay exponent of waves by frequency, of the presets that stand for skin."""
+"""Speed, 1/e length and decay exponent of waves by frequency, of presets that stand for skin."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simple_model.dispersion import Mode
 from simple_model.focus import NOMINAL_HEIGHT, lobe_width, spot_width
@@ -35,7 +36,7 @@ WORDS: Mapping[str, str] = {
     "palm": "half-space, Kelvin-Voigt, chosen for an optimum speed of the focus of 5 m/s",
     "palm-stiff": "half-space, Kelvin-Voigt, chosen for an optimum speed of 7 m/s",
     "skin-slab": "15 mm of palm on rigid bone",
-    "palm-layers": "epidermis, dermis, fat and muscle on rigid bone, 15 mm, moduli of fingertip models",
+    "palm-layers": "epidermis, dermis, fat, muscle on rigid bone, 15 mm; moduli of fingertips",
     "forearm-layers": "epidermis, dermis, hypodermis and muscle on rigid bone, 20 mm",
 }
 GRID = np.arange(10.0, 701.0, 10.0)  # Hz: fine enough for modes to be tracked
@@ -45,16 +46,17 @@ FITTED = (0.010, 0.040)  # m, between which an exponent is fitted
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """Leading wave of a body at frequencies (f,) in Hz: phase speed in m/s and 1/e length in m,
-    nan where no wave propagates.
+    """Leading wave of a body at frequencies (f,) in Hz: number of its mode, phase speed in m/s and
+    1/e length in m, nan where no wave propagates.
     """
 
     frequencies: Floats
+    mode: NDArray[np.int_]
     speed: Floats
     length: Floats
 
     def at(self, quantity: Quantity, frequencies: Floats) -> Floats:
-        """Values (n,) of speed or 1/e length; nan beyond the frequencies and where there is none."""
+        """Values (n,) of speed or 1/e length; nan beyond the frequencies and without a wave."""
         values = self.speed if quantity is SPEED else self.length
         return np.interp(frequencies, self.frequencies, values, left=np.nan, right=np.nan)
 
@@ -82,7 +84,8 @@ def leading_wave(body: Body) -> Curves:
         np.where(some, np.array(values)[first, np.arange(len(f))], np.nan)
         for values in ([m.phase_speed for m in modes], [m.decay_length for m in modes])
     )
-    return Curves(frequencies=np.where(f == AT_REST, 0.0, f), speed=speed, length=length)
+    f = np.where(f == AT_REST, 0.0, f)
+    return Curves(frequencies=f, mode=first, speed=speed, length=length)
 
 
 def _amplitude(mode: Mode) -> Floats:

@@ -5,11 +5,11 @@ longitudinal speed 1 to 11 m/s, transverse speed 2.5 m/s either way, path 20 mm 
 differs with the hand.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.flat_body import flat_body
@@ -82,7 +82,7 @@ def measured(file: Path, speed: float) -> Profile:
             f"{file} holds no waveforms of velocity, which the zigzag is compared by; give one of "
             "the set's .mat files"
         )
-    known = np.isfinite(found.places).all(axis=1)
+    known: NDArray[np.bool_] = np.isfinite(found.places).all(axis=-1)
     if known.sum() < 2:
         raise ValueError(
             f"{file} holds no places of its {len(known)} points; give a file with its point map, "
@@ -92,7 +92,7 @@ def measured(file: Path, speed: float) -> Profile:
     return Profile(name=f"measured, {file.name}", speed=speed, places=along, rms=rms)
 
 
-def _along(found: Measurement, known: np.ndarray) -> tuple[Floats, Floats]:
+def _along(found: Measurement, known: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Places along the principal axis, from their middle, rising, and RMS there."""
     places = found.places[known]
     centred = places - (places.max(axis=0) + places.min(axis=0)) / 2
@@ -107,12 +107,6 @@ def _along(found: Measurement, known: np.ndarray) -> tuple[Floats, Floats]:
 
 def _rms(velocity: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(velocity**2, axis=0)))
-
-
-def profiles(measurements: Sequence[tuple[Path, float]]) -> tuple[list[Profile], list[Profile]]:
-    """Predicted profiles of all bodies and speeds, and those of recordings (file, speed in m/s)."""
-    own = [predicted(body, speed) for body in BODIES_SHOWN for speed in SPEEDS]
-    return own, [measured(file, speed) for file, speed in measurements]
 
 
 def binned(profile: Profile, places: Floats = PLACES) -> Floats:
