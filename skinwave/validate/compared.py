@@ -63,11 +63,7 @@ class Compared:
             said = _inside(self.published)
         else:
             of = "spread" if self.published.has_spread else "value, of which no spread is published"
-            by = (
-                f"by a factor of {significant(self.miss, 2)}"
-                if self.miss < inf
-                else "without bound"
-            )
+            by = f"by a factor of {times(self.miss)}" if self.miss < inf else "without bound"
             said = f"{self.outcome} the published {of}, {by}"
         return f"{said}; the preset was made from it" if self.is_built else said
 
@@ -93,6 +89,11 @@ def compared(published: Published, body: str, ours: Iterable[float]) -> list[Com
             value=published.values[k], low=low, high=high,
         ))  # fmt: skip
     return rows
+
+
+def times(factor: float) -> str:
+    """A factor above 1, of which what is above 1 shows."""
+    return significant(factor, 2 if factor >= 1.1 else 3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,10 +145,12 @@ def _inside(published: Published) -> str:
 def _range(factors: Sequence[float]) -> str:
     low, high = min(factors), max(factors)
     if not isfinite(high):
-        return "a factor without bound" if len(factors) == 1 else f"{significant(low, 2)} and more"
-    if significant(low, 2) == significant(high, 2):
-        return f"a factor of {significant(high, 2)}"
-    return f"factors of {significant(low, 2)} to {significant(high, 2)}"
+        return (
+            "a factor without bound" if len(factors) == 1 else f"factors of {times(low)} and more"
+        )
+    if times(low) == times(high):
+        return f"a factor of {times(high)}"
+    return f"factors of {times(low)} to {times(high)}"
 
 
 COLUMNS = (

@@ -61,7 +61,9 @@ def factors_figure(rows: Sequence[Compared]) -> Figure:
         ax.grid(alpha=0.25)
         marks = [Line2D([], [], color=c, marker="o", ls="", ms=4, label=n)
                  for n, c in COLOURS.items()]  # fmt: skip
-        figure.legend(handles=marks, loc="outside upper right", ncols=6, fontsize=8, frameon=False)
+        if any(row.body not in COLOURS for row in rows):
+            marks.append(Line2D([], [], color="k", marker="o", ls="", ms=4, label="hand"))
+        figure.legend(handles=marks, loc="outside upper right", ncols=7, fontsize=8, frameon=False)
 
     return _figure(draw, 10.5, 0.3 * len(names) + 1.6)
 
@@ -176,10 +178,11 @@ def finger_figure(decays: Sequence[Decay], frequencies: Floats) -> Figure:
                 at = np.flatnonzero(np.isclose(each.frequencies, f))
                 if len(at):
                     own = "#0072B2" if each.dofs else "k"
-                    ax.semilogy(1e3 * each.distances, each.amplitudes[at[0]], color=own,
+                    away = 1e3 * (each.distances - each.distances[0])
+                    ax.semilogy(away, each.amplitudes[at[0]], color=own,
                                 marker=MARKERS[k % len(MARKERS)], ms=4, lw=1,
                                 label=each.name)  # fmt: skip
-            ax.set(title=f"{f:g} Hz", xlabel="from the tip, mm")
+            ax.set(title=f"{f:g} Hz", xlabel="from the first place, mm")
             ax.grid(alpha=0.25)
         axes[0].set_ylabel("amplitude over the largest")
         handles = {h.get_label(): h for ax in axes for h in ax.get_lines()}

@@ -19,7 +19,7 @@ from skinwave.validate.published import SKINSOURCE, Published
 
 EXAMPLE = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 UP = "-x"  # of the example, its palm
-SIZE = 6e-3  # m, of elements
+SIZE = 6.5e-3  # m, of elements; see `page.FINGER` for what it costs
 FREQUENCIES = (200.0, 300.0, 400.0)  # Hz
 FINGER_LENGTH = 0.070  # m
 LOADED = 0.010  # m from the tip, where the focus is
@@ -32,9 +32,9 @@ PEOPLE = (1, 2, 3, 4)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Decay:
-    """Amplitude (f, p) of the normal motion over the largest, at frequencies (f,) in Hz and
-    distances (p,) in m from the finger's tip, of a hand or person by `name`; of a hand the
-    mean edge of the finger's elements in m, and its dofs.
+    """Amplitude (f, p) of the normal motion of a hand or person over the largest, at frequencies
+    (f,) in Hz and distances (p,) in m: of a hand from the finger's tip, of a person from the first
+    sensor. Of a hand also the mean edge of the finger's elements in m, and its dofs.
     """
 
     name: str

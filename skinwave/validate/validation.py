@@ -17,6 +17,7 @@ from skinwave.validate.compared import (
     WITHIN,
     Compared,
     compared,
+    times,
     worst,
 )
 from skinwave.validate.focus_speed import PERIMETERS, Sweep, compare_sweeps, sweep
@@ -138,7 +139,7 @@ def _counted(rows: Sequence[Compared]) -> str:
     without = sum(row.outcome == NONE for row in own)
     far = worst(own)
     said = (
-        f"Of {len(own)} comparisons of a published value with a preset that was not made from it, "
+        f"Of {len(own)} comparisons of a published value with a model that was not made from it, "
         f"{within} agree: within the published spread or, where none is published, within "
         f"{100 * DIGITISED:g} %; in {without} the model has no wave, and "
         f"{len(own) - within - without} miss, by a median factor of {significant(_median(own), 2)}"
@@ -188,12 +189,15 @@ def _of_all_sources(rows: Iterable[Compared], quantity: str) -> str:
 def _optima(found: Validation) -> str:
     low, high = OPTIMUM.lows[0], OPTIMUM.highs[0]
     said = []
-    for name, sweeps in found.sweeps.items():
-        optima = [each.optimum for each in sweeps]
-        shown = " and ".join(significant(x, 2) for x in optima)
-        inside = all(low <= x <= high for x in optima)
-        chosen = ", as it was chosen to" if inside and name in OPTIMUM.built else ""
-        said.append(f"{name} at {shown} m/s ({'within' if inside else 'misses'}{chosen})")
+    for name in found.sweeps:
+        own = [row for row in found.rows
+               if row.body == name
+               and row.published.name.startswith(f"{OPTIMUM.name}, largest")]  # fmt: skip
+        shown = " and ".join(significant(row.ours, 2) for row in own)
+        missed = [row for row in own if row.outcome != WITHIN]
+        outcome = ", ".join(f"{row.outcome} by {times(row.miss)}" for row in missed)
+        chosen = ", chosen by it" if own[0].is_built else ""
+        said.append(f"{name} at {shown} m/s ({outcome or 'within'}{chosen})")
     around = " and ".join(f"{1e3 * each:g}" for each in PERIMETERS)
     return (
         f"On circles of {around} mm around the focus deflects most, where {low:g} to {high:g} m/s "

@@ -82,7 +82,7 @@ def measured(file: Path, speed: float) -> Profile:
             f"{file} holds no waveforms of velocity, which the zigzag is compared by; give one of "
             "the set's .mat files"
         )
-    known: NDArray[np.bool_] = np.isfinite(found.places).all(axis=-1)
+    known = np.asarray(np.isfinite(found.places).all(axis=1))
     if known.sum() < 2:
         raise ValueError(
             f"{file} holds no places of its {len(known)} points; give a file with its point map, "
