@@ -20,6 +20,7 @@ small.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -154,9 +155,9 @@ def _volume_operators(
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
     D = {
         m: projected_divergence(elements_of(mesh, region == m))
-        for m in np.flatnonzero(lam > direct)
+        for m in np.flatnonzero(lam > direct).tolist()
     }
-    beside = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
+    beside: dict[int, Any] = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
     for m, added in directional_parts(materials).items():
         own = region == m
         part = replace(pattern, slot=pattern.slot[own])

@@ -85,7 +85,7 @@ def tension_stiffness(
     (3 n, 3 n) sparse, N/m
     """
     normal = np.cross(*axes)
-    stress = np.einsum("k,ki,kj->ij", tension, axes, axes) / np.ptp(mesh.points @ normal)
+    stress = axes.T @ np.diag(tension) @ axes / np.ptp(mesh.points @ normal)
     outer = np.outer(normal, normal)
 
     def blocks() -> Iterator[tuple[slice, Floats]]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem.boundary import Support
 from fem.coat import Coat
@@ -21,8 +22,9 @@ class Discretised:
     `sides` where conditions of these names hold.
 
     `materials` by region; `coat`: thin layers at the top; `drag`: mass-proportional damping (m,) in
-    1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh. Both are
-    called with the part of the mesh that symmetry leaves.
+    1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh; `held`:
+    components (n, 3) of its nodes that are held, in place of all of its sides: called with the part
+    of the mesh that symmetry leaves. `tension` of a sheet in N/m along x and y.
     """
 
     mesh: TetMesh
@@ -30,6 +32,8 @@ class Discretised:
     coat: Coat | None = None
     drag: Callable[[TetMesh], Floats] | None = None
     support: Callable[[TetMesh], Support] | None = None
+    held: Callable[[TetMesh], NDArray[np.bool_]] | None = None
+    tension: tuple[float, float] | None = None
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:

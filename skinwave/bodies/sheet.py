@@ -1,7 +1,8 @@
 """Thin sheet, which bends: paper in a frame. Its waves, its air, and its mesh."""
 
 from dataclasses import replace
-from math import pi
+from functools import partial
+from math import pi, sqrt
 
 from fem.added_mass import AddedMass, added_mass
 from fem.assembly import Operators
@@ -16,6 +17,7 @@ from simple_model.sheet_modes import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.mounting import FRAME, held
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
@@ -42,7 +44,14 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     return Discretised(
         mesh=sheet(body.width, body.height, thickness, h),
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
+        held=None if _is_clamped_frame(body) else partial(held, body.mounting),
+        tension=(body.mounting.tension_x, body.mounting.tension_y),
     )
+
+
+def _is_clamped_frame(body: Body) -> bool:
+    """Whether its sides are as `sides` says, all alike."""
+    return body.mounting.is_frame and body.mounting.support == FRAME.support
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
@@ -58,9 +67,29 @@ def _check_size(body: Body, h: float) -> None:
     check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
 
 
+def check_alike(body: Body) -> None:
+    """Refuse a sheet whose waves depend on their direction, as an infinite one.
+
+    Raises
+    ------
+    ValueError
+        If it is orthotropic or its tensions differ.
+    """
+    x, y = body.mounting.tension_x, body.mounting.tension_y
+    if body.solid.orthotropy is not None or x != y:
+        what = "orthotropic" if x == y else f"stretched by {x:g} and {y:g} N/m along x and y"
+        raise ValueError(
+            f"the wavenumber integral is of waves alike in all directions, and this sheet is {what}"
+            "; use --model fem, or an isotropic material and equal tensions"
+        )
+
+
 def compliance(body: Body) -> Compliance:
-    """Compliance of an infinite sheet."""
-    return thin_sheet(body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0)
+    """Compliance of an infinite sheet; of one whose directions differ, that of their means."""
+    return thin_sheet(
+        body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0,
+        tension=body.mounting.mean_tension,
+    )  # fmt: skip
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
@@ -76,19 +105,27 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
     -------
     DispersionCurves
     """
-    air_density = AIR_DENSITY if body.air else 0.0
-    return sheet_curves(body.solid, body.depth, frequencies, air_density=air_density)
+    check_alike(body)
+    return sheet_curves(
+        body.solid, body.depth, frequencies, air_density=AIR_DENSITY if body.air else 0.0,
+        tension=body.mounting.mean_tension,
+    )  # fmt: skip
 
 
 def bending_wavenumber(body: Body, frequency: float) -> float:
     """Bending wavenumber k of an infinite sheet, rad/m, at a frequency in Hz:
-    D k^4 = (m + 2 rho / k) w^2.
+    D k^4 + T k^2 = (m + 2 rho / k) w^2, with the means D and T of an orthotropic one's directions.
     """
-    w = 2 * pi * frequency
-    k = (body.mass_per_area * w**2 / body.bending_stiffness) ** 0.25
+    w, D = 2 * pi * frequency, body.bending_stiffness
+    half = body.mounting.mean_tension / 2 / D
+
+    def without_air(mass: float) -> float:
+        return sqrt(sqrt(half**2 + mass * w**2 / D) - half)
+
+    k = without_air(body.mass_per_area)
     for _ in range(AIR_TURNS if body.air and w else 0):
-        k = ((body.mass_per_area + 2 * AIR_DENSITY / k) * w**2 / body.bending_stiffness) ** 0.25
-    return float(k)
+        k = without_air(body.mass_per_area + 2 * AIR_DENSITY / k)
+    return k
 
 
 def air_mass(body: Body, frequency: float) -> float:
@@ -119,10 +156,11 @@ def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
     """
     if not body.air:
         return None
-    if body.sides != "clamped":
+    if body.sides != "clamped" or not body.mounting.is_frame:
+        how = body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"
         raise ValueError(
-            f"elements have air around a sheet in a frame, not with {body.sides} sides; clamp "
-            "them, leave air out, or use --model flat-body"
+            f"elements have air around a sheet in a frame, not one {how}; hold all four edges, "
+            "leave air out, or use --model flat-body"
         )
     by_mass, _ = rayleigh_damping(body.solid.loss_factor, LOSS_BAND)
     sides = body.placement.rotation.T[:2]
@@ -134,7 +172,7 @@ def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
 SHEET = register(
     BodyKind(
         name="sheet",
-        keys=("air",),
+        keys=("air", "mounting"),
         # 80 g/m2 office paper in a frame.
         presets={
             "paper-sheet": {"material": "paper", "depth": 1e-4, "base": "free", "sides": "clamped"}
@@ -144,6 +182,7 @@ SHEET = register(
         default_size=lambda body: min(body.width, body.height) / SHEET_CELLS,
         interactive_size=2.5e-3,
         compliance=compliance,
+        check_exact=check_alike,
         dispersion=dispersion,
         wave_speed=lambda body, frequency: 2 * pi * frequency / bending_wavenumber(body, frequency),
         is_plate=True,

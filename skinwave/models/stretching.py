@@ -111,7 +111,7 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
     return fem.finite_strain(
         made.mesh,
         made.material,
-        fixed=made.fixed,
+        fixed=made.constraints,
         membrane=missing if missing.thickness > 1e-9 * body.depth else None,
     )
 

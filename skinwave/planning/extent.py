@@ -34,7 +34,11 @@ def symmetry(scene: Scene) -> str:
         return ""
     path = scene.tacton.trajectory
     path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
-    return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
+    return "".join(
+        axis
+        for axis, x in zip("xy", path_points.T, strict=True)
+        if np.abs(x).max() < 1e-9 and axis in scene.body.mounting.symmetry
+    )
 
 
 def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[PlanRow]]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from fem.materials import Material
 from simple_model import MovingPressure, Tacton
+from skinwave.bodies.mounting import FRAME
 from skinwave.models import named
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
@@ -110,6 +111,8 @@ def levels_of(tacton: Tacton) -> list[str]:
 def extent(body: Body) -> str:
     """Kind, size and boundary conditions of a body."""
     size = body.of_kind.words(body)
+    if body.mounting != FRAME:
+        return f"{size}, {body.mounting.words}"
     return f"{size}, base {body.base}, sides {body.sides}" if body.of_kind.discretise else size
 
 
