@@ -14,7 +14,7 @@ einsum in this package:
     i j  components of displacement
     c    components of a symmetric tensor: xx, yy, zz, xy, xz, yz
     k l  directions at rest, of which a membrane has two
-    v w  linear pressure functions of a macroelement
+    v w  linear pressure functions of a macroelement; in-plane strains xx, yy and 2 xy
     n    node, or degree of freedom
     p    probe, or point
     m    mode, or vector of a basis

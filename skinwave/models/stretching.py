@@ -113,6 +113,7 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
         made.material,
         fixed=made.constraints,
         membrane=missing if missing.thickness > 1e-9 * body.depth else None,
+        tension=made.tension,
     )
 
 
