@@ -243,13 +243,13 @@ def orthotropic(
     shear_xy: float | None = None,
     **losses: Any,
 ) -> Material:
-    """Material of a sheet by its moduli along x and y.
+    """Material of a sheet by its moduli along x and y; its losses, `viscosity`, `loss_factor` and
+    `prony` as of `Material`, are the same in all directions.
 
     Parameters
     ----------
     density : float, kg/m3
     young_x, young_y, poisson_xy, shear_xy : as of `Orthotropy`
-    losses : `viscosity`, `loss_factor` and `prony` as of `Material`, the same in all directions
 
     Returns
     -------

@@ -30,7 +30,7 @@ class Mounting:
     Raises
     ------
     ValueError
-        If a value is unknown, not finite or out of range, or nothing holds the sheet.
+        If a value is unknown, not finite or out of range, or the sheet is unconstrained.
     """
 
     edges: tuple[str, ...] = tuple(EDGES)
@@ -51,7 +51,7 @@ class Mounting:
                 raise ValueError(f"{name} = {value} {unit} must be a finite number, 0 or above")
         if not (self.edges or self.clips):
             raise ValueError(
-                "edges = [] and no clips_mm: nothing holds the sheet; name an edge or a clip, or "
+                "edges = [] and no clips_mm leave the sheet unconstrained; name an edge or a clip, or "
                 'take sides = "free" and clamp its base'
             )
         if self.support == "simply" and len(self.edges) == 1 and not self.clips:
