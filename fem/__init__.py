@@ -46,6 +46,7 @@ from fem.load_and_probe import (
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles
+from fem.plane_stiffness import Tension
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
@@ -80,6 +81,7 @@ __all__ = [
     "State",
     "StretchingModes",
     "Support",
+    "Tension",
     "added_mass",
     "assemble",
     "at_rest",

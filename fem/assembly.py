@@ -18,7 +18,7 @@ without that volumetric locking makes displacements some wavelengths away severa
 small.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,6 +34,7 @@ from fem.materials import Material
 from fem.maxwell import Branch, on_free
 from fem.plane_stiffness import (
     SIDES,
+    Tension,
     directional_parts,
     orthotropic_stiffness,
     tension_stiffness,
@@ -84,7 +85,7 @@ def assemble(
     drag: Floats | None = None,
     support: Support | None = None,
     coat: Coat | None = None,
-    tension: tuple[float, float] | None = None,
+    tension: Tension | None = None,
     axes: Floats = SIDES,
 ) -> Operators:
     """Assemble the operators of a body.
@@ -99,7 +100,7 @@ def assemble(
     drag : (m,) float, 1/s, mass-proportional damping of each element in an absorbing layer
     support : springs and dashpots of a surface as functions of position, or None
     coat : thin layers at a surface, in place of the material that is meshed there, or None
-    tension : N/m, in-plane tension of a sheet along its sides x and y, or None
+    tension : in-plane tension of a sheet along its sides, or None
     axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched
 
     Returns
@@ -120,7 +121,9 @@ def assemble(
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
-    K, C, M, branches = _volume_operators(mesh, pattern, materials, region, axes)
+    K, C, M, branches = _volume_operators(
+        mesh, pattern, materials, region, axes, tension and tension.share
+    )
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
         K, C, M, branches = together((K, C, M, branches), added)
@@ -131,7 +134,7 @@ def assemble(
         K = (K + springs(mesh, support)).tocsr()
     if support is not None and support.absorbed.any():
         R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
-    if tension is not None and any(tension):
+    if tension is not None:
         K = (K + tension_stiffness(mesh, pattern, tension, axes)).tocsr()
     if drag is not None:
         R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
@@ -149,6 +152,7 @@ def _volume_operators(
     materials: list[Material],
     region: Ints,
     axes: Floats,
+    share: Callable[[Floats], Floats] | None,
 ) -> Matrices:
     """K, C, M and the branches of all materials, on all dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
@@ -170,7 +174,7 @@ def _volume_operators(
         summed = from_components(pattern, pattern.sum(blocks, 6))
         return sum((share[m] * part for m, part in beside.items()), start=summed).tocsr()
 
-    return viscoelastic(materials, stiffness, lambda rho: _mass(mesh, pattern, rho[region]))
+    return viscoelastic(materials, stiffness, lambda rho: _mass(mesh, pattern, rho[region]), share)
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:

@@ -22,7 +22,7 @@ from fem.assembly import Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
-from fem.plane_stiffness import SIDES, directional_parts, tension_stiffness
+from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
 from fem.sparsity import UPPER, SparsityPattern, from_components, slabs
 from fem.viscoelastic import LOSS_BAND
 from meshes import MeshError, TetMesh
@@ -97,7 +97,7 @@ def finite_strain(
     *,
     fixed: str | Mapping[str, str] | ArrayLike = "clamped",
     membrane: Membrane | None = None,
-    tension: tuple[float, float] | None = None,
+    tension: Tension | None = None,
 ) -> Elastic:
     """Hyperelastic body at large displacement, of tetrahedra and a membrane if there is one.
 
@@ -108,7 +108,7 @@ def finite_strain(
     ----------
     mesh, material, fixed : as for `assemble`
     membrane : Membrane among the nodes of the mesh, or None
-    tension : N/m, in-plane tension of a horizontal sheet at rest along x and y, or None
+    tension : in-plane tension at rest of a horizontal sheet along x and y, or None
 
     Returns
     -------
@@ -135,7 +135,7 @@ def finite_strain(
         return operators.expand(u).reshape(n, 3)
 
     T = sparse.csr_array((len(free), len(free)))
-    if tension is not None and any(tension):
+    if tension is not None:
         T = tension_stiffness(mesh, solid.pattern, tension, SIDES)[free][:, free]
     body = Elastic(
         operators=operators,

@@ -11,11 +11,10 @@ stiffness is so much softer in its plane that the tension would bend it otherwis
 of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.geometry import gradient_products
@@ -25,6 +24,19 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats
 
 SIDES = np.eye(3)[:2]  # unit vectors (2, 3) along the sides x and y of a sheet that lies flat
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tension:
+    """Uniform in-plane tension of a sheet, `x` and `y` in N/m along its sides.
+
+    It has no loss. `share`, if given, is the elastic share (f,) of the stiffness of bending waves
+    at angular frequencies (f,) in rad/s, which the damping is fitted to.
+    """
+
+    x: float
+    y: float
+    share: Callable[[Floats], Floats] | None = None
 
 
 def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
@@ -69,7 +81,7 @@ def orthotropic_stiffness(
 
 
 def tension_stiffness(
-    mesh: TetMesh, pattern: SparsityPattern, tension: ArrayLike, axes: Floats
+    mesh: TetMesh, pattern: SparsityPattern, tension: Tension, axes: Floats
 ) -> sparse.csr_array:
     """Geometric stiffness of a uniform in-plane tension on the normal displacement of a sheet.
 
@@ -77,7 +89,7 @@ def tension_stiffness(
     ----------
     mesh : TetMesh, of one thickness
     pattern : SparsityPattern, of the elements
-    tension : (2,) float, N/m, along x and y of the sheet
+    tension : Tension
     axes : (2, 3) float, unit vectors along x and y
 
     Returns
@@ -85,7 +97,7 @@ def tension_stiffness(
     (3 n, 3 n) sparse, N/m
     """
     normal = np.cross(*axes)
-    stress = axes.T @ np.diag(tension) @ axes / np.ptp(mesh.points @ normal)
+    stress = axes.T @ np.diag([tension.x, tension.y]) @ axes / np.ptp(mesh.points @ normal)
     outer = np.outer(normal, normal)
 
     def blocks() -> Iterator[tuple[slice, Floats]]:

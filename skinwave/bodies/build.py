@@ -10,7 +10,7 @@ from fem.assembly import Operators, assemble
 from fem.boundary import Support, fixed_dofs
 from fem.coat import Coat
 from fem.materials import Material
-from fem.plane_stiffness import SIDES
+from fem.plane_stiffness import SIDES, Tension
 from meshes import TetMesh, half
 from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.body import Body
@@ -25,7 +25,7 @@ COMPARED = 4 / 3
 class Build:
     """Meshed body: arguments of `fem.assemble`; `coat` and `support` of a hand, or None; `drag`
     (m,) in 1/s of the absorbing layer, or None; `held` (n, 3) components beside those `fixed`, or
-    None; `tension` in N/m of a sheet along its sides, or None, and `axes` (2, 3) along these.
+    None; `tension` of a sheet, or None, and `axes` (2, 3) along its sides.
     """
 
     mesh: TetMesh
@@ -37,7 +37,7 @@ class Build:
     support: Support | None = None
     symmetry: str = ""
     held: NDArray[np.bool_] | None = None
-    tension: tuple[float, float] | None = None
+    tension: Tension | None = None
     axes: Floats = field(default_factory=lambda: SIDES)
 
     @property

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fem.boundary import Support
 from fem.coat import Coat
 from fem.materials import Material
+from fem.plane_stiffness import Tension
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 
@@ -24,7 +25,7 @@ class Discretised:
     `materials` by region; `coat`: thin layers at the top; `drag`: mass-proportional damping (m,) in
     1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh; `held`:
     components (n, 3) of its nodes that are held, in place of all of its sides: called with the part
-    of the mesh that symmetry leaves. `tension` of a sheet in N/m along x and y.
+    of the mesh that symmetry leaves. `tension` of a sheet, or None.
     """
 
     mesh: TetMesh
@@ -33,7 +34,7 @@ class Discretised:
     drag: Callable[[TetMesh], Floats] | None = None
     support: Callable[[TetMesh], Support] | None = None
     held: Callable[[TetMesh], NDArray[np.bool_]] | None = None
-    tension: tuple[float, float] | None = None
+    tension: Tension | None = None
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:

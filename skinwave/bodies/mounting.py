@@ -51,8 +51,7 @@ class Mounting:
                 raise ValueError(f"{name} = {value} {unit} must be a finite number, 0 or above")
         if not (self.edges or self.clips):
             raise ValueError(
-                "edges = [] and no clips_mm leave the sheet unconstrained; name an edge or a clip, or "
-                'take sides = "free" and clamp its base'
+                "edges = [] without clips_mm leaves the sheet unconstrained; name an edge or a clip"
             )
         if self.support == "simply" and len(self.edges) == 1 and not self.clips:
             raise ValueError(

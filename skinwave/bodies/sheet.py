@@ -4,9 +4,12 @@ from dataclasses import replace
 from functools import partial
 from math import pi, sqrt
 
+import numpy as np
+
 from fem.added_mass import AddedMass, added_mass
 from fem.assembly import Operators
 from fem.materials import Material, rayleigh_damping
+from fem.plane_stiffness import Tension
 from fem.viscoelastic import LOSS_BAND
 from meshes import sheet
 from meshes.shapes.structured import check_size, round_up
@@ -23,6 +26,8 @@ SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and thicker elements are far more accurate: thin ones lock.
 SHEET_THICKNESS = 0.01
+PAPER = {"depth": 1e-4, "base": "free", "sides": "clamped"}
+OF_A_SIZE = {"material": "paper-grain", "air": True, **PAPER}
 AIR_TURNS = 30  # each leaves a quarter of the error, or less
 
 
@@ -45,7 +50,32 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
         mesh=sheet(body.width, body.height, thickness, h),
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
         held=None if _is_clamped_frame(body) else partial(held, body.mounting),
-        tension=(body.mounting.tension_x, body.mounting.tension_y),
+        tension=tension(body),
+    )
+
+
+def tension(body: Body) -> Tension | None:
+    """Tension of a sheet; None without any."""
+    if not body.mounting.is_stretched:
+        return None
+    x, y = body.mounting.tension_x, body.mounting.tension_y
+    return Tension(x=x, y=y, share=partial(elastic_share, body))
+
+
+def elastic_share(body: Body, omega: Floats) -> Floats:
+    """Elastic share D k^2 / (D k^2 + T) (f,) of the stiffness of bending waves at angular
+    frequencies (f,) in rad/s, of the means of an infinite sheet's directions.
+    """
+    k = np.array([bending_wavenumber(body, w / 2 / pi) for w in omega.tolist()])
+    bent = body.bending_stiffness * k**2
+    return bent / (bent + body.mounting.mean_tension)
+
+
+def damping(body: Body) -> tuple[float, float]:
+    """Rayleigh damping of a sheet, by mass in 1/s and by stiffness in s."""
+    stretched = tension(body)
+    return rayleigh_damping(
+        body.solid.loss_factor, LOSS_BAND, None if stretched is None else stretched.share
     )
 
 
@@ -157,12 +187,14 @@ def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
     if not body.air:
         return None
     if body.sides != "clamped" or not body.mounting.is_frame:
-        how = body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"
+        how, cure, other = f"with {body.sides} sides", "clamp them", "flat-body"
+        if body.sides == "clamped":
+            how, cure, other = f"one {body.mounting.words}", "hold all its edges", "plate-modes"
         raise ValueError(
-            f"elements have air around a sheet in a frame, not one {how}; hold all four edges, "
-            "leave air out, or use --model flat-body"
+            f"elements have air around a sheet in a frame, not {how}; {cure}, leave air out, or "
+            f"use --model {other}"
         )
-    by_mass, _ = rayleigh_damping(body.solid.loss_factor, LOSS_BAND)
+    by_mass, _ = damping(body)
     sides = body.placement.rotation.T[:2]
     return added_mass(
         build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry, rate=by_mass
@@ -173,9 +205,12 @@ SHEET = register(
     BodyKind(
         name="sheet",
         keys=("air", "mounting"),
-        # 80 g/m2 office paper in a frame.
+        # 80 g/m2 office paper in a frame; the A sizes lie across, with air and their grain along x.
         presets={
-            "paper-sheet": {"material": "paper", "depth": 1e-4, "base": "free", "sides": "clamped"}
+            "paper-sheet": {"material": "paper", **PAPER},
+            "a4-sheet": {"width": 0.297, "height": 0.210, **OF_A_SIZE},
+            "a5-sheet": {"width": 0.210, "height": 0.148, **OF_A_SIZE},
+            "a6-sheet": {"width": 0.148, "height": 0.105, **OF_A_SIZE},
         },
         discretise=discretise,
         check_size=_check_size,

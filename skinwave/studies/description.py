@@ -148,7 +148,8 @@ def above(body: Body) -> str:
 def _material(solid: Material) -> str:
     text = f"density {solid.density:g} kg/m3, "
     if (along := solid.orthotropy) is None:
-        text += f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa, Poisson's ratio {solid.poisson:g}, "
+        text += f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
+        text += f"Poisson's ratio {solid.poisson:g}, "
     else:
         text += (
             f"Young's moduli {along.young_x / 1e9:.3g} and {along.young_y / 1e9:.3g} GPa along x "
