@@ -122,7 +122,7 @@ def assemble(
         raise ValueError("every node is fixed; leave some of the body free to move")
 
     K, C, M, branches = _volume_operators(
-        mesh, pattern, materials, region, axes, tension and tension.share
+        mesh, pattern, materials, region, axes, tension.share if tension else None
     )
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))

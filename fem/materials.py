@@ -49,7 +49,7 @@ def _of_share(
     loss_factor: float, w: Floats, share: Callable[[Floats], Floats]
 ) -> tuple[float, float]:
     """The pair of least maximum deviation from a loss factor at w (f,), by linear programming."""
-    one = np.column_stack([1 / w / share(w) * w[0], w / w[-1]])  # of the unknowns a/w0 and b w1
+    one = np.column_stack([1 / w / share(w) * w[0], w / w[-1]])  # of a/w0 and of b w1
     bounds = np.vstack([np.column_stack([sign * one, -np.ones(len(w))]) for sign in (1, -1)])
     limits = np.repeat([1.0, -1.0], len(w))
     a, b, _ = linprog([0, 0, 1], A_ub=bounds, b_ub=limits).x

@@ -114,9 +114,10 @@ def damping_misfit(
         return ()
     stretched = tension(scene.body)
     w, share = 2 * np.pi * np.maximum(frequencies, 1e-9), np.ones(len(frequencies))
-    if stretched is not None and stretched.share is not None:
-        share = stretched.share(np.maximum(w, 2 * np.pi))
-    by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND, stretched and stretched.share)
+    known = stretched.share if stretched else None
+    if known:
+        share = known(np.maximum(w, 2 * np.pi))
+    by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND, known)
     ratio = by_mass / w / share + by_stiffness * w
     heard = (frequencies > 0) & (np.sqrt(shares.max(axis=1)) > tolerance)
     beyond = heard & (abs(ratio - 1) > LOSS_ERROR)
