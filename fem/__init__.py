@@ -49,6 +49,7 @@ from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.plane_stiffness import Tension
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
+from fem.shallow_shell import shell_stiffness
 from fem.static import modes, static
 from fem.stress import (
     materials_at,
@@ -113,6 +114,7 @@ __all__ = [
     "reduce",
     "relaxation",
     "relaxed",
+    "shell_stiffness",
     "static",
     "stored",
     "strain_operator",

@@ -87,6 +87,7 @@ def assemble(
     coat: Coat | None = None,
     tension: Tension | None = None,
     axes: Floats = SIDES,
+    stiffener: sparse.csr_array | None = None,
 ) -> Operators:
     """Assemble the operators of a body.
 
@@ -102,6 +103,8 @@ def assemble(
     coat : thin layers at a surface, in place of the material that is meshed there, or None
     tension : in-plane tension of a sheet along its sides, or None
     axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched
+    stiffener : (3 n, 3 n) N/m, elastic stiffness beside that of the elements, such as that of a
+        `shallow_shell`, which scales with the modulus of the first material; or None
 
     Returns
     -------
@@ -122,7 +125,7 @@ def assemble(
         raise ValueError("every node is fixed; leave some of the body free to move")
 
     K, C, M, branches = _volume_operators(
-        mesh, pattern, materials, region, axes, tension.share if tension else None
+        mesh, pattern, materials, region, axes, tension.share if tension else None, stiffener
     )
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
@@ -153,6 +156,7 @@ def _volume_operators(
     region: Ints,
     axes: Floats,
     share: Callable[[Floats], Floats] | None,
+    stiffener: sparse.csr_array | None,
 ) -> Matrices:
     """K, C, M and the branches of all materials, on all dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
@@ -167,6 +171,8 @@ def _volume_operators(
         part = replace(pattern, slot=pattern.slot[own])
         extra = orthotropic_stiffness(elements_of(mesh, own), part, added, axes)
         beside[m] = beside.get(m, 0) + extra
+    if stiffener is not None:
+        beside[0] = beside.get(0, 0) + stiffener
 
     def stiffness(share: Floats) -> sparse.csr_array:
         """K with a share (r,) of each material's moduli."""

@@ -293,13 +293,24 @@ def tangent(part: Part, u: Floats) -> sparse.csr_array:
     F, E = deformation(part, u)
     S = stress(part, E)
     blocks = (
-        (slab, _tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs(len(part.nodes))
+        (slab, tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs(len(part.nodes))
     )
     return from_components(part.pattern, part.pattern.sum(blocks, 6))
 
 
-def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
-    """Element blocks (6, e, a, b) of the tangent."""
+def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
+    """Element blocks of the tangent.
+
+    Parameters
+    ----------
+    part : Part
+    slab : its elements
+    F, S : (e, q, k, i) and (e, q, k, l) float, their deformation gradient, and stress in Pa
+
+    Returns
+    -------
+    (6, e, a, b) float, N/m
+    """
     V, G = part.volume[slab, :, None, None], part.G[slab]
     G_transposed = G.swapaxes(2, 3)
     A = G_transposed @ F  # (e, q, a, i)

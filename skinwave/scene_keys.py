@@ -318,6 +318,8 @@ MOUNTING = {
     "clip_radius_mm": _scaled("clip_radius", 1e3),
     "tension_x_n_per_m": _scaled("tension_x"),
     "tension_y_n_per_m": _scaled("tension_y"),
+    "curl_x_mm": _scaled("curl_x", 1e3),
+    "curl_y_mm": _scaled("curl_y", 1e3),
 }
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {

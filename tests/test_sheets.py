@@ -156,6 +156,25 @@ def test_a_stretched_sheet_without_stiffness_is_a_membrane():
     np.testing.assert_allclose(hz, np.sqrt(T / 0.08) / 2 * waves, rtol=5e-3)
 
 
+@pytest.mark.parametrize("rise", [0.5e-3, 2e-3])
+def test_frequencies_of_a_curled_sheet_are_those_of_a_shallow_shell(rise):
+    # m w^2 = D k^4 + E h kappa^2 b^4 / k^4, k^2 = a^2 + b^2: Donnell's equations on shear
+    # diaphragms, by Airy's function of the membrane forces.
+    solid, thickness = from_young(density=800, young=4e9, poisson=0.3), 0.01 * HIGH
+    a, b = np.arange(1, 6, 2)[:, None] * np.pi / WIDE, np.arange(1, 6, 2) * np.pi / HIGH
+    bent = 4e9 * DEEP**3 / 12 / 0.91 * (a**2 + b**2) ** 2
+    shell = 4e9 * DEEP * (8 * rise / WIDE**2) ** 2 * b**4 / (a**2 + b**2) ** 2
+    exact = np.sort(np.sqrt((bent + shell) / 0.08), axis=None)[:2] / (2 * np.pi)
+    mesh, fixed = quarter(thickness, 15, "even", "even")
+    middle = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=DEEP, material=solid)
+    stiffener = fem.shell_stiffness(
+        mesh, middle, lambda at: at * [-8 * rise / WIDE**2, 0], meshed=(DEEP / thickness) ** 2
+    )
+    ops = fem.assemble(mesh, equivalent(thickness, solid), fixed=fixed, stiffener=stiffener)
+    assert exact[0] > 1.5 * np.sqrt(bent[0, 0] / 0.08) / (2 * np.pi)
+    np.testing.assert_allclose(fem.modes(ops, 2)[0], exact, rtol=7e-3)
+
+
 TWO = Mounting(edges=("left", "right"), tension_x=30.0, tension_y=10.0)
 CLIPPED = Mounting(edges=("back",), clips=((-0.02, -0.02), (0.02, -0.02)), clip_radius=4e-3)
 
@@ -315,6 +334,7 @@ shear_xy_pa = 1.4e9
 clips_mm = [[-40, 40], [40, 40]]
 clip_radius_mm = 6
 tension_y_n_per_m = 12.5
+curl_x_mm = -1.5
 """
 
 
@@ -366,6 +386,9 @@ def test_models_say_which_sheets_they_are_not_for():
     with pytest.raises(ValueError, match="stretched by 30 and 10 N/m"):
         named("flat-body").refuse(two)
     named("flat-body").refuse(replace(two, mounting=replace(TWO, tension_y=30.0)))
+    for model in ("flat-body", "plate-modes", "fem-nonlinear"):
+        with pytest.raises(ValueError, match="curled"):
+            named(model).refuse(replace(two, mounting=Mounting(curl_y=1e-3)))
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=two)
     with pytest.raises(ValueError, match="clamped at its left and right edges"):
         named("fem").solve(

@@ -15,7 +15,7 @@ from simple_model.compliance import Compliance
 from simple_model.dispersion import DispersionCurves
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.mounting import FRAME, Mounting, check_clips
+from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import FLAT, PLAIN, Layer, Placement, Relief, check_material, solid_of
 
 BASES = ("clamped", "absorbing", "free")
@@ -119,12 +119,13 @@ class Body:
                 f"a mounting says how the sides of a sheet are held, and they are {self.sides}; "
                 'take sides = "clamped", or leave it out'
             )
-        if self.mounting.support == "simply" and self.placement.is_tilted:
+        shaped = self.mounting.support == "simply" or self.mounting.is_curled
+        if shaped and self.placement.is_tilted:
             raise ValueError(
-                "a simple support is implemented for a sheet that lies across the beam, not a "
-                "tilted one; clamp it, or leave out its tilt"
+                "a simple support and a curl are implemented for a sheet that lies across the "
+                "beam, not a tilted one; clamp and flatten it, or leave out its tilt"
             )
-        check_clips(self.mounting, self.width, self.height)
+        check_extent(self.mounting, self.width, self.height)
 
     def _check_layers(self) -> None:
         if not self.layers:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, fixed_dofs
@@ -25,7 +26,7 @@ COMPARED = 4 / 3
 class Build:
     """Meshed body: arguments of `fem.assemble`; `coat` and `support` of a hand, or None; `drag`
     (m,) in 1/s of the absorbing layer, or None; `held` (n, 3) components beside those `fixed`, or
-    None; `tension` of a sheet, or None, and `axes` (2, 3) along its sides.
+    None; `stiffener` and `tension` of a sheet, or None, and `axes` (2, 3) along its sides.
     """
 
     mesh: TetMesh
@@ -38,6 +39,7 @@ class Build:
     symmetry: str = ""
     held: NDArray[np.bool_] | None = None
     tension: Tension | None = None
+    stiffener: sparse.csr_array | None = None
     axes: Floats = field(default_factory=lambda: SIDES)
 
     @property
@@ -89,6 +91,7 @@ def build(
     drag = made.drag(mesh) if made.drag else None
     support = made.support(mesh) if made.support else None
     held = made.held(mesh) if made.held else None
+    stiffener = made.stiffener(mesh) if made.stiffener else None
     is_fixed = "xyz" in fixed.values() or held is not None
     if body.is_held and not is_fixed and not (support and support.stiffness.any()):
         raise ValueError(
@@ -108,6 +111,7 @@ def build(
         symmetry=symmetry,
         held=held,
         tension=made.tension,
+        stiffener=stiffener,
         axes=body.placement.rotation.T[:2],
     )
 
@@ -123,5 +127,6 @@ def operators(build: Build) -> Operators:
         support=build.support,
         coat=build.coat,
         tension=build.tension,
+        stiffener=build.stiffener,
         axes=build.axes,
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from fem.boundary import Support
 from fem.coat import Coat
@@ -25,7 +26,8 @@ class Discretised:
     `materials` by region; `coat`: thin layers at the top; `drag`: mass-proportional damping (m,) in
     1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh; `held`:
     components (n, 3) of its nodes that are held, in place of all of its sides: called with the part
-    of the mesh that symmetry leaves. `tension` of a sheet, or None.
+    of the mesh that symmetry leaves. `tension` of a sheet; `stiffener` (3 n, 3 n) in N/m of a
+    mesh, as `fem.assemble` takes it.
     """
 
     mesh: TetMesh
@@ -35,6 +37,7 @@ class Discretised:
     support: Callable[[TetMesh], Support] | None = None
     held: Callable[[TetMesh], NDArray[np.bool_]] | None = None
     tension: Tension | None = None
+    stiffener: Callable[[TetMesh], sparse.csr_array] | None = None
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:

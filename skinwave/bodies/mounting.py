@@ -1,4 +1,4 @@
-"""How a sheet is held and stretched: its edges, its clips, and the tension in its plane."""
+"""How a sheet is held: its edges, its clips, the tension in its plane, and its curl."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from simple_model.choices import choose
 
 EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, and its end
 SUPPORTS = ("clamped", "simply")
+STEEPEST = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
 FEWEST = 3  # columns of nodes in a clip: fewer let the sheet turn about it
 
 
@@ -26,6 +27,8 @@ class Mounting:
     clips : (x, y) in metre, middles of clips, which let nothing move within `clip_radius`
     clip_radius : float, metre
     tension_x, tension_y : float, N/m, uniform, 0 or above
+    curl_x, curl_y : float, metre, how much higher than its edges the sheet is in the middle between
+        left and right, and between front and back, as a parabola; it is unstressed
 
     Raises
     ------
@@ -39,6 +42,8 @@ class Mounting:
     clip_radius: float = 5e-3
     tension_x: float = 0.0
     tension_y: float = 0.0
+    curl_x: float = 0.0
+    curl_y: float = 0.0
 
     def __post_init__(self) -> None:
         for edge in self.edges:
@@ -70,6 +75,11 @@ class Mounting:
         return self.tension_x > 0 or self.tension_y > 0
 
     @property
+    def is_curled(self) -> bool:
+        """Whether it is curved at rest."""
+        return bool(self.curl_x or self.curl_y)
+
+    @property
     def mean_tension(self) -> float:
         """Mean of the tensions along x and y, N/m."""
         return (self.tension_x + self.tension_y) / 2
@@ -96,6 +106,8 @@ class Mounting:
             held.append(f"held by {len(self.clips)} clips of {2e3 * self.clip_radius:g} mm")
         if self.is_stretched:
             held.append(f"stretched by {self.tension_x:g} and {self.tension_y:g} N/m along x and y")
+        if self.is_curled:
+            held.append(f"curled by {1e3 * self.curl_x:g} and {1e3 * self.curl_y:g} mm along them")
         return " and ".join(held)
 
 
@@ -106,8 +118,8 @@ def _listed(edges: Sequence[str]) -> str:
 FRAME = Mounting()
 
 
-def check_clips(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips beyond a sheet.
+def check_extent(mounting: Mounting, width: float, height: float) -> None:
+    """Refuse clips beyond a sheet, and a curl that is not shallow.
 
     Parameters
     ----------
@@ -117,8 +129,14 @@ def check_clips(mounting: Mounting, width: float, height: float) -> None:
     Raises
     ------
     ValueError
-        If the middle of a clip is off the sheet.
+        If the middle of a clip is off the sheet, or it rises by more than `STEEPEST` of a side.
     """
+    for name, side in (("curl_x", width), ("curl_y", height)):
+        if not abs(curl := getattr(mounting, name)) <= STEEPEST * side:
+            raise ValueError(
+                f"{name} = {1e3 * curl:g} mm on a side of {1e3 * side:g} mm is beyond "
+                f"{1e3 * STEEPEST * side:g} mm, the limit of a shallow shell; flatten it"
+            )
     for x, y in mounting.clips:
         if not (abs(x) <= width / 2 and abs(y) <= height / 2):
             raise ValueError(

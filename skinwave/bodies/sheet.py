@@ -5,13 +5,16 @@ from functools import partial
 from math import pi, sqrt
 
 import numpy as np
+from scipy import sparse
 
 from fem.added_mass import AddedMass, added_mass
 from fem.assembly import Operators
+from fem.finite_strain import Membrane
 from fem.materials import Material, rayleigh_damping
 from fem.plane_stiffness import Tension
+from fem.shallow_shell import shell_stiffness
 from fem.viscoelastic import LOSS_BAND
-from meshes import sheet
+from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
 from meshes.tetmesh import Floats
 from simple_model.compliance import AIR_DENSITY, Compliance, thin_sheet
@@ -51,7 +54,17 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
         held=None if _is_clamped_frame(body) else partial(held, body.mounting),
         tension=tension(body),
+        stiffener=partial(_curl, body) if body.mounting.is_curled else None,
     )
+
+
+def _curl(body: Body, mesh: TetMesh) -> sparse.csr_array:
+    """Membrane stiffness of a sheet that is curved at rest."""
+    middle = Membrane(triangles=middle_plane(mesh), thickness=body.depth, material=body.solid)
+    rise = np.array([body.mounting.curl_x, body.mounting.curl_y])
+    curvature = -8 * rise / np.array([body.width, body.height]) ** 2
+    meshed = (body.depth / float(np.ptp(mesh.points[:, 2]))) ** 2  # as of `bending_equivalent`
+    return shell_stiffness(mesh, middle, lambda at: curvature * at, meshed=meshed)
 
 
 def tension(body: Body) -> Tension | None:
@@ -103,14 +116,15 @@ def check_alike(body: Body) -> None:
     Raises
     ------
     ValueError
-        If it is orthotropic or its tensions differ.
+        If it is orthotropic or curled, or its tensions differ.
     """
     x, y = body.mounting.tension_x, body.mounting.tension_y
-    if body.solid.orthotropy is not None or x != y:
+    if body.solid.orthotropy is not None or x != y or body.mounting.is_curled:
         what = "orthotropic" if x == y else f"stretched by {x:g} and {y:g} N/m along x and y"
+        what = "curled" if body.mounting.is_curled else what
         raise ValueError(
             f"the wavenumber integral is of waves alike in all directions, and this sheet is {what}"
-            "; use --model fem, or an isotropic material and equal tensions"
+            "; use --model fem, or a flat sheet of an isotropic material and equal tensions"
         )
 
 

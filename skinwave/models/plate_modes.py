@@ -84,6 +84,8 @@ def _refuse(body: Body) -> None:
             "plate-modes is for a sheet of free faces that lies across the beam; leave out its "
             "base and its tilt, or use --model fem"
         )
+    if body.mounting.is_curled:
+        raise ValueError("plate-modes is for a flat sheet, not a curled one; use --model fem")
     if body.solid.prony or body.solid.law is not None:
         raise ValueError(
             "plate-modes takes one modulus at all frequencies; give the material a loss_factor or "
