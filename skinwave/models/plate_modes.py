@@ -15,6 +15,7 @@ from simple_model.plate_response import modal_path_forces
 from simple_model.sampling import shown
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
+from skinwave.effort import peak_memory
 from skinwave.models import Model, Request, register
 from skinwave.models.nonlinear_elements import of_surface_motion
 from skinwave.scene import Scene
@@ -68,7 +69,7 @@ def plate_answer(scene: Scene, request: Request) -> Response:
         quantity=scene.reading.asked.name, values=synthesise(f, lines, request.times),
         effort=Effort(
             seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
-            steps=len(f),
+            steps=len(f), peak_memory=peak_memory(),
         ),
     )  # fmt: skip
 
