@@ -21,6 +21,7 @@ from skinwave.models import Request, named
 from skinwave.models.plate_modes import middle_compliance, plate_of
 from skinwave.planning.extent import mean_sag, symmetry
 from skinwave.scene import BODIES, Body, Scene
+from skinwave.studies.assumptions import droppable
 
 PAPER = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03)
 WIDE, HIGH, DEEP = 0.12, 0.09, 1e-4
@@ -399,3 +400,14 @@ def test_models_say_which_sheets_they_are_not_for():
         named("plate-modes").refuse(replace(SMALL, sides="absorbing"))
     required = plan(scene, model="plate-modes")
     assert (required.model, required.h) == ("plate-modes", None)
+
+
+def test_assumptions_that_a_sheet_keeps_by_its_mounting():
+    scene = Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140)),
+        body=replace(SMALL, material="paper", mounting=replace(TWO, tension_y=30.0)),
+    )
+    framed = replace(scene, body=replace(scene.body, mounting=Mounting()))
+    assert set(droppable(framed)) - set(droppable(scene)) == {"vacuum"}  # without a frame, no air
+    with pytest.raises(ValueError, match="orthotropic; use --model fem"):
+        droppable(replace(scene, body=SMALL))
