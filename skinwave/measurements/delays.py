@@ -12,7 +12,8 @@ MOST_TRIALS = 2**21
 def correlation(
     frequencies: Floats, products: np.ndarray, delays: Floats, order: int = 0
 ) -> Floats:
-    """Correlation (d,) or its derivative with respect to the delay: Re sum (2 pi i f)^n s e^(2 pi i f d).
+    """Correlation (d,) of lines at trial delays, Re sum (2 pi i f)^n s exp(2 pi i f d), or its
+    derivative with respect to the delay.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ def correlation(
 
 
 def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Floats, Floats]:
-    """Local maxima of the correlation: delays (k,) in s within half a window of 0, and heights (k,).
+    """Local maxima of the correlation: delays (k,) in s, up to half a window, and heights (k,).
 
     Sampled `A_PERIOD` times a period of the highest line, then by Newton's method.
     """
@@ -44,9 +45,10 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
     if not len(top):
         top = np.array([int(np.argmax(height))])
     top = top[np.argsort(-height[top], kind="stable")[:1000]]
-    delays = trial[top]
+    delays = np.asarray(trial[top], np.float64)
     for _ in range(NEWTON):
-        slope, bend = (correlation(frequencies, products, delays, k) for k in (1, 2))
+        slope = correlation(frequencies, products, delays, 1)
+        bend = correlation(frequencies, products, delays, 2)
         move = np.where(bend < 0, -slope / np.where(bend < 0, bend, -1.0), 0.0)
         delays = delays + np.clip(move, -step, step)
     return delays, correlation(frequencies, products, delays)

@@ -1,0 +1,308 @@
+"""Page and tables of models beside a measurement."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from skinwave import document
+from skinwave.document import Markup, paragraph, table
+from skinwave.measurements.coherence import floor, over_places
+from skinwave.measurements.lines import ellipses, radius
+from skinwave.numbers import significant
+from skinwave.pictures.figures import label, measured
+from skinwave.pictures.measured import MOST_LINES, lines_figure
+from skinwave.plain_text import csv_table
+from skinwave.studies.claims import TEXTS
+from skinwave.studies.measured_claims import FAILS, HOLDS
+from skinwave.studies.measured_study import (
+    LEVEL,
+    UNKNOWN,
+    Column,
+    MeasuredComparison,
+    drawn_places,
+    main_column,
+)
+
+MOST_ROWS = 30  # of differences on the page; all are in measured.csv
+MOST_NAMED = 3  # lines that a sentence names
+CAPTION = (
+    f"At most {MOST_LINES} lines, the strongest. Models are drawn with the delay and the gain "
+    "that fit each best, or that were given. Filled where the difference, amplitude and phase "
+    "together, is beyond the noise."
+)
+METHOD = (
+    "Lines are fitted to each repetition by least squares; gain and delay of each model follow "
+    "from all lines and places, weighed by their noise, and their errors are those of the noise "
+    "alone. A difference is beyond the noise where the chance of one so large, if there were only "
+    f"noise, is below {100 * LEVEL:g} % for all lines and places together (Holm's correction); the "
+    "noise is taken as circular (Victor & Mast 1991). The point kernels are pressures, and their "
+    "gain has that unit."
+)
+
+
+def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], str]) -> list[str]:
+    """Parts of a page: the conclusion, a figure and tables.
+
+    Parameters
+    ----------
+    found : MeasuredComparison
+    picture : makes a part of the page of a name, a figure and its caption
+    """
+    main, at = main_column(found), drawn_places(found)
+    columns = {c.run.column: c for c in found.columns}
+    figure = lines_figure(
+        {n: float(f) for n, f in zip(found.names, found.lines.frequencies, strict=True)},
+        found.scene.probe_points[at], found.lines.mean[:, at], found.lines.amplitude_error[:, at],
+        {name: c.model[:, at] for name, c in columns.items()},
+        {name: c.differs[:, at] for name, c in columns.items()}, found.measurement.record,
+    )  # fmt: skip
+    return [document.section(
+        "Beside the measurement",
+        paragraph(conclusion(found)),
+        *map(paragraph, remarks(found)),
+        picture("measured", figure, CAPTION),
+        columns_table(found),
+        paragraph(METHOD),
+        document.section(f"Largest differences of the {label(main.run.column)}",
+                         differences_table(found, main)),
+        document.section("Which of the paper's claims the measurement itself shows",
+                         claims_table(found)),
+        document.section("Coherence of the lines", *coherence_parts(found)),
+    )]  # fmt: skip
+
+
+def conclusion(found: MeasuredComparison) -> str:
+    """Whether the model of waves agrees with the data, and where not."""
+    column = main_column(found)
+    name, differs = label(column.run.column), column.differs
+    known = np.isfinite(column.significance)
+    left = f"its misfit is {significant(100 * column.misfit, 2)} % of the measured lines"
+    if not known.any():
+        return (
+            f"Whether the {name} agrees with the data cannot be said, since the noise of the data "
+            f"is unknown; {left}."
+        )
+    left += f", where noise alone leaves {significant(100 * found.noise, 2)} %"
+    least = significant(100 * _detectable(found), 2)
+    if not differs.any():
+        return (
+            f"The {name} agrees with the data within the noise: of {known.sum()} differences of "
+            f"lines at places none is beyond it; {left}. Differences below {least} % of the "
+            "strongest line would not be seen."
+        )
+    return (
+        f"The {name} does not agree with the data everywhere: {differs.sum()} of {known.sum()} "
+        f"differences of lines at places are beyond the noise, {_where(found, column)}; {left}."
+    )
+
+
+def _detectable(found: MeasuredComparison) -> float:
+    """Median radius of the confidence circles, over the strongest line."""
+    around = radius(found.lines, 1 - LEVEL / found.lines.variance.size)
+    return float(np.nanmedian(around) / np.abs(found.lines.mean).max())
+
+
+def _where(found: MeasuredComparison, column: Column) -> str:
+    """The lines and places where differences are beyond the noise, the largest first."""
+    away = np.where(column.differs, np.abs(found.lines.mean - column.model), 0)
+    order = np.argsort(-away.max(axis=1), kind="stable")
+    lines = [k for k in order if column.differs[k].any()]
+    names, asked = list(found.names), found.measurement.record
+    said = []
+    for k in lines[:MOST_NAMED]:
+        p = int(np.argmax(away[k]))
+        x, y = 1e3 * found.scene.probe_points[p]
+        has, shows = (measured(float(np.abs(z[k, p])), asked)
+                      for z in (column.model, found.lines.mean))  # fmt: skip
+        said.append(
+            f"{names[k]} at {column.differs[k].sum()} of {away.shape[1]} places (most at "
+            f"{x:.3g}, {y:.3g} mm: measured {shows}, model {has}{_turned(found, column, k, p)})"
+        )
+    more = len(lines) - len(said)
+    return ", ".join(said) + (f" and {more} more line{'s' * (more > 1)}" if more else "")
+
+
+def _turned(found: MeasuredComparison, column: Column, k: int, p: int) -> str:
+    """How far a model's phase is from the measured one, where both have one."""
+    a, b = found.lines.mean[k, p], column.model[k, p]
+    turn = np.degrees(np.angle(b * np.conj(a)))
+    return f", {turn:+.0f} degrees off" if abs(b) > 0.1 * abs(a) and abs(turn) >= 1 else ""
+
+
+def remarks(found: MeasuredComparison) -> list[str]:
+    """Sentences on the record: repetitions, what is unresolved, and what was assumed."""
+    measurement, shifts = found.measurement, found.lines.shifts
+    r = len(measurement.values)
+    said = f"{measurement.name or 'The measurement'}: {measurement.record.words} at "
+    said += f"{len(measurement.places)} place{'s' * (len(measurement.places) > 1)}, "
+    if r == 1:
+        unknown = np.isnan(found.lines.variance).any()
+        how = "is unknown" if unknown else "is that in the bins beside each line"
+        said += f"one repetition, whose noise {how}."
+    else:
+        said += f"{r} repetitions, whose spread is the noise"
+        step = f"; they are out of step by up to {1e3 * np.ptp(shifts):.3g} ms, and were shifted"
+        said += (step if shifts.any() else ", in step within it") + "."
+    lost = ", ".join(found.unresolved)
+    return [
+        said,
+        *([f"Not compared, since record or model cannot resolve them: {lost}."] if lost else []),
+        *measurement.remarks,
+    ]
+
+
+def columns_table(found: MeasuredComparison) -> Markup:
+    """Misfit, gain and delay of each model."""
+    rows = []
+    for column in found.columns:
+        a, known = column.alignment, np.isfinite(column.significance)
+        beyond = f"{column.differs.sum()} of {known.sum()}" if known.any() else UNKNOWN
+        rows.append([
+            label(column.run.column), significant(100 * column.misfit, 3),
+            significant(100 * found.noise, 2), beyond, _gain(found, column),
+            _with_error(1e3 * a.delay, 1e3 * a.delay_error),
+            "-" if not np.isfinite(a.repeats) else significant(1e3 * a.repeats, 3),
+        ])  # fmt: skip
+    header = ["model", "misfit, %", "of noise alone, %", "differences beyond the noise"]
+    header += ["gain", "delay of the record, ms", "delays so far off fit as well, ms"]
+    return table(header, rows)
+
+
+def _gain(found: MeasuredComparison, column: Column) -> str:
+    a, asked, own = column.alignment, found.measurement.record, column.run.response.record
+    if own == asked:
+        return _with_error(a.gain, a.gain_error)
+    said = _with_error(asked.per_unit * a.gain, asked.per_unit * a.gain_error)
+    return f"{said} {asked.shown} per {own.shown}"
+
+
+def _with_error(value: float, error: float) -> str:
+    """A value and its standard error to two digits, and the value to as many places."""
+    if not error:
+        return f"{significant(value, 4)} (given)"
+    if not np.isfinite(error):
+        return f"{significant(value, 3)} (error unknown)"
+    places = max(1 - int(np.floor(np.log10(error))), 0)
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def differences_table(found: MeasuredComparison, column: Column) -> Markup:
+    """The largest differences of a model, of amplitude and phase together."""
+    away = np.abs(found.lines.mean - column.model)
+    names, asked, findings = list(found.names), found.measurement.record, found.findings(column)
+    rows: list[list[str]] = []
+    for index in np.argsort(-away, axis=None, kind="stable")[:MOST_ROWS]:
+        k, p = (int(i) for i in np.unravel_index(int(index), away.shape))
+        z, m = complex(found.lines.mean[k, p]), complex(column.model[k, p])
+        x, y = 1e3 * found.scene.probe_points[p]
+        turn, error = np.degrees([np.angle(m * z.conjugate()), found.lines.phase_error[k, p]])
+        spread = float(found.lines.amplitude_error[k, p]) or np.inf
+        rows.append([
+            names[k], f"{found.lines.frequencies[k]:.1f}", f"{x:.3g}, {y:.3g}",
+            _with_error(asked.per_unit * abs(z), asked.per_unit * spread),
+            significant(asked.per_unit * abs(m)),
+            significant(asked.per_unit * float(away[k, p])), f"{turn:+.0f} ± {error:.2g}",
+            _chance(float(column.significance[k, p])), str(findings[k, p]),
+        ])  # fmt: skip
+    unit = asked.shown
+    header = ["line", "frequency, Hz", "place, mm", f"measured, {unit}", f"model, {unit}"]
+    header += [f"complex difference, {unit}", "model's phase off by, degrees", "p, adjusted"]
+    return table([*header, "difference is"], rows)
+
+
+def _chance(p: float) -> str:
+    return "-" if not np.isfinite(p) else f"{p:.1g}" if p >= 1e-6 else "< 1e-6"
+
+
+def claims_table(found: MeasuredComparison) -> Markup:
+    """Claims that are about such a Tacton, and what the measurement says of them."""
+    if not found.claims:
+        return paragraph(
+            "The claims are about one focus that is modulated by one tone at most, moves along a "
+            "closed path or both; this Tacton is another."
+        )
+    classes = {HOLDS: "yes", FAILS: "no"}
+    rows = [
+        [f"{one.claim}: {TEXTS[one.claim]}",
+         Markup('<span class="{}">{}</span>').format(classes.get(one.finding, ""), one.finding),
+         one.sentence]
+        for one in found.claims
+    ]  # fmt: skip
+    said = (
+        "From the data alone. A claim holds, or fails, where every set of amplitudes within the "
+        "noise says so (95 % for all together)."
+    )
+    return paragraph(said) + table(["claim", "in the data it", "by"], rows)
+
+
+def coherence_parts(found: MeasuredComparison) -> list[str]:
+    """Coherence of each line over time, repetitions and places, and what chance would leave."""
+    c, main = found.coherence, main_column(found)
+    places = over_places(found.lines.mean, main.model)
+    rows = [
+        [name, f"{found.lines.frequencies[k]:.1f}", _range(c.over_time[k]),
+         _range(c.over_repetitions[k]), significant(float(places[k]), 3)]
+        for k, name in enumerate(found.names)
+    ]  # fmt: skip
+    header = ["line", "frequency, Hz", "data and model over time, least to largest place"]
+    header += ["between repetitions", f"pattern over the places, data and {label(main.run.column)}"]
+    said = []
+    for what, k in (("time", c.segments), ("repetitions", c.repetitions)):
+        if k > 1:
+            said.append(
+                f"over {what}, of {k} values, no coherence at all leaves {significant(1 / k, 2)} "
+                f"on average and 95 % of the time less than {significant(floor(k), 2)}"
+            )
+    about = "Magnitude squared; the first two ask only whether a line keeps its phase"
+    return [paragraph("; ".join([about, *said]) + "."), table(header, rows)]
+
+
+def _range(values: np.ndarray) -> str:
+    if not np.isfinite(values).any():
+        return "-"
+    low, high = (significant(float(x), 3) for x in (np.nanmin(values), np.nanmax(values)))
+    return low if low == high else f"{low} to {high}"
+
+
+def write_tables(folder: Path, found: MeasuredComparison) -> None:
+    """measured.csv, a row for each line, place and model, and measured-claims.csv."""
+    asked = found.measurement.record.column
+    header = [
+        "line", "frequency_hz", "place", "x_mm", "y_mm", f"measured_{asked}",
+        f"measured_{asked}_error", "measured_phase_rad", "measured_phase_rad_error",
+        f"ellipse_major_{asked}", f"ellipse_minor_{asked}", "ellipse_angle_rad",
+        "coherence_over_time", "coherence_over_repetitions", "model", f"model_{asked}",
+        "model_phase_rad", f"difference_{asked}", "p_adjusted", "finding",
+    ]  # fmt: skip
+    (folder / "measured.csv").write_bytes(csv_table(header, _rows(found)))
+    claims = ([c.claim, c.finding, c.sentence] for c in found.claims)
+    header = ["claim", "finding", "sentence"]
+    (folder / "measured-claims.csv").write_bytes(csv_table(header, claims))
+
+
+def _rows(found: MeasuredComparison) -> Iterator[list[object]]:
+    lines, unit = found.lines, found.measurement.record.per_unit
+    major, minor, angle = ellipses(lines)
+    every = [(c, found.findings(c)) for c in found.columns]
+    for k, name in enumerate(found.names):
+        for p, (x, y) in enumerate(found.scene.probe_points):
+            z = lines.mean[k, p]
+            of_data = (
+                unit * abs(z), unit * lines.amplitude_error[k, p], np.angle(z),
+                lines.phase_error[k, p], unit * major[k, p], unit * minor[k, p], angle[k, p],
+                found.coherence.over_time[k, p], found.coherence.over_repetitions[k, p],
+            )  # fmt: skip
+            for column, findings in every:
+                m = column.model[k, p]
+                of_model = unit * abs(m), np.angle(m), unit * abs(z - m), column.significance[k, p]
+                yield [
+                    name, _short(lines.frequencies[k]), p + 1, _short(1e3 * x), _short(1e3 * y),
+                    *map(_short, of_data), column.run.column, *map(_short, of_model),
+                    findings[k, p],
+                ]  # fmt: skip
+
+
+def _short(value: float) -> str:
+    return f"{value:.6g}" if np.isfinite(value) else ""
