@@ -30,7 +30,10 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--measured", type=Path, metavar="FILE", help="a measurement of that scene to compare with"
     )
     parser.add_argument(
-        "--delay", type=float, metavar="MS", help="of the record behind the models (default: fitted)"
+        "--delay",
+        type=float,
+        metavar="MS",
+        help="of the record behind the models (default: fitted)",
     )
     parser.add_argument(
         "--gain", type=float, metavar="G", help="of the record over the body (default: fitted)"

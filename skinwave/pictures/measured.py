@@ -104,9 +104,14 @@ def _model(
         (left, quantity.per_unit * np.abs(model), seen | True),
         (right, phase, seen),
     ):
-        style: dict[str, Any] = {"color": inked(column), "ls": "", "marker": marker(column)}
+        style: dict[str, Any] = {"color": inked(column), "ls": "", "marker": _marker(column)}
         for mask, face in ((differs, inked(column)), (~differs, "none")):
             ax.plot(at[mask & drawn], y[mask & drawn], ms=6, mfc=face, **style)
+
+
+def _marker(column: str) -> str:
+    """The marker of a column, where it is a cross a filled one, to be open or not."""
+    return marker(column).replace("x", "X")
 
 
 def _labels(axes: np.ndarray, places: Floats, quantity: Quantity) -> None:
@@ -126,7 +131,7 @@ def _legend(figure: Figure, columns: Sequence[str]) -> None:
     handles: list[Any] = [ax.plot([], [], color=ink, marker="_", ms=14, mew=2, ls="")[0]]
     labels = ["measured, bars of 95 %"]
     for column in columns:
-        style: dict[str, Any] = {"color": inked(column), "ls": "", "marker": marker(column)}
+        style: dict[str, Any] = {"color": inked(column), "ls": "", "marker": _marker(column)}
         handles.append(ax.plot([], [], ms=6, **style)[0])
         labels.append(label(column))
     handles.append(ax.plot([], [], ls="", marker="o", mfc="none", color="0.4")[0])

@@ -26,6 +26,7 @@ from skinwave.studies.measured_study import (
 )
 
 MOST_ROWS = 30  # of differences on the page; all are in measured.csv
+MOST_COHERENT = 12  # lines, the strongest
 MOST_NAMED = 3  # lines that a sentence names
 CAPTION = (
     f"At most {MOST_LINES} lines, the strongest. Models are drawn with the delay and the gain "
@@ -94,8 +95,16 @@ def conclusion(found: MeasuredComparison) -> str:
         )
     return (
         f"The {name} does not agree with the data everywhere: {differs.sum()} of {known.sum()} "
-        f"differences of lines at places are beyond the noise, {_where(found, column)}; {left}."
+        f"differences of lines at places are beyond the noise{_numerical(found, column)}, "
+        f"{_where(found, column)}; {left}."
     )
+
+
+def _numerical(found: MeasuredComparison, column: Column) -> str:
+    """How many of the differences may be numerical."""
+    few = int((column.differs & found.is_numerical(column)).sum())
+    error = significant(100 * column.run.response.expected_error, 2)
+    return f" ({few} of them within the model's numerical error of {error} %)" if few else ""
 
 
 def _detectable(found: MeasuredComparison) -> float:
@@ -241,13 +250,16 @@ def coherence_parts(found: MeasuredComparison) -> list[str]:
     """Coherence of each line over time, repetitions and places, and what chance would leave."""
     c, main = found.coherence, main_column(found)
     places = over_places(found.lines.mean, main.model)
+    strongest = np.argsort(-np.abs(found.lines.mean).max(axis=1), kind="stable")[:MOST_COHERENT]
+    names = list(found.names)
     rows = [
-        [name, f"{found.lines.frequencies[k]:.1f}", _range(c.over_time[k]),
-         _range(c.over_repetitions[k]), significant(float(places[k]), 3)]
-        for k, name in enumerate(found.names)
+        [names[k], f"{found.lines.frequencies[k]:.1f}", _median(c.over_time[k]),
+         _median(c.over_repetitions[k]), significant(float(places[k]), 3)]
+        for k in np.sort(strongest)
     ]  # fmt: skip
-    header = ["line", "frequency, Hz", "data and model over time, least to largest place"]
-    header += ["between repetitions", f"pattern over the places, data and {label(main.run.column)}"]
+    header = ["line", "frequency, Hz", "data and model over time, median of the places"]
+    header += ["between repetitions, median"]
+    header += [f"pattern over the places, data and {label(main.run.column)}"]
     said = []
     for what, k in (("time", c.segments), ("repetitions", c.repetitions)):
         if k > 1:
@@ -259,11 +271,9 @@ def coherence_parts(found: MeasuredComparison) -> list[str]:
     return [paragraph("; ".join([about, *said]) + "."), table(header, rows)]
 
 
-def _range(values: np.ndarray) -> str:
-    if not np.isfinite(values).any():
-        return "-"
-    low, high = (significant(float(x), 3) for x in (np.nanmin(values), np.nanmax(values)))
-    return low if low == high else f"{low} to {high}"
+def _median(values: np.ndarray) -> str:
+    known = values[np.isfinite(values)]
+    return significant(float(np.median(known)), 3) if len(known) else "-"
 
 
 def write_tables(folder: Path, found: MeasuredComparison) -> None:

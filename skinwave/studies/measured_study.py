@@ -30,8 +30,9 @@ from skinwave.studies.measured_claims import MeasuredClaim, assess_measured, by_
 
 MEASURED = "measured"  # body and model of what is drawn beside the models
 LEVEL = 0.05  # chance that any difference at all is declared where there is none
-AGREES, DIFFERS, SILENT, UNKNOWN = (
-    "within the noise", "beyond the noise", "no line above the noise", "noise unknown"
+AGREES, DIFFERS, NUMERICAL, SILENT, UNKNOWN = (
+    "within the noise", "beyond the noise", "beyond the noise, within the numerical error",
+    "no line above the noise", "noise unknown",
 )  # fmt: skip
 MOST_DRAWN = 8  # places
 
@@ -105,12 +106,21 @@ class MeasuredComparison:
         """Misfit that noise alone would leave; nan if it is unknown."""
         return float(np.sqrt(self.lines.variance.sum() / (np.abs(self.lines.mean) ** 2).sum()))
 
+    def is_numerical(self, column: Column) -> np.ndarray:
+        """Mask (f, p) of differences no larger than the numerical error that a model's waveform is
+        expected to have at that place.
+        """
+        away = np.abs(self.lines.mean - column.model)
+        error = np.nan_to_num(column.run.response.expected_error)
+        return np.asarray(away <= error * np.linalg.norm(column.model, axis=0))
+
     def findings(self, column: Column) -> np.ndarray:
-        """What is found (f, p) of each difference: `AGREES`, `DIFFERS`, `SILENT` or `UNKNOWN`."""
+        """Finding (f, p) of each difference: one of `AGREES` to `UNKNOWN`."""
         with np.errstate(invalid="ignore"):
             silent = self.present >= LEVEL
         found = np.where(silent, SILENT, AGREES).astype(object)
         found[column.differs] = DIFFERS
+        found[column.differs & self.is_numerical(column)] = NUMERICAL
         found[np.isnan(column.significance)] = UNKNOWN
         return found
 
