@@ -5,7 +5,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 
 A_PERIOD = 8  # trial delays in a period of the highest line
-NEWTON = 8  # steps
+NEWTON = 5  # steps
 MOST_TRIALS = 2**21
 
 

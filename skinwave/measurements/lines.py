@@ -203,8 +203,9 @@ def _noise_beside(beside: Complex) -> tuple[Floats, float]:
 def in_step(each: Complex, frequencies: Floats) -> tuple[Complex, Floats]:
     """Repetitions (r, f, p) shifted onto their mean where they are out of step, and by how much.
 
-    Delays are those of least squares over all lines and places; they are taken where an F test of
-    what they leave against what there was is significant.
+    Delays are those of least squares over all lines and places, within a period of the lowest line;
+    they are taken where an F test of what they leave against what there was is significant for as
+    many independent delays as there were to choose from.
 
     Parameters
     ----------
@@ -233,7 +234,12 @@ def in_step(each: Complex, frequencies: Floats) -> tuple[Complex, Floats]:
     if not after > 0 or not frequencies.size:
         return each, np.zeros(r)
     gained = (before - after) / (r - 1) / (after / max(freedom, 1))
-    if fdtrc(r - 1, max(freedom, 1), max(gained, 0.0)) < JITTER:
+    chance = fdtrc(r - 1, max(freedom, 1), max(gained, 0.0))
+    choices = 2 * _period(frequencies) * float(frequencies.max())
+    power = float((weights * np.abs(shifted) ** 2).sum())
+    in_common = 1 - float(after) / power if power > 0 else 0.0
+    # Of noise alone delays can be found that bring it into step in part.
+    if chance * choices ** (r - 1) < JITTER and in_common > (1 + 1 / r) / 2:
         return shifted, shifts
     return each, np.zeros(r)
 
