@@ -66,12 +66,12 @@ def test_lines_without_noise_are_those_that_were_put_in():
     assert not found.shifts.any()
 
 
-@pytest.mark.parametrize("repetitions", [1, 2, 5])
+@pytest.mark.parametrize("repetitions", [1, 4])
 def test_amplitudes_are_within_their_circles_as_often_as_is_said(repetitions):
     rng = np.random.default_rng(repetitions)
     truth = GAIN * np.exp(-2j * np.pi * LINES * DELAY)[:, None] * MODEL
     inside = []
-    for _ in range(40):
+    for _ in range(30):
         found = lines_of(measured(rng, repetitions, 0.3), LINES)
         inside.append(np.abs(found.mean - truth) < radius(found, 0.95))
     assert 0.93 < np.mean(inside) < 0.97
@@ -87,7 +87,7 @@ def test_standard_errors_are_those_of_least_squares_of_white_noise():
     assert least < spread < 4 * least
 
 
-@pytest.mark.parametrize("repetitions", [1, 2, 5])
+@pytest.mark.parametrize("repetitions", [1, 4])
 def test_delay_and_gain_are_within_their_errors_as_often_as_is_said(repetitions):
     rng = np.random.default_rng(20 + repetitions)
     found = [
@@ -161,7 +161,7 @@ def test_repetitions_out_of_step_are_shifted_into_it():
 
 def test_repetitions_in_step_are_left_as_they_are():
     rng = np.random.default_rng(4)
-    moved = sum(bool(lines_of(measured(rng, 4, 0.3), LINES).shifts.any()) for _ in range(60))
+    moved = sum(bool(lines_of(measured(rng, 4, 0.3), LINES).shifts.any()) for _ in range(30))
     assert moved <= 1  # a thousandth of them
 
 
@@ -178,14 +178,14 @@ def test_significances_are_uniform_where_there_is_noise_alone():
 def test_the_chance_of_any_false_difference_is_as_stated():
     rng = np.random.default_rng(7)
     single, any_at_all = [], []
-    for _ in range(100):
+    for _ in range(60):
         lines = lines_of(measured(rng, 5, 0.2), LINES)
         away = lines.mean - align(lines, MODEL, window=0.05).applied(LINES, MODEL)
         p = significances(away, lines)
         single.append(np.mean(p < 0.05))
         any_at_all.append(holm(p).min() < 0.05)
     assert 0.03 < np.mean(single) < 0.06
-    assert np.mean(any_at_all) < 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 100)
+    assert np.mean(any_at_all) < 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 60)
 
 
 def test_differences_of_five_standard_errors_are_found():

@@ -18,6 +18,7 @@ BESIDE = np.array([3.0, 5.5, 8.0, 10.5, 13.0, 15.5])
 CLEAR = 2.5  # bins from any line, within which there is no noise alone
 FEWEST_BESIDE = 4  # bins, of which a noise is told
 MEDIAN_LOSS = 2.08  # 1 / ln(2)^2, variance of an exponential's median over that of its mean
+FEWEST_BINS = 16  # of a spectrum, fewer are single lines
 NEAREST = 1.0  # Hz, within which a spectrum must have a line
 JITTER = 1e-3  # significance from which repetitions are taken to be out of step
 
@@ -80,6 +81,13 @@ def measurable(measurement: Measurement, frequencies: Floats) -> np.ndarray:
     half = 0.5 * np.diff(axis).min(initial=2 * NEAREST)
     away = np.abs(frequencies[:, None] - axis).min(axis=1)
     return np.asarray((frequencies > 0) & (away <= min(half * (1 + 1e-9), NEAREST)))
+
+
+def bin_width(measurement: Measurement) -> float:
+    """Width in Hz of the bins of a spectrum; 0 of single lines, and where bins are not equal."""
+    steps = np.diff(measurement.frequencies)
+    even = len(steps) >= FEWEST_BINS and np.ptp(steps) <= 1e-3 * steps.mean()
+    return float(steps.mean()) if even else 0.0
 
 
 def lines_of(
@@ -175,11 +183,9 @@ def _of_spectra(measurement: Measurement, frequencies: Floats) -> tuple[Complex,
     """
     axis, values = measurement.frequencies, measurement.values
     nearest = np.abs(frequencies[:, None] - axis).argmin(axis=1)
-    steps = np.diff(axis)
-    even = len(steps) and np.ptp(steps) <= 1e-3 * steps.mean()
     away = np.unique(np.round((*BESIDE, *-BESIDE)).astype(int))
     beside = np.full((len(away), len(nearest), values.shape[2]), np.nan + 0j)
-    for k, shift in enumerate(away if even else ()):
+    for k, shift in enumerate(away if bin_width(measurement) else ()):
         at = nearest + shift
         clear = (at > 0) & (at < len(axis)) & (np.abs(at[:, None] - nearest) > CLEAR).all(axis=1)
         beside[k, clear] = values[0, at[clear]]

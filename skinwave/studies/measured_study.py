@@ -16,6 +16,8 @@ from skinwave.measurements.alignment import Alignment, align
 from skinwave.measurements.coherence import Coherence, coherence
 from skinwave.measurements.lines import (
     MeasuredLines,
+    as_response,
+    bin_width,
     evenly,
     holm,
     lines_of,
@@ -254,11 +256,11 @@ def _clock(measurement: Measurement) -> list[Response]:
     if not measurement.is_spectrum:
         times = evenly(measurement)
     else:
-        steps = np.diff(measurement.frequencies)
-        if not len(steps) or np.ptp(steps) > 1e-3 * steps.mean():
+        width = bin_width(measurement)
+        if not width:
             return []
         rate = 2.1 * measurement.frequencies[-1]
-        times = np.arange(int(rate / steps.mean())) / rate / (1 - SETTLE)
+        times = np.arange(int(rate / width)) / rate / (1 - SETTLE)
     return [_silence(times)]
 
 
@@ -271,13 +273,8 @@ def _silence(times: Floats) -> Response:
 def _spectrum(measurement: Measurement) -> tuple[Floats, Floats]:
     """Amplitude spectrum of the mean, for peaks; empty of spectra of single lines."""
     if not measurement.is_spectrum:
-        silent = Response(
-            model=MEASURED, times=evenly(measurement), probes=np.zeros((len(measurement.places), 2)),
-            values=measurement.mean, quantity=measurement.quantity,
-        )  # fmt: skip
-        return spectrum(silent)
-    steps = np.diff(measurement.frequencies)
-    if len(steps) < 3 or np.ptp(steps) > 1e-3 * steps.mean():
+        return spectrum(as_response(measurement, measurement.mean))
+    if not bin_width(measurement):
         return np.empty(0), np.empty((0, len(measurement.places)))
     return measurement.frequencies, np.abs(measurement.mean)
 
