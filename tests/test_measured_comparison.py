@@ -96,11 +96,15 @@ def test_a_model_three_tenths_too_stiff_is_found_out(models):
     assert column.differs[list(found.names).index("f_AM")].sum() >= 3
     assert column.misfit > 3 * found.noise
     assert (found.findings(column) == DIFFERS).any()
-    assert "does not agree with the data everywhere" in measured_page.conclusion(found)
-    assert "f_AM at" in measured_page.conclusion(found)
+    assert "does not agree with the data everywhere" in measured_page.conclusion(
+        found, main_column(found)
+    )
+    assert "f_AM at" in measured_page.conclusion(found, main_column(found))
     same = compare_measured(measured, models[True])
     assert main_column(same).misfit < column.misfit / 3
-    assert "agrees with the data within the noise" in measured_page.conclusion(same)
+    assert "agrees with the data within the noise" in measured_page.conclusion(
+        same, main_column(same)
+    )
     assert {*np.unique(same.findings(main_column(same)))} == {AGREES, SILENT}
 
 
@@ -111,7 +115,9 @@ def test_differences_within_the_numerical_error_are_marked(models):
     found = compare_measured(Measured(measurement=record(models[True][-1], rng, sigma=2e-5)), rough)
     findings = found.findings(main_column(found))
     assert (findings == NUMERICAL).any()
-    assert "within the model's numerical error of 50 %" in measured_page.conclusion(found)
+    assert "within the model's numerical error of 50 %" in measured_page.conclusion(
+        found, main_column(found)
+    )
 
 
 def test_delay_and_gain_are_those_given(models):
@@ -152,7 +158,7 @@ def test_a_spectrum_of_lines_is_compared_and_drawn(models):
     assert "3f_AM" in found.unresolved
     assert (found.findings(main_column(found)) == UNKNOWN).all()
     assert "cannot be said, since the noise of the data is unknown" in measured_page.conclusion(
-        found)  # fmt: skip
+        found, main_column(found))  # fmt: skip
     assert main_column(found).misfit < 1e-4
     drawn = beside(found, models[True])[-1].response
     size = np.ptp(run.response.values, axis=0)
@@ -252,7 +258,7 @@ def test_places_are_those_of_the_measurement_or_as_many():
     with pytest.raises(ValueError, match="2 signals are unknown, and the scene has 5 probes"):
         at_measured(AM, unknown)
     two = replace(AM, probes=((0.0, 0.0), (0.002, 0.0)))
-    assert at_measured(two, unknown) == two
+    assert at_measured(two, unknown) == replace(two, quantity="displacement")
     with pytest.raises(ValueError, match="off the body"):
         at_measured(AM, Measurement(places=places + 1, **given))
     with pytest.raises(ValueError, match="strain xx cannot be compared; give one of displacement"):
@@ -264,7 +270,7 @@ def test_records_that_show_no_line_are_refused(models):
     short = Measurement(quantity="velocity", places=measured.places, times=measured.times[:12],
                         values=measured.values[:, :12])  # fmt: skip
     with pytest.raises(ValueError, match="resolves no line of the scene's load; give a longer"):
-        compare_measured(Measured(measurement=short), models[True])
+        at_measured(AM, short)
 
 
 @pytest.fixture(scope="module")

@@ -131,7 +131,13 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
     from skinwave.studies.measured_study import Measured
 
     delay = None if options.delay is None else options.delay / 1e3
-    return Measured(measurement=read(options.measured), delay=delay, gain=options.gain)
+    try:
+        found = read(options.measured)
+    except ValueError as error:
+        raise ValueError(
+            f"{error}; `skinwave measured` takes these options, and writes a file that says all"
+        ) from None
+    return Measured(measurement=found, delay=delay, gain=options.gain)
 
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":

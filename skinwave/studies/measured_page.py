@@ -21,10 +21,12 @@ from skinwave.studies.measured_study import (
     UNKNOWN,
     Column,
     MeasuredComparison,
+    body_columns,
     drawn_places,
     main_column,
 )
 
+FEW = 4  # repetitions: of fewer the noise is poorly known
 MOST_ROWS = 30  # of differences on the page; all are in measured.csv
 MOST_COHERENT = 12  # lines, the strongest
 MOST_NAMED = 3  # lines that a sentence names
@@ -61,7 +63,7 @@ def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], 
     )  # fmt: skip
     return [document.section(
         "Beside the measurement",
-        paragraph(conclusion(found)),
+        *(paragraph(conclusion(found, column)) for column in body_columns(found)),
         *map(paragraph, remarks(found)),
         picture("measured", figure, CAPTION),
         columns_table(found),
@@ -74,9 +76,8 @@ def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], 
     )]  # fmt: skip
 
 
-def conclusion(found: MeasuredComparison) -> str:
-    """Whether the model of waves agrees with the data, and where not."""
-    column = main_column(found)
+def conclusion(found: MeasuredComparison, column: Column) -> str:
+    """Whether a model agrees with the data, and where not."""
     name, differs = label(column.run.column), column.differs
     known = np.isfinite(column.significance)
     left = f"its misfit is {significant(100 * column.misfit, 2)} % of the measured lines"
@@ -154,6 +155,7 @@ def remarks(found: MeasuredComparison) -> list[str]:
         said += f"{r} repetitions, whose spread is the noise"
         step = f"; they are out of step by up to {1e3 * np.ptp(shifts):.3g} ms, and were shifted"
         said += (step if shifts.any() else ", in step within it") + "."
+        said += " More of them would tell smaller differences." if r < FEW else ""
     lost = ", ".join(found.unresolved)
     return [
         said,

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.line_table import resolved_lines
-from simple_model.quantities import QUANTITIES
+from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from simple_model.response import SETTLE, spectrum, step
 from skinwave.comparison import heard_phasors
 from skinwave.measurements.alignment import Alignment, align
@@ -128,25 +128,30 @@ class MeasuredComparison:
 
 
 def at_measured(scene: Scene, measurement: Measurement) -> Scene:
-    """The scene with probes where was measured or, where that is unknown, with as many.
+    """The scene with probes where was measured or, where that is unknown, with as many; they read
+    displacement, as every comparison, and are read in the measured quantity beside it.
 
     Raises
     ------
     ValueError
-        If the quantity is not of normal motion, or places are unknown and not as many as probes.
+        If the quantity is not of normal motion, places are unknown and not as many as probes, or
+        the record resolves no line of the load.
     """
     if not measurement.record.is_normal:
         known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)
         raise ValueError(
             f"a measured {measurement.record.words} cannot be compared; give one of {known}"
         )
+    if scene.reading.is_on_surface and scene.reading.asked.is_normal:
+        scene = replace(scene, quantity=DISPLACEMENT.name)
     if np.isfinite(measurement.places).all():
-        return replace(scene, probes=tuple(map(tuple, measurement.places.tolist())))
-    if len(scene.probes) != len(measurement.places):
+        scene = replace(scene, probes=tuple(map(tuple, measurement.places.tolist())))
+    elif len(scene.probes) != len(measurement.places):
         raise ValueError(
             f"the places of the measurement's {len(measurement.places)} signals are unknown, and "
             f"the scene has {len(scene.probes)} probes; give as many, in the same order"
         )
+    lines_to_compare(measurement, scene)
     return scene
 
 
@@ -310,10 +315,15 @@ def _mean_in_step(comparison: MeasuredComparison) -> Floats:
     return np.asarray(np.mean(shifted, axis=0))
 
 
-def main_column(comparison: MeasuredComparison) -> Column:
-    """The column of waves: of the body, or of the last kernel if there is none."""
+def body_columns(comparison: MeasuredComparison) -> list[Column]:
+    """The columns of waves: of the bodies, or of the last kernel if there is none."""
     bodies = [c for c in comparison.columns if c.run.response.record.of_body]
-    return (bodies or list(comparison.columns))[-1]
+    return bodies or list(comparison.columns[-1:])
+
+
+def main_column(comparison: MeasuredComparison) -> Column:
+    """The last column of waves."""
+    return body_columns(comparison)[-1]
 
 
 def at_places(run: Run, chosen: np.ndarray) -> Run:
