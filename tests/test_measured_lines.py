@@ -156,6 +156,8 @@ def test_repetitions_out_of_step_are_shifted_into_it():
                      LINES)  # fmt: skip
     assert np.abs(found.shifts - (late - late.mean())).max() < 2e-5
     assert np.abs(np.abs(found.mean) - np.abs(truth)).max() < 0.02
+    record = measured(rng, 5, 0.0, values=values)
+    assert coherence(record, LINES).over_time.min() > 1 - 1e-6  # of segments, shifted alike
     assert found.shift_error == pytest.approx(late.std(ddof=1) / np.sqrt(5), rel=0.05)
 
 

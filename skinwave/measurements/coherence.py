@@ -1,12 +1,12 @@
 """Coherence of a measurement with the lines of a model, over time, repetitions and places."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.response import SETTLE
-from skinwave.measurements.lines import as_response, fit_lines, lines_of
+from simple_model.response import SETTLE, fit_lines
+from skinwave.measurements.lines import MeasuredLines, as_response, lines_of
 from skinwave.measurements.measurement import Measurement
 
 MOST_SEGMENTS = 8  # of each repetition
@@ -53,11 +53,11 @@ def coherence(
     -------
     Coherence
     """
-    segments = _segments(measurement, frequencies, settle)
-    each = lines_of(measurement, frequencies, settle=settle).each
+    lines = lines_of(measurement, frequencies, settle=settle)
+    segments = _segments(measurement, lines, settle)
     return Coherence(
         over_time=with_a_constant(segments), segments=len(segments),
-        over_repetitions=with_a_constant(each), repetitions=len(each),
+        over_repetitions=with_a_constant(lines.each), repetitions=len(lines.each),
     )  # fmt: skip
 
 
@@ -96,24 +96,25 @@ def floor(k: int, level: float = 0.95) -> float:
     return float(1 - (1 - level) ** (1 / (k - 1))) if k > 1 else float("nan")
 
 
-def _segments(measurement: Measurement, frequencies: Floats, settle: float) -> np.ndarray:
-    """Amplitudes (k, f, p) in segments of each repetition, as many as resolve the lines."""
-    if measurement.is_spectrum or not len(frequencies):
-        return lines_of(measurement, frequencies, settle=settle).each
+def _segments(measurement: Measurement, lines: MeasuredLines, settle: float) -> np.ndarray:
+    """Amplitudes (k, f, p) in segments of each repetition, as many as resolve the lines, shifted as
+    the repetitions were.
+    """
+    if measurement.is_spectrum or not len(lines.frequencies):
+        return lines.each
     r, t, p = measurement.values.shape
     first = int(np.ceil(settle * t))
+    apart = np.diff(np.concatenate([[0.0], np.sort(lines.frequencies)])).min()
     span = (t - first) / measurement.rate
-    apart = np.diff(np.concatenate([[0.0], np.sort(frequencies)])).min()
     count = int(np.clip(span * apart / RESOLVED, 1, MOST_SEGMENTS))
     length = (t - first) // count
-    together = as_response(measurement, measurement.values.transpose(1, 0, 2).reshape(t, r * p))
+    whole = as_response(measurement, measurement.values.transpose(1, 0, 2).reshape(t, r * p))
+    turned = np.exp(2j * np.pi * np.multiply.outer(lines.shifts, lines.frequencies))
     found = []
     for k in range(count):
         cut = slice(first + k * length, first + (k + 1) * length)
-        part = type(together)(
-            model=together.model, times=together.times[cut], probes=together.probes,
-            values=together.values[cut], quantity=together.quantity,
-        )  # fmt: skip
-        z = fit_lines(part, frequencies, settle=0.0)[0]
-        found.append(z.reshape(len(frequencies), r, p).transpose(1, 0, 2))
+        part = replace(whole, times=whole.times[cut], values=whole.values[cut])
+        z = fit_lines(part, lines.frequencies, settle=0.0)[0]
+        each = z.reshape(len(lines.frequencies), r, p).transpose(1, 0, 2)
+        found.append(each * turned[:, :, None])
     return np.concatenate(found)

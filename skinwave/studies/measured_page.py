@@ -68,12 +68,19 @@ def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], 
         picture("measured", figure, CAPTION),
         columns_table(found),
         paragraph(METHOD),
-        document.section(f"Largest differences of the {label(main.run.column)}",
-                         differences_table(found, main)),
+        _folded(f"Largest differences of the {label(main.run.column)}, line by line",
+                differences_table(found, main)),
+        _folded("Coherence of the lines", *coherence_parts(found)),
         document.section("Which of the paper's claims the measurement itself shows",
                          claims_table(found)),
-        document.section("Coherence of the lines", *coherence_parts(found)),
+        document.section("The models by themselves"),
     )]  # fmt: skip
+
+
+def _folded(heading: str, *parts: str) -> Markup:
+    return Markup("<details><summary>{}</summary>{}</details>").format(
+        heading, Markup("\n").join(parts)
+    )
 
 
 def conclusion(found: MeasuredComparison, column: Column) -> str:
@@ -96,8 +103,8 @@ def conclusion(found: MeasuredComparison, column: Column) -> str:
         )
     return (
         f"The {name} does not agree with the data everywhere: {differs.sum()} of {known.sum()} "
-        f"differences of lines at places are beyond the noise{_numerical(found, column)}, "
-        f"{_where(found, column)}; {left}."
+        f"differences of lines at places are beyond the noise{_numerical(found, column)}: "
+        f"{_where(found, column)}. {left[0].upper()}{left[1:]}."
     )
 
 
@@ -116,9 +123,11 @@ def _detectable(found: MeasuredComparison) -> float:
 
 def _where(found: MeasuredComparison, column: Column) -> str:
     """The lines and places where differences are beyond the noise, the largest first."""
-    away = np.where(column.differs, np.abs(found.lines.mean - column.model), 0)
+    real = column.differs & ~found.is_numerical(column)
+    shown = real if real.any() else column.differs
+    away = np.where(shown, np.abs(found.lines.mean - column.model), 0)
     order = np.argsort(-away.max(axis=1), kind="stable")
-    lines = [k for k in order if column.differs[k].any()]
+    lines = [k for k in order if shown[k].any()]
     names, asked = list(found.names), found.measurement.record
     said = []
     for k in lines[:MOST_NAMED]:
@@ -127,7 +136,7 @@ def _where(found: MeasuredComparison, column: Column) -> str:
         has, shows = (measured(float(np.abs(z[k, p])), asked)
                       for z in (column.model, found.lines.mean))  # fmt: skip
         said.append(
-            f"{names[k]} at {column.differs[k].sum()} of {away.shape[1]} places (most at "
+            f"{names[k]} at {shown[k].sum()} of {away.shape[1]} places (most at "
             f"{x:.3g}, {y:.3g} mm: measured {shows}, model {has}{_turned(found, column, k, p)})"
         )
     more = len(lines) - len(said)
