@@ -19,6 +19,7 @@ from skinwave.scene_file import dumps
 from skinwave.simulation import compute
 from skinwave.studies import measured_page
 from skinwave.studies.measured_claims import FAILS, HOLDS, UNDECIDED, assess_measured, by_name
+from skinwave.studies.measured_runs import at_measured, beside
 from skinwave.studies.measured_study import (
     AGREES,
     DIFFERS,
@@ -26,8 +27,6 @@ from skinwave.studies.measured_study import (
     SILENT,
     UNKNOWN,
     Measured,
-    at_measured,
-    beside,
     compare_measured,
     main_column,
 )
@@ -130,6 +129,18 @@ def test_delay_and_gain_are_those_given(models):
     assert not body.differs.any()
     late = compare_measured(replace(asked, delay=0.0), models[True])
     assert main_column(late).differs.any()
+
+
+def test_a_record_that_begins_before_the_motion_is_told(models):
+    rng = np.random.default_rng(8)
+    steady = record(models[True][-1], rng)
+    values = steady.values.copy()
+    values[:, :400] = 0  # of 900, of which the first 225 are left out
+    early = record(models[True][-1], rng, values=values)
+    said = [measured_page.remarks(compare_measured(Measured(measurement=m), models[True]))
+            for m in (steady, early)]  # fmt: skip
+    assert not any("not steady" in text for text in said[0])
+    assert "cut off what lies before and after the Tacton" in said[1][-1]
 
 
 def test_a_record_is_drawn_on_the_clock_of_the_model(models):

@@ -11,15 +11,8 @@ from scipy import stats
 from skinwave.measurements import Measurement
 from skinwave.measurements.alignment import align
 from skinwave.measurements.coherence import coherence, floor, over_places, unbiased
-from skinwave.measurements.lines import (
-    MeasuredLines,
-    ellipses,
-    holm,
-    lines_of,
-    measurable,
-    radius,
-    significances,
-)
+from skinwave.measurements.lines import MeasuredLines, lines_of, measurable
+from skinwave.measurements.significance import ellipses, holm, radius, significances
 
 RATE, SAMPLES = 2000.0, 1000
 LINES = np.array([51.0, 140.0, 190.0, 280.0, 332.0, 381.0])  # Hz

@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene import with_body
     from skinwave.scene_file import read
     from skinwave.studies import paper15
-    from skinwave.studies.measured_study import at_measured
+    from skinwave.studies.measured_runs import at_measured
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"

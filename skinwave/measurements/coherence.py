@@ -24,6 +24,8 @@ class Coherence:
     segments : their number k
     over_repetitions : (f, p) float, the same over the repetitions alone, each as a whole
     repetitions : their number
+    extremes : (2, f, p) float, least and largest amplitude in a segment, over the repetitions, in
+        the unit of the measurement: the same if the motion is steady
 
     Of k independent values with no coherence at all, 1/k is left on average; see `floor`.
     """
@@ -32,6 +34,7 @@ class Coherence:
     segments: int
     over_repetitions: Floats
     repetitions: int
+    extremes: Floats
 
 
 def coherence(
@@ -55,7 +58,9 @@ def coherence(
     """
     lines = lines_of(measurement, frequencies, settle=settle)
     segments = _segments(measurement, lines, settle)
+    each = np.abs(segments.reshape(-1, *lines.each.shape).mean(axis=1))
     return Coherence(
+        extremes=np.array([each.min(axis=0), each.max(axis=0)]),
         over_time=with_a_constant(segments), segments=len(segments),
         over_repetitions=with_a_constant(lines.each), repetitions=len(lines.each),
     )  # fmt: skip

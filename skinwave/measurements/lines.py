@@ -3,13 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import fdtrc
 
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import SETTLE, fit_lines
-from skinwave.measurements.delays import best_delay
 from skinwave.measurements.measurement import Measurement
+from skinwave.measurements.repetitions import in_step
 
 Complex = np.ndarray
 
@@ -20,7 +19,6 @@ FEWEST_BESIDE = 4  # bins, of which a noise is told
 MEDIAN_LOSS = 2.08  # 1 / ln(2)^2, variance of an exponential's median over that of its mean
 FEWEST_BINS = 16  # of a spectrum, fewer are single lines
 NEAREST = 1.0  # Hz, within which a spectrum must have a line
-JITTER = 1e-3  # significance from which repetitions are taken to be out of step
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,124 +202,3 @@ def _noise_beside(beside: Complex) -> tuple[Floats, float]:
         variance[enough] = np.nanmedian(power[:, enough], axis=0) / np.log(2)
     fewest = int(counts[enough].min(initial=len(power)))
     return variance, 2 * fewest / MEDIAN_LOSS
-
-
-def in_step(each: Complex, frequencies: Floats) -> tuple[Complex, Floats]:
-    """Repetitions (r, f, p) shifted onto their mean where they are out of step, and by how much.
-
-    Delays are those of least squares over all lines and places, within a period of the lowest line;
-    they are taken where an F test of what they leave against what there was is significant for as
-    many independent delays as there were to choose from.
-
-    Parameters
-    ----------
-    each : (r, f, p) complex, at least two repetitions
-    frequencies : (f,) float, Hz
-
-    Returns
-    -------
-    (r, f, p) complex, and the shifts (r,) in s, of mean zero
-    """
-    r = len(each)
-    spread = _squares(each).mean(axis=1, keepdims=True)  # of lines, over places
-    weights = 1 / np.where(spread > 0, spread, 1)
-    reference, shifts = each[0], np.zeros(r)
-    for _ in range(3):
-        products = (weights * reference.conj() * each).sum(axis=2)
-        shifts = np.array([best_delay(frequencies, s, _period(frequencies)) for s in products])
-        shifted = each * _turned(frequencies, shifts)
-        reference = shifted.mean(axis=0)
-        left = _squares(shifted).mean(axis=1, keepdims=True)
-        weights = 1 / np.where(left > 0, left, 1)
-    shifts = shifts - shifts.mean()
-    shifted = each * _turned(frequencies, shifts)
-    before, after = ((weights * _squares(x)).sum() for x in (each, shifted))
-    freedom = 2 * each[0].size * (r - 1) - (r - 1)
-    if not after > 0 or not frequencies.size:
-        return each, np.zeros(r)
-    gained = (before - after) / (r - 1) / (after / max(freedom, 1))
-    chance = fdtrc(r - 1, max(freedom, 1), max(gained, 0.0))
-    choices = 2 * _period(frequencies) * float(frequencies.max())
-    power = float((weights * np.abs(shifted) ** 2).sum())
-    in_common = 1 - float(after) / power if power > 0 else 0.0
-    # Of noise alone delays can be found that bring it into step in part.
-    if chance * choices ** (r - 1) < JITTER and in_common > (1 + 1 / r) / 2:
-        return shifted, shifts
-    return each, np.zeros(r)
-
-
-def _period(frequencies: Floats) -> float:
-    """Period in s of the lowest line, within which repetitions are sought."""
-    return 1 / float(frequencies.min()) if len(frequencies) else 0.0
-
-
-def _turned(frequencies: Floats, shifts: Floats) -> Complex:
-    return np.exp(2j * np.pi * np.multiply.outer(shifts, frequencies))[:, :, None]
-
-
-def _squares(each: Complex) -> Floats:
-    """Sum (f, p) of squared deviations from the mean."""
-    return np.asarray((np.abs(each - each.mean(axis=0)) ** 2).sum(axis=0))
-
-
-def ellipses(lines: MeasuredLines, level: float = 0.95) -> tuple[Floats, Floats, Floats]:
-    """Confidence ellipses of the means in the complex plane.
-
-    From the covariance of real and imaginary parts over the repetitions, by Hotelling's T2; of less
-    than four repetitions circles, by the circular statistic (Victor & Mast 1991,
-    doi 10.1016/0013-4694(91)90099-P).
-
-    Parameters
-    ----------
-    lines : MeasuredLines
-    level : confidence, 0..1
-
-    Returns
-    -------
-    semi-axes (f, p), the larger and the smaller, in the unit of the measurement, and the angle
-    (f, p) in rad of the larger from the real axis
-    """
-    from scipy.stats import f as fisher
-
-    r = len(lines.each)
-    if r < 4:
-        radius = np.sqrt(lines.variance * fisher.ppf(level, 2, lines.freedom))
-        return radius, radius, np.zeros_like(radius)
-    away = lines.each - lines.mean
-    parts = np.stack([away.real, away.imag])
-    covariance = np.einsum("irfp,jrfp->fpij", parts, parts) / (r - 1) / r
-    values, vectors = np.linalg.eigh(covariance)
-    reach = 2 * (r - 1) / (r - 2) * fisher.ppf(level, 2, r - 2)
-    minor, major = np.moveaxis(np.sqrt(np.maximum(reach * values, 0)), -1, 0)
-    return major, minor, np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1])
-
-
-def significances(away: Complex, lines: MeasuredLines) -> Floats:
-    """P-values (f, p) that deviations (f, p) from the means are noise, which is taken as circular.
-
-    |away|^2 over the variance of the mean is F distributed with 2 and 2 (r - 1) degrees of freedom
-    (Victor & Mast 1991); nan where the noise is unknown.
-    """
-    half = lines.freedom / 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.abs(away) ** 2 / lines.variance
-        found = (1 + ratio / half) ** -half
-    return np.where(np.isnan(lines.variance), np.nan, np.where(np.abs(away) == 0, 1.0, found))
-
-
-def radius(lines: MeasuredLines, level: float) -> Floats:
-    """Radius (f, p) about the means within which the true amplitudes lie with a confidence."""
-    half = lines.freedom / 2
-    return np.sqrt(lines.variance * half * ((1 - level) ** (-1 / half) - 1))
-
-
-def holm(p: Floats) -> Floats:
-    """P-values adjusted for their number, so that with a threshold of a the chance of any false
-    one among them is at most a (Holm 1979); nan stays.
-    """
-    known = np.flatnonzero(np.isfinite(p.ravel()))
-    order = known[np.argsort(p.ravel()[known], kind="stable")]
-    adjusted = np.full(p.size, np.nan)
-    times = len(order) - np.arange(len(order))
-    adjusted[order] = np.minimum(np.maximum.accumulate(times * p.ravel()[order]), 1.0)
-    return adjusted.reshape(p.shape)

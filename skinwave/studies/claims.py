@@ -7,7 +7,6 @@ Nothing here knows which model should fulfil which.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -15,57 +14,13 @@ from meshes.tetmesh import Floats
 from skinwave.numbers import decibel
 from skinwave.plain_text import csv_table
 from skinwave.run import Run
-from skinwave.scene import Scene
+from skinwave.studies.named_lines import NamedLines
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
 ABSENT = -120.0  # dB
 MUCH_LOWER = -20.0  # dB: a tenth
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 REACH = 6.0  # Hz from a line within which its spectral peak is looked for
-
-
-class NamedLines(Protocol):
-    """Lines by name that claims are assessed by: of a `Run`, or of a measurement."""
-
-    @property
-    def tacton(self) -> str:
-        """Name of the Tacton."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene, whose load has the lines."""
-
-    @property
-    def places(self) -> Floats:
-        """Places (p, 2) in metre."""
-
-    @property
-    def frequencies(self) -> dict[str, float]:
-        """Frequencies in Hz by name."""
-
-    @property
-    def lines(self) -> dict[str, Floats]:
-        """Amplitudes (p,) by name."""
-
-    @property
-    def unresolved(self) -> tuple[str, ...]:
-        """Names of unresolved lines."""
-
-    @property
-    def spectrum(self) -> tuple[Floats, Floats]:
-        """Frequencies (f,) in Hz and amplitudes (f, p)."""
-
-    @property
-    def is_am(self) -> bool:
-        """Whether the amplitude is modulated."""
-
-    @property
-    def is_stm(self) -> bool:
-        """Whether the focus moves."""
-
-    @property
-    def is_motion(self) -> bool:
-        """Whether they are of displacement."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,10 +7,12 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.quantities import DISPLACEMENT
-from skinwave.measurements.lines import MeasuredLines, radius
+from skinwave.measurements.lines import MeasuredLines
+from skinwave.measurements.significance import radius
 from skinwave.numbers import decibel
 from skinwave.scene import Scene
-from skinwave.studies.claims import CLAIMS, NEEDED, PAIRS, NamedLines, is_resolved, is_single
+from skinwave.studies.claims import CLAIMS, NEEDED, PAIRS, is_resolved, is_single
+from skinwave.studies.named_lines import NamedLines
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
 CONFIDENCE = 0.95  # that all true amplitudes are within their bounds
@@ -23,7 +25,7 @@ SOUGHT = {  # lines that a claim says are there, where the others are to be weak
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinesByName:
-    """Measured lines by name, as `claims.NamedLines`, with the `radius` (p,) of the confidence
+    """Measured lines by name, as `NamedLines`, with the `radius` (p,) of the confidence
     circle of each amplitude; `spectrum` is empty where there are only lines.
     """
 

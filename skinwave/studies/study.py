@@ -18,15 +18,14 @@ from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, check_motion, with_body
 from skinwave.simulation import check_options, compute
-from skinwave.studies import measured_page, paper15, study_page
+from skinwave.studies import measured_page, measured_tables, paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
 from skinwave.studies.claims import evaluate, write_claims
+from skinwave.studies.measured_runs import beside, in_quantity
 from skinwave.studies.measured_study import (
     Measured,
     MeasuredComparison,
-    beside,
     compare_measured,
-    in_quantity,
 )
 from skinwave.studies.study_page import StudyOutcome
 from skinwave.surface import has_wavenumber_integral
@@ -112,7 +111,7 @@ def run_study(
             first = shown(groups, maps) if outcome.runs == outcome.planned else None
         parts = study_page.page_parts(folder, groups, drawn, first, outcome, progress, figures)
         for comparison in found:
-            measured_page.write_tables(folder, comparison)
+            measured_tables.write_tables(folder, comparison)
             parts[:0] = measured_page.page_parts(comparison, partial(study_page.kept, folder))
         spent = replace(
             outcome,
