@@ -135,7 +135,8 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
         found = read(options.measured)
     except ValueError as error:
         raise ValueError(
-            f"{error}; `skinwave measured` takes these options, and writes a file that says all"
+            f"{error}; `skinwave measured {options.measured} --out DIR` takes such options, and "
+            "writes DIR/measurement.npz, which says all"
         ) from None
     return Measured(measurement=found, delay=delay, gain=options.gain)
 
