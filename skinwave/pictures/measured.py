@@ -119,8 +119,8 @@ def _labels(axes: np.ndarray, places: Floats, quantity: Quantity) -> None:
     axes[0, 1].set_title("phase of the model less the measured one, degrees", fontsize="medium")
     for ax in axes[-1]:
         ax.set_xticks(range(len(places)))
-        ax.set_xticklabels([f"{1e3 * x:.3g}, {1e3 * y:.3g}" for x, y in places])
-        ax.set_xlabel("place x, y in mm")
+        ax.set_xticklabels([f"{1e3 * x:.3g}\n{1e3 * y:.3g}" for x, y in places])
+        ax.set_xlabel("place, x above y, mm")
         ax.set_xlim(-0.6, len(places) - 0.4)
     for ax in axes[:, 0]:
         ax.set_ylim(bottom=0)
