@@ -16,6 +16,7 @@ import tomli_w
 from fem.materials import PRESETS
 from meshes import reading
 from simple_model.choices import choose, meant
+from skinwave.distributions import without_spreads
 from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, loads, parsed, read
@@ -219,7 +220,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
-    keys = _flat(tomllib.loads(text))
+    keys = _flat(without_spreads(tomllib.loads(text))[0])
     for key, value in varied.items():  # a name for a number, as of a depth, is that number
         keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
     return DesignPoint(varied=varied, keys=keys, text=text, scene=scene, error=error)
