@@ -7,12 +7,19 @@
 nothing else is said, with `value` for their median, so that no sample changes sign.
 """
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite, log, log1p, sqrt
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtri
+
+from meshes.tetmesh import Floats
 from simple_model.choices import choose, meant
+from skinwave.plain_text import number_in
 
 VALUE, SHAPE = "value", "distribution"  # keys of a table beside its width
 TAIL = 1.6448536269514722  # standard deviations from the median of a normal to its 95th percentile
@@ -83,8 +90,8 @@ class Distribution:
         """Whether it is of no width: the number is known."""
         return self.measure != "bounds" and self.width[0] == float(self.measure == "factor")
 
-    def about(self, value: float) -> Any:
-        """Frozen distribution of `scipy.stats` about a central value.
+    def quantile(self, value: float, shares: ArrayLike) -> Floats:
+        """Quantiles (...) about a central value, at shares (...) above 0 and below 1.
 
         Raises
         ------
@@ -92,7 +99,7 @@ class Distribution:
             If the value does not fit: outside the bounds, or not above 0 of a lognormal.
         """
         self.check(value)
-        return FROZEN[self.shape](value, self)
+        return np.asarray(QUANTILES[self.shape](value, self, np.asarray(shares, np.float64)))
 
     def check(self, value: float) -> None:
         """Refuse a central value that it cannot be about; raises a ValueError."""
@@ -119,37 +126,31 @@ class Distribution:
         return f"{self.shape}, standard error {self.width[0]:g}"
 
 
-def _lognormal(value: float, given: Distribution) -> Any:
+def _lognormal(value: float, given: Distribution, shares: Floats) -> Floats:
     """Of median `value`; s^2 = ln(1 + c^2) for a coefficient of variation c."""
-    from scipy import stats
-
     (width,) = given.width
     s = log(width) / TAIL if given.measure == "factor" else sqrt(log1p(width**2))
-    return stats.lognorm(s=s, scale=value)
+    return value * np.exp(s * ndtri(shares))
 
 
-def _normal(value: float, given: Distribution) -> Any:
-    from scipy import stats
-
+def _normal(value: float, given: Distribution, shares: Floats) -> Floats:
     (width,) = given.width
-    return stats.norm(value, width if given.measure == "standard_error" else width * abs(value))
+    return value + (width if given.measure == "standard_error" else width * abs(value)) * ndtri(shares)
 
 
-def _uniform(value: float, given: Distribution) -> Any:
-    from scipy import stats
-
+def _uniform(value: float, given: Distribution, shares: Floats) -> Floats:
     low, high = given.width
-    return stats.uniform(low, high - low)
+    return low + (high - low) * shares
 
 
-def _triangular(value: float, given: Distribution) -> Any:
-    from scipy import stats
-
+def _triangular(value: float, given: Distribution, shares: Floats) -> Floats:
     low, high = given.width
-    return stats.triang((value - low) / (high - low), low, high - low)
+    rising = low + np.sqrt(shares * (high - low) * (value - low))
+    falling = high - np.sqrt((1 - shares) * (high - low) * (high - value))
+    return np.where(shares * (high - low) < value - low, rising, falling)
 
 
-FROZEN: Mapping[str, Callable[[float, Distribution], Any]] = {
+QUANTILES: Mapping[str, Callable[[float, Distribution, Floats], Floats]] = {
     "lognormal": _lognormal,
     "normal": _normal,
     "uniform": _uniform,
@@ -196,6 +197,51 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from None
     return found
+
+
+CALLED = re.compile(r"\s*(normal|lognormal|factor|uniform|triangular)\s*\(([^()]*)\)\s*")
+ARGUMENTS = {"normal": 2, "lognormal": 2, "factor": 2, "uniform": 2, "triangular": 3}
+
+
+def called(text: str) -> tuple[float, Distribution] | None:
+    """Central value and distribution of a text such as normal(25e3, 0.3), lognormal(25e3, 0.3),
+    factor(25e3, 2), uniform(10, 20) or triangular(10, 15, 20); None of any other text.
+
+    The first number is the central value and the second its relative standard deviation or factor;
+    of the last two all are limits, with the mode of a triangular one between them.
+
+    Raises
+    ------
+    ValueError
+        If it has other numbers than that.
+    """
+    match = CALLED.fullmatch(text)
+    if match is None:
+        return None
+    name, words = match[1], match[2].split(",")
+    numbers = [x for x in map(number_in, words) if x is not None]
+    if len(numbers) != len(words) or len(numbers) != ARGUMENTS[name]:
+        raise ValueError(f"{text.strip()} needs {ARGUMENTS[name]} numbers; write {EXAMPLES[name]}")
+    if name in ("uniform", "triangular"):
+        low, *mode, high = numbers
+        found = Distribution(shape=name, measure="bounds", width=(low, high))
+        value = mode[0] if mode else (low + high) / 2
+    else:
+        value, width = numbers
+        plain = {"shape": "lognormal", "measure": "factor"}
+        kind = plain if name == "factor" else {"shape": name, "measure": "spread"}
+        found = Distribution(**kind, width=(width,))
+    found.check(value)
+    return value, found
+
+
+EXAMPLES = {
+    "normal": "normal(25e3, 0.3)",
+    "lognormal": "lognormal(25e3, 0.3)",
+    "factor": "factor(25e3, 2)",
+    "uniform": "uniform(10, 20)",
+    "triangular": "triangular(10, 15, 20)",
+}
 
 
 def _number(key: str, own: str, value: Any) -> float:

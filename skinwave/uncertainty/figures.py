@@ -7,10 +7,12 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from meshes.tetmesh import Floats
 from simple_model import threshold
 from simple_model.line_names import line_frequency
+from skinwave.pictures.figures import HIGHEST
 from skinwave.pictures.levels import written
 from skinwave.pictures.maps import SEQUENTIAL
 from skinwave.pictures.styles import STYLES, Style
@@ -46,10 +48,11 @@ def bands_figure(found: Ensemble, centre: Floats, style: Style = REPORT) -> Figu
         axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
         waveforms = per * percentiles(found.waveform)
         lines = per * percentiles(found.lines)
+        most = int(np.argmax(np.median(found.rms, axis=0)))
         for p, (x, y) in enumerate(probes):
             _waveform(axes[p, 0], 1e3 * shown_times(found.scene), waveforms[..., p])
             axes[p, 0].plot(1e3 * shown_times(found.scene), per * centre[:, p], color=CENTRE, lw=1)
-            _lines(axes[p, 1], found, lines[..., p], named=p == 0)
+            _lines(axes[p, 1], found, lines[..., p], named=p == most)
             axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
         asked = found.scene.reading.asked
         axes[0, 0].set_title(f"{asked.words} about its mean, {asked.shown}", fontsize="medium")
@@ -92,14 +95,16 @@ def _lines(ax: Axes, found: Ensemble, bands: Floats, *, named: bool) -> None:
     ax.plot(f, median, "o", color="white", mec=BAND, ms=4)
     ax.set_yscale("log")
     top = float(median.max(initial=1e-9))
-    ax.set_ylim(max(float(low.min(initial=top)), 1e-3 * top) / 1.5, float(high.max(initial=top)) * 4)
+    ax.set_ylim(1e-3 * top, 30 * top)
+    ax.set_xlim(0, HIGHEST)
     if _is_skin(found):
         grid = np.geomspace(max(10.0, np.nanmin(f) / 1.2), min(1000.0, np.nanmax(f) * 1.2), 200)
         ax.plot(grid, 1e6 * threshold(grid), color="0.45", lw=1.2, zorder=0)
     ax.grid(alpha=0.25)
     if named:
-        for k in np.argsort(-median)[:NAMED_LINES]:
-            ax.annotate(written(names[k]), (f[k], high[k]), xytext=(0, 3), ha="center", rotation=60,
+        shown = [k for k in np.argsort(-median) if f[k] < HIGHEST]
+        for k in shown[:NAMED_LINES]:
+            ax.annotate(written(names[k]), (f[k], high[k]), xytext=(0, 3), ha="center", rotation=90,
                         textcoords="offset points", va="bottom", fontsize="x-small")  # fmt: skip
 
 
@@ -138,18 +143,52 @@ def maps_figure(found: Ensemble, style: Style = REPORT) -> Figure:
 
 def _image(ax: Axes, values: Floats, frame: tuple[float, ...], **limits: float) -> Any:
     extent: Any = frame
-    return ax.imshow(values, origin="lower", extent=extent, cmap=SEQUENTIAL, **limits)
+    return ax.imshow(values, origin="lower", extent=extent, cmap=SEQUENTIAL,
+                     interpolation="bilinear", **limits)  # fmt: skip
+
+
+def distances_figure(
+    radii: Floats, bands: Mapping[str, Floats], style: Style = REPORT
+) -> Figure:
+    """Bands of 50 and 90 % of quantities at the probes, over their distance.
+
+    Parameters
+    ----------
+    radii : (p,) float, mm
+    bands : percentiles (5, p) by label
+    style : Style
+
+    Returns
+    -------
+    Figure
+    """
+    order = np.argsort(radii, kind="stable")
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=style.size(10.5, 3.2), layout="constrained")
+        axes = figure.subplots(1, len(bands), squeeze=False)[0]
+        for ax, (name, each) in zip(axes, bands.items(), strict=True):
+            _waveform(ax, radii[order], each[:, order])
+            ax.plot(radii[order], each[2, order], "o", color=BAND, ms=4)
+            ax.set(xlabel="distance of the probe from the middle, mm", ylabel=name)
+    return figure
+
+
+ENDS = tuple(f"number at its {share} % quantile" for share in (PERCENTILES[0], PERCENTILES[-1]))
 
 
 def tornado_figure(
-    charts: Mapping[str, Tornado], keys: Sequence[str], style: Style = REPORT
+    charts: Mapping[str, Tornado],
+    keys: Sequence[str],
+    ends: Sequence[str] = ENDS,
+    style: Style = REPORT,
 ) -> Figure:
-    """Tornado charts: each output with one number at a time at the ends of its 90 %.
+    """Tornado charts: each output with one number at a time at either end.
 
     Parameters
     ----------
     charts : by name of the output
     keys : (d,) names of the numbers
+    ends : what a legend calls the low and the high end
     style : Style
 
     Returns
@@ -169,8 +208,7 @@ def tornado_figure(
             ax.set_title(name, fontsize="small")
             ax.grid(alpha=0.25, axis="x")
         handles = [
-            mpl.patches.Patch(color=colour, label=f"number at its {share} % quantile")
-            for colour, share in ((BAND, PERCENTILES[0]), (CENTRE, PERCENTILES[-1]))
+            Patch(color=colour, label=end) for colour, end in zip((BAND, CENTRE), ends, strict=True)
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     return figure

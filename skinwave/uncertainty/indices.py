@@ -13,6 +13,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from skinwave.spreads import Spread
+from skinwave.sweeps.saltelli import saltelli_shares
 from skinwave.uncertainty.sampling import one_at_a_time, quantiles
 
 Outputs = Mapping[str, Floats]  # samples (n,) by name
@@ -52,26 +53,8 @@ class Tornado:
 
 
 def saltelli(spreads: Sequence[Spread], n: int, seed: int = 0) -> Floats:
-    """Samples (n (d + 2), d) that Sobol' indices need: matrices A, B and, for each number, A with
-    its column of B, from a Sobol' sequence of 2 d numbers.
-
-    Raises
-    ------
-    ValueError
-        If n is no power of two, which balances the sequence.
-    """
-    from scipy.stats import qmc
-
-    if n < 2 or n & (n - 1):
-        near = 2 ** max(1, round(np.log2(max(n, 2))))
-        raise ValueError(f"{n} samples of each matrix are no power of two; take {near}")
-    d = len(spreads)
-    shares = qmc.Sobol(2 * d, rng=seed).random(n)
-    a, b = (quantiles(spreads, part) for part in np.split(shares, 2, axis=1))
-    mixed = np.tile(a, (d, 1, 1))
-    for k in range(d):
-        mixed[k, :, k] = b[:, k]
-    return np.vstack([a, b, *mixed])
+    """Samples (n (d + 2), d) that Sobol' indices need; raises a ValueError if n is no power of two."""
+    return quantiles(spreads, saltelli_shares(len(spreads), n, seed))
 
 
 def sobol_indices(values: Floats, d: int, seed: int = 0) -> SobolIndices:
