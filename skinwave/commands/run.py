@@ -84,12 +84,14 @@ def _uncertainty(
     options: argparse.Namespace, run: "Run", h: float | None, folder: Path
 ) -> list[str]:
     """Bands over samples of the uncertain numbers: their tables in the folder, parts of a page."""
+    from skinwave.effort import usable_cores
     from skinwave.uncertainty.report import uncertainty_of, write
 
     with progress_of(options) as progress:
         known = uncertainty_of(
             run.scene, options.samples, run.model, progress,
             h=h or metre(options.h), solver=options.solver, seed=options.seed,
+            workers=usable_cores(),
         )  # fmt: skip
     return write(folder, known)
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats
 from simple_model import named_lines
-from skinwave.effort import Progress, one_thread, silent, usable_cores
+from skinwave.effort import Progress, one_thread, silent
 from skinwave.models.flat_body import HARMONIC
 from skinwave.processes import as_worker, pool
 from skinwave.scene import Scene
-from skinwave.spreads import Spread, spreads_of, with_values
+from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
 from skinwave.uncertainty.sampling import samples
 from skinwave.uncertainty.solutions import Method, Solution, has_exact_map, map_axes, solve
 
@@ -71,7 +71,7 @@ def propagate(
     h: float | None = None,
     solver: str = "auto",
     seed: int = 0,
-    workers: int | None = None,
+    workers: int = 1,
     progress: Progress | None = None,
 ) -> Ensemble:
     """Ensemble of a scene under a Latin hypercube of its uncertain numbers.
@@ -84,7 +84,7 @@ def propagate(
     h : metre, its element size
     solver : a backend of `fem.linear_solver`
     seed : of the samples
-    workers : processes; all cores if not given
+    workers : processes; with several, a script needs `if __name__ == "__main__"`
     progress : called with the name of the phase and the fraction done
 
     Returns
@@ -117,7 +117,10 @@ def method_of(
     Method
     """
     lines = tuple(named_lines(scene.pressure, WEAKEST, most=MOST))
-    return Method(lines=lines, model=model, h=h, solver=solver, mapped=has_exact_map(scene))
+    same = all(s.part == "material" or s.key == PRESSURE for s in spreads_of(scene))
+    return Method(
+        lines=lines, model=model, h=h, solver=solver, mapped=has_exact_map(scene), same_load=same
+    )
 
 
 def ensemble(
@@ -126,7 +129,7 @@ def ensemble(
     values: Floats,
     method: Method,
     *,
-    workers: int | None = None,
+    workers: int = 1,
     progress: Progress | None = None,
 ) -> Ensemble:
     """Ensemble of given samples, the same whatever the number of processes.
@@ -137,7 +140,7 @@ def ensemble(
     spreads : (d,) Spread
     values : (n, d) float
     method : Method
-    workers : processes; all cores if not given
+    workers : processes; with several, a script needs `if __name__ == "__main__"`
     progress : called with the name of the phase and the fraction done
 
     Returns
@@ -152,13 +155,12 @@ def ensemble(
     keys = tuple(spread.key for spread in spreads)
     batches = np.split(values, range(BATCH, len(values), BATCH))
     work = partial(_batch, scene, keys, method)
-    count = workers or usable_cores()
     report = progress or silent
-    if count < 2 or len(values) <= ALONE:
+    if workers < 2 or len(values) <= ALONE:
         with one_thread():
             found = [_reported(work(b), k, len(batches), report) for k, b in enumerate(batches)]
     else:
-        with pool(count, as_worker) as processes:
+        with pool(workers, as_worker) as processes:
             futures = [processes.submit(work, batch) for batch in batches]
             found = [
                 _reported(future.result(), k, len(batches), report)

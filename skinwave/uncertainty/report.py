@@ -65,12 +65,13 @@ def uncertainty_of(
     h: float | None = None,
     solver: str = "auto",
     seed: int = 0,
+    workers: int = 1,
 ) -> Uncertainty:
     """Ensemble of a scene, and its outputs with one number at a time at its ends.
 
     Parameters
     ----------
-    scene, n, model, h, solver, seed, progress : as for `propagate`
+    scene, n, model, h, solver, seed, workers, progress : as for `propagate`
 
     Returns
     -------
@@ -81,7 +82,9 @@ def uncertainty_of(
     ValueError
         As `propagate` does.
     """
-    found = propagate(scene, n, model=model, h=h, solver=solver, seed=seed, progress=progress)
+    found = propagate(
+        scene, n, model=model, h=h, solver=solver, seed=seed, workers=workers, progress=progress
+    )
 
     def evaluate(values: Floats) -> Mapping[str, Floats]:
         return outputs(ensemble(scene, found.spreads, values, found.method))

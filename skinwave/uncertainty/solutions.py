@@ -14,7 +14,9 @@ from meshes.tetmesh import Floats
 from simple_model import sensation_level
 from simple_model.flat_body import steady_lines
 from simple_model.line_names import line_frequency
-from simple_model.load_spectrum import synthesise
+from simple_model.load_spectrum import Complex, synthesise
+from simple_model.path_operator import PathOperator, path_operator
+from simple_model.pressure import MovingPressure
 from simple_model.response import SETTLE, phasors
 from skinwave.bodies.analytic import exact_waves
 from skinwave.models import named
@@ -33,8 +35,8 @@ KEPT = 4  # solutions that may differ by the pressure alone
 @dataclass(frozen=True, kw_only=True)
 class Method:
     """How samples are solved: names of the `lines` that are looked at, the `model` with its element
-    size `h` in metre, its `solver` and its `tolerance`, and whether it is `mapped`, by the
-    wavenumber integral.
+    size `h` in metre, its `solver` and its `tolerance`; whether it is `mapped`, by the wavenumber
+    integral; and whether all samples have one load, `same_load`, but for its pressure.
     """
 
     lines: tuple[str, ...]
@@ -43,6 +45,7 @@ class Method:
     solver: str = "auto"
     tolerance: float = 0.05
     mapped: bool = False
+    same_load: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,8 +157,7 @@ def _mapped(scene: Scene, method: Method, frequencies: Floats) -> Solution:
     x, y = map_axes(scene)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points = np.vstack([scene.probe_points, places])
-    compliance = exact_waves(scene.body, HARMONIC.name)
-    f, a = steady_lines(compliance, scene.pressure, points, threshold=FAINT)
+    f, a = _lines(scene, points, method)
     f, a = f[f > 0], a[f > 0]
     p = len(scene.probes)
     rms = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2)
@@ -167,6 +169,19 @@ def _mapped(scene: Scene, method: Method, frequencies: Floats) -> Solution:
         map_rms=rms[p:].reshape(len(y), len(x)),
         map_level=_highest(f, np.abs(a[:, p:])).reshape(len(y), len(x)),
     )
+
+
+def _lines(scene: Scene, points: Floats, method: Method) -> tuple[Floats, Complex]:
+    compliance = exact_waves(scene.body, HARMONIC.name)
+    if not method.same_load:
+        return steady_lines(compliance, scene.pressure, points, threshold=FAINT)
+    operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
+    return operator.steady_lines(compliance)
+
+
+@lru_cache(maxsize=2)
+def _operator(pressure: MovingPressure, points: tuple[tuple[float, ...], ...]) -> PathOperator:
+    return path_operator(pressure, points, threshold=FAINT)
 
 
 def _at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats:
