@@ -135,7 +135,9 @@ def _lognormal(value: float, given: Distribution, shares: Floats) -> Floats:
 
 def _normal(value: float, given: Distribution, shares: Floats) -> Floats:
     (width,) = given.width
-    return value + (width if given.measure == "standard_error" else width * abs(value)) * ndtri(shares)
+    return value + (width if given.measure == "standard_error" else width * abs(value)) * ndtri(
+        shares
+    )
 
 
 def _uniform(value: float, given: Distribution, shares: Floats) -> Floats:

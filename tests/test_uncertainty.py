@@ -101,7 +101,10 @@ def test_a_scene_with_spreads_is_complete_and_takes_the_central_values():
         ("{ value = 50, low = 1, high = 3 }", "outside low = 1 .. high = 3"),
         ("{ value = 50, spread = -1 }", "below 0"),
         ("{ value = 50, factor = 0.5 }", "below 1"),
-        ("{ value = 50, factor = 2, distribution = 'normal' }", "normal distribution has no factor"),
+        (
+            "{ value = 50, factor = 2, distribution = 'normal' }",
+            "normal distribution has no factor",
+        ),
         ("{ value = 0, spread = 0.2 }", "give standard_error"),
         ("{ value = 'a', spread = 0.2 }", "must be a number"),
         ("{ value = 50, spread = nan }", "must be finite"),
@@ -270,7 +273,9 @@ def test_the_budget_of_the_pressure_is_its_closed_form():
     scene = replace(loads(SLAB), spreads=())
     found = error_budget(scene, 0.02)
     assert found.device == pytest.approx(sinh(log(2) / stats.norm.ppf(0.95)), rel=1e-6)
-    assert "numerical 2.0 %; one standard deviation of the material of no known spread" in found.words
+    assert (
+        "numerical 2.0 %; one standard deviation of the material of no known spread" in found.words
+    )
 
 
 def test_a_finer_mesh_than_a_tenth_of_the_material_gains_nothing():
@@ -374,4 +379,3 @@ def test_what_ignores_a_spread_says_so_once(tmp_path, capsys):
     path.write_text(SLAB.replace('{ value = 50, spread = 0.2, distribution = "normal" }', "50"))
     note_central_values(asked)
     assert capsys.readouterr().err == ""
-

@@ -34,8 +34,12 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, body=skin-slab,palm; "
         "start:stop or normal(25e3,0.3), lognormal, factor, uniform, triangular of lhs and sobol",
     )  # fmt: skip
-    parser.add_argument("--design", default="factorial", help="factorial (default), zip, lhs or sobol")
-    parser.add_argument("--samples", type=int, metavar="N", help="runs of lhs; rows of each matrix of sobol")
+    parser.add_argument(
+        "--design", default="factorial", help="factorial (default), zip, lhs or sobol"
+    )
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="runs of lhs; rows of each matrix of sobol"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of a Latin hypercube")
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     parser.add_argument(

@@ -45,8 +45,8 @@ class ErrorBudget:
     def words(self) -> str:
         """The three in one sentence."""
         return (
-            f"Error of the worst probe's waveform: numerical {_percent(self.numerical)}; one standard "
-            f"deviation of the {self.spreads}"
+            f"Error of the worst probe's waveform: numerical {_percent(self.numerical)}; one "
+            f"standard deviation of the {self.spreads}"
         )
 
     @property

@@ -129,8 +129,8 @@ def combinations(
         raise ValueError(f"{twice[0]} is varied twice; give all its values at once")
     if (samples is None) == (design in SAMPLED):
         raise ValueError(
-            "--samples belongs to --design lhs or sobol, and lhs needs it as sobol does; give both or "
-            "none"
+            "--samples belongs to --design lhs or sobol, and lhs needs it as sobol does; give both "
+            "or none"
         )
     if design in SAMPLED:
         return _sampled(variations, design, samples or 0, seed)

@@ -141,15 +141,13 @@ def maps_figure(found: Ensemble, style: Style = REPORT) -> Figure:
     return figure
 
 
-def _image(ax: Axes, values: Floats, frame: tuple[float, ...], **limits: float) -> Any:
+def _image(ax: Axes, values: Floats, frame: tuple[float, ...], **limits: Any) -> Any:
     extent: Any = frame
     return ax.imshow(values, origin="lower", extent=extent, cmap=SEQUENTIAL,
                      interpolation="bilinear", **limits)  # fmt: skip
 
 
-def distances_figure(
-    radii: Floats, bands: Mapping[str, Floats], style: Style = REPORT
-) -> Figure:
+def distances_figure(radii: Floats, bands: Mapping[str, Floats], style: Style = REPORT) -> Figure:
     """Bands of 50 and 90 % of quantities at the probes, over their distance.
 
     Parameters

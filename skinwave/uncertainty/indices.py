@@ -53,7 +53,7 @@ class Tornado:
 
 
 def saltelli(spreads: Sequence[Spread], n: int, seed: int = 0) -> Floats:
-    """Samples (n (d + 2), d) that Sobol' indices need; raises a ValueError if n is no power of two."""
+    """Samples (n (d + 2), d) for Sobol' indices; raises a ValueError if n is no power of two."""
     return quantiles(spreads, saltelli_shares(len(spreads), n, seed))
 
 

@@ -195,9 +195,7 @@ def _percentile_rows(rows: Sequence[Row]) -> Iterator[list[str]]:
             yield [column, at, f"{x[p]:.6g}", f"{y[p]:.6g}", *(f"{v:.6g}" for v in band)]
 
 
-def _index_rows(
-    indices: Mapping[str, SobolIndices], keys: Sequence[str]
-) -> Iterator[list[str]]:
+def _index_rows(indices: Mapping[str, SobolIndices], keys: Sequence[str]) -> Iterator[list[str]]:
     for name, one in indices.items():
         columns = (one.first, one.first_error, one.total, one.total_error)
         for k, key in enumerate(keys):

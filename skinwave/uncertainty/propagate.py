@@ -102,9 +102,7 @@ def propagate(
     return ensemble(scene, spreads, values, method, workers=workers, progress=progress)
 
 
-def method_of(
-    scene: Scene, model: str, *, h: float | None = None, solver: str = "auto"
-) -> Method:
+def method_of(scene: Scene, model: str, *, h: float | None = None, solver: str = "auto") -> Method:
     """Method that samples of a scene are solved by.
 
     Parameters
@@ -178,16 +176,12 @@ def ensemble(
     )  # fmt: skip
 
 
-def _reported(
-    found: list[Solution], k: int, batches: int, report: Progress
-) -> list[Solution]:
+def _reported(found: list[Solution], k: int, batches: int, report: Progress) -> list[Solution]:
     report("samples", (k + 1) / batches)
     return found
 
 
-def _batch(
-    scene: Scene, keys: tuple[str, ...], method: Method, values: Floats
-) -> list[Solution]:
+def _batch(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) -> list[Solution]:
     """Solutions of some samples (b, d), on a worker."""
     found = []
     for row in values:

@@ -133,10 +133,12 @@ def sentences(found: Ensemble) -> list[str]:
     )  # fmt: skip
     p, asked = strongest(found), found.scene.reading.asked
     x, y = (1e3 * z for z in found.scene.probes[p])
-    low, _, median, _, high = (significant(asked.per_unit * v) for v in percentiles(found.rms)[:, p])
+    low, _, median, _, high = (
+        significant(asked.per_unit * v) for v in percentiles(found.rms)[:, p]
+    )
     said = [
         f"{n} samples of {d} uncertain number{'s' * (d > 1)}, {how}.",
-        f"RMS at ({x:g}, {y:g}) mm: {median} {asked.shown}, in nine of ten samples {low} to {high}.",
+        f"RMS at ({x:g}, {y:g}) mm: {median} {asked.shown}, in nine of ten {low} to {high}.",
     ]
     named = outputs(found)
     if (name := "highest sensation level at a probe, dB") in named:

@@ -57,9 +57,7 @@ def check(spreads: Sequence[Spread], n: int, seed: int) -> None:
 def quantiles(spreads: Sequence[Spread], shares: Floats) -> Floats:
     """Quantiles (n, d) of numbers (d,), at shares (n, d) of 0 to 1."""
     clipped = np.clip(shares, EDGE, 1 - EDGE)
-    columns = [
-        s.distribution.quantile(s.value, u) for s, u in zip(spreads, clipped.T, strict=True)
-    ]
+    columns = [s.distribution.quantile(s.value, u) for s, u in zip(spreads, clipped.T, strict=True)]
     return np.stack(columns, axis=1)
 
 
