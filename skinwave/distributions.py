@@ -127,7 +127,7 @@ class Distribution:
 
 
 def _lognormal(value: float, given: Distribution, shares: Floats) -> Floats:
-    """Of median `value`; s^2 = ln(1 + c^2) for a coefficient of variation c."""
+    """Median `value`; s^2 = ln(1 + c^2) for a coefficient of variation c."""
     (width,) = given.width
     s = log(width) / TAIL if given.measure == "factor" else sqrt(log1p(width**2))
     return value * np.exp(s * ndtri(shares))
