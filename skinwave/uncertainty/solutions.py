@@ -29,6 +29,7 @@ from skinwave.surface import REACH, SILENT, grid, has_wavenumber_integral
 
 STEP = 0.004  # m between places of a map
 FAINT = 1e-3  # of the load's strongest line: lines that no sample has
+ROUND_OFF = 1e-12  # of the largest line
 KEPT = 4  # solutions that may differ by the pressure alone
 
 
@@ -190,7 +191,7 @@ def _at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats:
     for row, frequency in zip(found, frequencies, strict=True):
         near = np.abs(f - frequency) < 1e-6 * max(frequency, 1.0)
         row[:] = amplitudes[near].sum(axis=0)
-    return found
+    return np.where(found > ROUND_OFF * found.max(initial=0.0), found, 0.0)
 
 
 def _highest(frequencies: Floats, amplitudes: Floats) -> Floats:
