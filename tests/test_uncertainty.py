@@ -278,6 +278,18 @@ def test_the_budget_of_the_pressure_is_its_closed_form():
     )
 
 
+def test_the_budget_of_the_material_is_what_samples_of_it_show():
+    """First order: the share of one standard deviation, here of 3 %, in the waveform's change."""
+    text = SLAB.replace("25e3", "{ value = 25e3, spread = 0.03 }")
+    scene = loads(text.replace('{ value = 50, spread = 0.2, distribution = "normal" }',
+                               "{ value = 50, spread = 0 }"))  # fmt: skip
+    found = propagate(scene, 64)
+    centre = solve(scene, found.method).waveform
+    away = np.sqrt(((found.waveform - centre) ** 2).mean(axis=0).sum(axis=0))
+    expected = (away / np.linalg.norm(centre, axis=0)).max()
+    assert error_budget(scene).material == pytest.approx(expected, rel=0.1)
+
+
 def test_a_finer_mesh_than_a_tenth_of_the_material_gains_nothing():
     palm = loads(SLAB.split("[body]")[0] + '[body]\nmaterial = "palm"')
     row = mesh_row(palm, 3e-3, 0.02)

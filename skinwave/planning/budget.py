@@ -28,6 +28,7 @@ from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
 FAINT = 1e-3  # of the load's strongest line: lines that no budget needs
 LEFT_OUT = ("placement.", "probes.")  # sections of numbers that flat layers know nothing of
+LEAST = 0.005  # numerical error that is told: wavenumber integrals and elements agree to 0.002
 ENOUGH = 0.1  # of another error: a numerical one below it gains nothing
 
 
@@ -45,7 +46,7 @@ class ErrorBudget:
     def words(self) -> str:
         """The three in one sentence."""
         return (
-            f"Error of the worst probe's waveform: numerical {_percent(self.numerical)}; one "
+            f"Error of the worst probe's waveform: numerical {_numerical(self.numerical)}; one "
             f"standard deviation of the {self.spreads}"
         )
 
@@ -64,6 +65,11 @@ class ErrorBudget:
         known = {"material": self.material, "device": self.device}
         name = max(known, key=lambda each: known[each] if isfinite(known[each]) else -1.0)
         return (name, known[name]) if isfinite(known[name]) else ("", 0.0)
+
+
+def _numerical(error: float) -> str:
+    """An expected error; wavenumber integrals state none below `LEAST`."""
+    return f"below {_percent(LEAST)}" if error < LEAST else _percent(error)
 
 
 def _percent(value: float) -> str:
