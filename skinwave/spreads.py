@@ -11,6 +11,7 @@ measured one).
     forearm                  24 % [3]             27 % [3]
     layers of skin           factor 3.2 [4]       factor 3 [2]
     paper                    factor 2 [5]         factor 1.6 [5]
+    paper-grain              factor 1.6 [5]       factor 1.6 [5]
     ecoflex                  none known: its constants are second-hand
 
 [1] No shear modulus of a palm in vivo is published: surface waves at which a moving focus is
@@ -24,7 +25,7 @@ measured one).
 [4] Fingertip models, indentation, optical and elastographic values differ by a factor of ten and
     more with method and strain (see `simple_model.material.PRESETS`): the root of ten either way.
 [5] Office paper: 5 to 8 GPa along and 2 to 4 GPa across the machine direction, about the 4 GPa of
-    the preset; loss factor 0.02 to 0.05.
+    "paper" and, each, the 5.5 and 2.5 GPa of "paper-grain"; loss factor 0.02 to 0.05.
 
 Pressure: 160 dB at 200 mm are 59 Pa or, if that level is of the peak, 28 Pa; models of the array
 give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; AcousTools).
@@ -62,6 +63,7 @@ OF_PRESETS: Mapping[str, MaterialSpread] = {
     **dict.fromkeys(("epidermis", "dermis", "fat", "muscle"), _LAYER),
     **dict.fromkeys(("forearm-epidermis", "forearm-dermis", "forearm-hypodermis"), _LAYER),
     "paper": MaterialSpread(moduli=known_to(2.0), losses=known_to(1.6)),
+    "paper-grain": MaterialSpread(moduli=known_to(1.6), losses=known_to(1.6)),
 }
 
 
