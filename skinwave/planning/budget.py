@@ -69,6 +69,8 @@ class ErrorBudget:
 
 def _numerical(error: float) -> str:
     """An expected error; wavenumber integrals state none below `LEAST`."""
+    if not isfinite(error):
+        return "not known"
     return f"below {_percent(LEAST)}" if error < LEAST else _percent(error)
 
 
