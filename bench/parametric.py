@@ -1,4 +1,4 @@
-"""One reduced palm for a range of materials against each material's own, `python -m bench.parametric`.
+"""One reduced palm for a range of materials, each beside its own: `python -m bench.parametric`.
 
 CPU seconds on one thread. `--own` is how many random materials are reduced on their own, `--h` the
 element size in mm; the default of the palm takes some 15 s each.

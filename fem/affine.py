@@ -4,14 +4,14 @@
     C = sum_r (viscosity_r + lag_r mu_r) K_r + rate_r rho_r M_r + sqrt(mu_r rho_r) R_r
         + drag rho_r D_r
 
-with the Rayleigh damping (rate, lag) of a loss factor, springs S and dashpots R at surfaces, and the
-absorbing layer D. Poisson's ratios are fixed, so that the dynamic stiffness
+with the Rayleigh damping (rate, lag) of a loss factor, springs S and dashpots R at surfaces, and
+the absorbing layer D. Poisson's ratios are fixed, so that the dynamic stiffness
 
     A(s) = sum_q w_q(s) A_q
 
-is an affine sum with scalar weights: its projection onto one basis answers for every material
-(Prud'homme et al., J Fluids Eng 124:70 (2002)). With a complex modulus mu_r(s) of any law that
-holds at each frequency.
+is an affine sum with scalar weights, and its projection onto one basis serves every material
+(Prud'homme et al., J Fluids Eng 124:70 (2002)). In the steady state mu_r(s) may be the complex
+modulus of any law.
 """
 
 from collections.abc import Callable, Sequence
@@ -186,8 +186,14 @@ def project(affine: AffineOperators, basis: Floats) -> AffineOperators:
 
 def mapped(affine: AffineOperators, of: Callable[[Any], Any]) -> AffineOperators:
     """The same with a function of each matrix in its place."""
-    kinds = ("stiffness", "mass", "dashpots", "layer", "springs")
-    return replace(affine, **{kind: tuple(map(of, getattr(affine, kind))) for kind in kinds})
+    return replace(
+        affine,
+        stiffness=tuple(map(of, affine.stiffness)),
+        mass=tuple(map(of, affine.mass)),
+        dashpots=tuple(map(of, affine.dashpots)),
+        layer=tuple(map(of, affine.layer)),
+        springs=tuple(map(of, affine.springs)),
+    )
 
 
 def _alone(materials: Sequence[Material], r: int) -> tuple[Material, ...]:

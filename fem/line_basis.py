@@ -1,13 +1,13 @@
 """Reduced basis of each spectral line of a load, over a range of materials.
 
-At one frequency the steady state of a body moves on a smooth manifold, with as many dimensions as
-materials have free parameters. A few states span it to any accuracy: Galerkin's method in a basis of
-these leaves equations of some tens of unknowns a line, in place of hundreds of a reduced-order model
+At one frequency the steady state of a body is on a smooth manifold, with as many dimensions as its
+materials have free parameters. A few states span it to any accuracy: Galerkin's method in a basis
+of these leaves some tens of equations a line, in place of the hundreds of a reduced-order model
 that holds in a whole band.
 
-States are chosen by a greedy search (Rozza, Huynh and Patera, Arch Comput Methods Eng 15:229 (2008)):
-the next is that of the material at which the last one changed the response most. There the
-prediction is compared with the state itself before that is taken in; the search ends when several
+States are chosen by a greedy search (Rozza, Huynh and Patera, Arch Comput Methods Eng 15:229
+(2008)): the next is that of the material at which the last one changed the response most. There
+the prediction is compared with the state before it is extended by it; the search ends when several
 such comparisons in a row are within the tolerance.
 """
 
@@ -96,9 +96,7 @@ def line_bases(
         for k in np.flatnonzero(by_line > SETTLED * tolerance):
             bases[k] = _extended(bases[k], states[k], parts, forces[k], outputs)
         now = np.stack([_outputs(b, weights[:, k]) for k, b in enumerate(bases)], axis=1)
-        changes = np.array(
-            [line_errors(a, b).max() for a, b in zip(before, now, strict=True)]
-        )
+        changes = np.array([line_errors(a, b).max() for a, b in zip(before, now, strict=True)])
         before = now
     raise ValueError(
         f"{len(errors)} materials of the ranges leave an error of {errors[-1]:.2g} in between, "
@@ -118,7 +116,7 @@ def line_errors(candidate: Complex, reference: Complex) -> Floats:
 def _solved(parts: Floats, weights: Complex, force: Complex) -> Complex:
     """State (r,) of one line."""
     A = np.tensordot(weights, parts, 1)
-    return np.linalg.solve(A, force)
+    return np.asarray(np.linalg.solve(A, force), np.complex128)
 
 
 def _outputs(basis: LineBasis, weights: Complex) -> Complex:

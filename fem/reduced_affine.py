@@ -1,14 +1,14 @@
 """Reduced-order model of a body for every material of a range.
 
 One basis of Krylov moments serves all materials if it holds those of the least loss, whose motion
-has most detail. It begins with the reduced-order model of that material (`reduced`), and is judged
-over a training set: by how much its last quarter changes the response of each material and line
-and, at the largest such changes, by solutions of the full body. Where one of these is off by more
+has most detail. It begins with the reduced-order model of that material (`reduced`), and is
+assessed over a training set: by how much its last quarter changes the response of each material and
+line and, at the largest such changes, by solutions of the full body. Where one of these is off by more
 than the tolerance, the moments of that material are added (weak greedy algorithm: Rozza, Huynh and
 Patera, Arch Comput Methods Eng 15:229 (2008)).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,7 +112,7 @@ def reduce_affine(
 
 
 def steady(
-    model: AffineModel, solids: Solids, frequencies: Floats, chosen: Sequence[int], size: int = 0
+    model: AffineModel, solids: Solids, frequencies: Floats, chosen: Iterable[int], size: int = 0
 ) -> Complex:
     """Steady state (k, p) of the outputs at chosen lines (k,).
 
@@ -130,12 +130,13 @@ def steady(
     """
     n = size or model.basis.shape[1]
     parts = np.stack(model.affine.parts)[:, :n, :n]
-    each = weights(model.affine, solids, frequencies[list(chosen)])
+    chosen = list(chosen)
+    each = weights(model.affine, solids, frequencies[chosen])
     states = [
         np.linalg.solve(np.tensordot(w, parts, 1), model.forces[k, :n])
         for w, k in zip(each, chosen, strict=True)
     ]
-    return np.stack(states) @ model.outputs[:, :n].T
+    return np.asarray(np.stack(states) @ model.outputs[:, :n].T, np.complex128)
 
 
 def _suspects(

@@ -1,12 +1,9 @@
-"""Parametric reduced body: one offline stage that answers for every material of a range.
+"""Parametric reduced body: one offline stage for every material of a range.
 
-    palm = skinwave.prepare(scene, {"body.material.shear_modulus_pa": (15e3, 40e3)})
-    frequencies, motion = parametric.lines(palm, {"body.material.shear_modulus_pa": 20e3})
-
-`lines` takes milliseconds: Galerkin's equations of each line of the scene's load in a few states.
+`prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds: Galerkin's equations of each line of the scene's load in a few states.
 `answer` is the waveform from rest, by the poles of the reduced-order model; `at` is that model, for
-any other Tacton. Poisson's ratios, geometry and mesh are fixed. Where a slab has absorbing sides its
-absorbing layer is as wide as the fastest shear waves need.
+any other Tacton. Poisson's ratios, geometry and mesh are fixed. The absorbing layer of a slab with
+absorbing sides is as wide as the fastest shear waves need.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +15,7 @@ import numpy as np
 import fem
 from fem.affine import AffineOperators, Solids, assemble_affine, operators_of, weights
 from fem.line_basis import LineBasis, line_bases, steady_lines
+from fem.maxwell import with_internal
 from fem.reduced_affine import AffineModel, reduce_affine, steady
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
@@ -42,7 +40,7 @@ from skinwave.models.loads import line_factor, probe_rows, surface_load
 from skinwave.models.prepared import SERIES_ERROR, Prepared, typical_spots
 from skinwave.models.prepared import answer as answer_of
 from skinwave.models.reduction import BAND, ReducedBody
-from skinwave.scene import Scene
+from skinwave.scene import Body, Scene
 
 TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
@@ -167,14 +165,14 @@ def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
 
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
-    """Reduced body of a material, which answers for any Tacton."""
+    """Reduced body of a material, for any Tacton."""
     body = relaxing(_body(prepared, values), SERIES_ERROR * TOLERANCE)
     small = operators_of(prepared.affine, solids_of(prepared.reference, body))
     upright = np.linalg.inv(np.linalg.cholesky(small.M)).T  # coordinates of unit mass
     K, C, R = (upright.T @ matrix @ upright for matrix in (small.K, small.C, small.R))
     branches = tuple(
-        fem.MaxwellBranch(K=upright.T @ branch.K @ upright, time=branch.time)
-        for branch in small.branches
+        replace(branch, K=upright.T @ branch.K @ upright)
+        for branch in with_internal(small.branches)
     )
     outputs = prepared.outputs @ upright
     model = fem.ReducedModel(
@@ -192,17 +190,17 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
 
 
 def _check(scene: Scene, tolerance: float) -> None:
-    """Refuse what an affine sum cannot answer."""
+    """Refuse what no affine sum gives."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     if scene.body.air:
         raise ValueError(
             "a body with free materials has no air: its added mass is a dense operator; leave air "
-            "out, or prepare a body for each material"
+            "out, or reduce the body of each material"
         )
     asked, solid = scene.reading.asked, scene.body.solid
-    rows = [asked.rows(each) for each in (solid, solid.scaled(modulus=2.0))]
-    if asked.relaxes or not np.array_equal(*rows):
+    rows, doubled = (asked.rows(each) for each in (solid, solid.scaled(modulus=2.0)))
+    if asked.relaxes or not np.array_equal(rows, doubled):
         raise ValueError(
             f"{scene.reading.words} depends on the material beyond the motion, which is all that a "
             "body with free materials gives; take a displacement, velocity or strain"
@@ -221,7 +219,7 @@ def _moving(scene: Scene, lines: tuple[Floats, fem.Complex]) -> tuple[Floats, fe
     return frequencies[kept], forces[kept]
 
 
-def _body(prepared: ParametricBody, values: Mapping[str, float]):
+def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
     return with_values(prepared.scene.body, prepared.keys, values)
 
 

@@ -171,7 +171,8 @@ def test_affine_sums_are_the_operators():
         coat=fem.Coat(materials=materials[:2], thicknesses=(1e-4, 3e-4)),
         support=fem.Support(facets=facets, stiffness=1e6 * shares[0], absorbed=shares[1]),
     )  # fmt: skip
-    assert made.drag is not None and made.drag.any()
+    assert made.drag is not None
+    assert made.drag.any()
     expected = operators(made)
     affine = assemble_affine(
         made.mesh, materials, fixed=made.fixed, absorbing=made.absorbing, drag=made.drag,
@@ -213,8 +214,8 @@ def test_ranges_that_few_states_do_not_span_are_refused():
     ("free", "words"),
     [
         ({}, "names no key"),
-        ({"body.thickness_mm": (5, 10)}, "answers for materials alone"),
-        ({"body.material.poisson": (0.4, 0.45)}, "prepare a body for each value"),
+        ({"body.thickness_mm": (5, 10)}, "serves materials alone"),
+        ({"body.material.poisson": (0.4, 0.45)}, "reduce a body for each value"),
         ({"body.material.shear_modulus": (1e4, 2e4)}, "body.material.shear_modulus'"),
         ({MODULUS: (2e4, 1e4)}, "give a finite range, low to high"),
         ({MODULUS: (-1e4, 1e4)}, "must be a finite number above 0"),

@@ -54,7 +54,7 @@ class Reference:
 
 
 def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
-    """The free keys of a body, checked.
+    """Free keys of a body, checked.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
 
 
 def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
-    """The body with values of its free keys.
+    """Body with values of its free keys.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]
     """
     if strange := sorted(set(values) - {key.key for key in keys}):
         raise ValueError(
-            f"'{strange[0]}' is not free; prepare the body with it, or leave it out: free are "
+            f"'{strange[0]}' is not free; free it as well, or leave it out: free are "
             f"{', '.join(key.key for key in keys)}"
         )
     for of in dict.fromkeys(key.layer for key in keys):
@@ -122,7 +122,7 @@ def training_shares(count: int, inside: int) -> Floats:
 
 def meshing_values(keys: Sequence[FreeKey]) -> dict[str, float]:
     """Values of the body that is meshed: the fastest shear waves below all layers, for which an
-    absorbing layer is widest; layers of one range differ, so that their elements are told apart.
+    absorbing layer is widest; layers of one range differ, so that their elements do.
     """
     fastest = {"shear_modulus_pa": 1.0, "density_kg_m3": 0.0}
     inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
@@ -134,7 +134,7 @@ def meshing_values(keys: Sequence[FreeKey]) -> dict[str, float]:
 
 
 def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference:
-    """The materials of a meshed body by its layers.
+    """Layers and factors of the materials of a meshed body.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def meshed_materials(build: Build) -> tuple[Material, ...]:
 
 
 def solids_of(reference: Reference, body: Body) -> Solids:
-    """The materials of a body that differs from the one that was meshed by its materials alone."""
+    """Materials of a body that differs from the one that was meshed by its materials alone."""
     own = [solid_of(body.material if k is None else body.layers[k].material)
            for k in reference.layers]  # fmt: skip
     before, now = reference.body.solid, body.solid
@@ -195,21 +195,23 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
         of, path = int(parts[2]), parts[4:]
     elif parts[:2] != ["body", "material"] or not path:
         raise ValueError(
-            f"'{key}' cannot be free: a reduced body answers for materials alone; free keys of "
-            "body.material or body.layers.0.material, and prepare a body for each value of others"
+            f"'{key}' cannot be free: one reduced body serves materials alone; free keys of "
+            "body.material or body.layers.0.material, and reduce a body for each value of others"
         )
     known = [name for name in MATERIAL if name not in FIXED]
     if path[0] in FIXED:
         raise ValueError(
             f"'{key}' cannot be free: only moduli, losses, times and densities change none of a "
-            "body's matrices; prepare a body for each value of it"
+            "body's matrices; reduce a body for each value of it"
         )
     choose(f"free key '{key}'", path[0], known)
     if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
         raise ValueError(f"'{key}' is no number of a Prony term; name one as prony.0.modulus_pa")
     low, high = (float(bound) for bound in bounds)
     if not (isfinite(low) and isfinite(high) and low < high):
-        raise ValueError(f"{key} is free from {low:g} to {high:g}; give a finite range, low to high")
+        raise ValueError(
+            f"{key} is free from {low:g} to {high:g}; give a finite range, low to high"
+        )
     return FreeKey(key=key, layer=of, path=tuple(path), low=low, high=high)
 
 
@@ -219,8 +221,8 @@ def _value(key: FreeKey, values: Mapping[str, float]) -> float:
     value, slack = float(values[key.key]), OUTSIDE * (key.high - key.low)
     if not key.low - slack <= value <= key.high + slack:
         raise ValueError(
-            f"{key.key} = {value:g} is outside its range, {key.low:g} to {key.high:g}; prepare the "
-            "body for a wider one"
+            f"{key.key} = {value:g} is outside its range, {key.low:g} to {key.high:g}; free it "
+            "over a wider one"
         )
     return value
 
@@ -253,7 +255,7 @@ def _factors(meshed: Material, solid: Material) -> tuple[float, float]:
     expected, one = _times(solid, modulus, density), complex(meshed.complex_modulus(1e3))
     if abs(one - complex(expected.complex_modulus(1e3))) > AGREES * abs(one):
         raise ValueError(
-            "the mesh of this kind of body has other materials than its scene; prepare it for each "
+            "the mesh of this kind of body has other materials than its scene; reduce it for each "
             "material"
         )
     return modulus, density
