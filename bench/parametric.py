@@ -8,7 +8,7 @@ import argparse
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ def main() -> None:
             flush=True,
         )
         evaluations(prepared)
-        fit(prepared)
+        fit(scene, prepared, h)
         compare(scene, prepared, asked.own, h)
 
 
@@ -80,10 +80,7 @@ def compare(
     for k, shares in enumerate(np.random.default_rng(1).random((count, len(prepared.keys)))):
         values = values_at(prepared.keys, shares)
         frequencies, found = parametric.lines(prepared, values)
-        body = with_values(scene.body, prepared.keys, values)
-        own, seconds = timed(lambda: own_body(body, scene.probe_points, h=h))  # noqa: B023
-        motion = components(own, scene.pressure)
-        expected = motion.lines[[np.argmin(np.abs(motion.frequencies - f)) for f in frequencies]]
+        expected, seconds = timed(lambda: own_lines(scene, prepared, values, h))  # noqa: B023
         moving = frequencies > 0
         apart = np.linalg.norm((found - expected)[moving])
         whole.append(apart / np.linalg.norm(expected[moving]))
@@ -97,10 +94,22 @@ def compare(
             )
 
 
-def fit(prepared: parametric.ParametricBody) -> None:
-    """Modulus and viscosity from the lines of another material, from eight starts."""
+def own_lines(
+    scene: skinwave.Scene,
+    prepared: parametric.ParametricBody,
+    values: Mapping[str, float],
+    h: float | None,
+) -> np.ndarray:
+    """Lines of a material by its own reduction."""
+    body = with_values(scene.body, prepared.keys, values)
+    motion = components(own_body(body, scene.probe_points, h=h), scene.pressure)
+    return motion.lines[[np.argmin(np.abs(motion.frequencies - f)) for f in prepared.frequencies]]
+
+
+def fit(scene: skinwave.Scene, prepared: parametric.ParametricBody, h: float | None) -> None:
+    """Modulus and viscosity from the lines of a material's own reduction, from eight starts."""
     hidden = values_at(prepared.keys, [0.37, 0.58])
-    _, measured = parametric.lines(prepared, hidden)
+    measured = own_lines(scene, prepared, hidden, h)
     count = 0
 
     def misfit(shares: np.ndarray) -> np.ndarray:

@@ -3,9 +3,9 @@
 One basis of Krylov moments serves all materials if it holds those of the least loss, whose motion
 has most detail. It begins with the reduced-order model of that material (`reduced`), and is
 assessed over a training set: by how much its last quarter changes the response of each material and
-line and, at the largest such changes, by solutions of the full body. Where one of these is off by more
-than the tolerance, the moments of that material are added (weak greedy algorithm: Rozza, Huynh and
-Patera, Arch Comput Methods Eng 15:229 (2008)).
+line and, at the largest such changes, by solutions of the full body. Where one of these is off by
+more than the tolerance, the moments of that material are added (weak greedy algorithm: Rozza, Huynh
+and Patera, Arch Comput Methods Eng 15:229 (2008)).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,27 +1,32 @@
 """Parametric reduced body: one offline stage for every material of a range.
 
-`prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds: Galerkin's equations of each line of the scene's load in a few states.
-`answer` is the waveform from rest, by the poles of the reduced-order model; `at` is that model, for
-any other Tacton. Poisson's ratios, geometry and mesh are fixed. The absorbing layer of a slab with
-absorbing sides is as wide as the fastest shear waves need.
+`prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds:
+Galerkin's equations of each line of the scene's load in a few states. `answer` is the waveform from
+rest, by the poles of the reduced-order model; `at` is that model, for any other Tacton. Poisson's
+ratios, geometry and mesh are fixed. The absorbing layer of a slab with absorbing sides is as wide
+as the fastest shear waves need.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 import fem
 from fem.affine import AffineOperators, Solids, assemble_affine, operators_of, weights
 from fem.line_basis import LineBasis, line_bases, steady_lines
 from fem.maxwell import with_internal
 from fem.reduced_affine import AffineModel, reduce_affine, steady
+from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, pressure_lines
+from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Clock, Progress, one_thread, silent
+from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent
 from skinwave.models.free_materials import (
     FreeKey,
     Reference,
@@ -35,9 +40,10 @@ from skinwave.models.free_materials import (
     with_values,
 )
 from skinwave.models.full import meshed, spent
-from skinwave.models.laws import relaxing
+from skinwave.models.laws import check_laws, relaxing
 from skinwave.models.loads import line_factor, probe_rows, surface_load
-from skinwave.models.prepared import SERIES_ERROR, Prepared, typical_spots
+from skinwave.models.parametric_cache import packed, unpacked
+from skinwave.models.prepared import SERIES_ERROR, Prepared, entry_name, typical_spots
 from skinwave.models.prepared import answer as answer_of
 from skinwave.models.reduction import BAND, ReducedBody
 from skinwave.scene import Body, Scene
@@ -46,6 +52,8 @@ TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
 FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
 MOST_LINES = 400
+FORMAT = "parametric 1"  # of what is cached
+ARRAYS = ("outputs", "load", "points", "frequencies")
 INSIDE = 128  # materials inside the ranges, for the lines' bases
 
 
@@ -108,6 +116,49 @@ def prepare(
     body = relaxing(with_values(scene.body, keys, meshing_values(keys)), SERIES_ERROR * tolerance)
     build = meshed(body, h, clock, report)
     reference = reference_of(body, build, keys)
+    probes, _ = probe_rows(body, build, scene.probe_points, scene.reading)
+    of_body = entry_name(body, build, scene.probe_points, solver, tolerance, outputs=probes)
+    name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
+    with clock("read from cache"):
+        entry = cache.load(name)
+    if not entry:
+        stage = _Stage(
+            scene=scene, keys=keys, reference=reference, build=build, probes=probes,
+            tolerance=tolerance, solver=solver,
+        )  # fmt: skip
+        entry = _reduced(stage, clock, report, h or default_size(body))
+        cache.store(name, **entry)
+    affine, bases = unpacked(entry, entry["outputs"])
+    effort = Effort(**{**entry["meta"], "seconds": clock.seconds, "peak_memory": peak_memory()})
+    return ParametricBody(
+        scene=scene, keys=keys, reference=reference, affine=affine, bases=bases, effort=effort,
+        **{array: entry[array] for array in ARRAYS},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Stage:
+    """Offline stage of a scene on its mesh; `probes` (p c, 3 n) is what they read."""
+
+    scene: Scene
+    keys: tuple[FreeKey, ...]
+    reference: Reference
+    build: Build
+    probes: sparse.csr_array
+    tolerance: float
+    solver: str
+
+    def training(self, inside: int) -> list[Solids]:
+        """Materials over the ranges, with so many inside them."""
+        shares = training_shares(len(self.keys), inside).tolist()
+        values = (values_at(self.keys, each) for each in shares)
+        bodies = (with_values(self.scene.body, self.keys, each) for each in values)
+        return [solids_of(self.reference, body) for body in bodies]
+
+
+def _reduced(stage: _Stage, clock: Clock, report: Progress, h: float) -> dict[str, Any]:
+    """Arrays and `meta`, the effort, of what is cached."""
+    build, tolerance = stage.build, stage.tolerance
     with clock("assemble"):
         report("assemble", 0.0)
         affine = assemble_affine(
@@ -115,31 +166,29 @@ def prepare(
             drag=build.drag, support=build.support, coat=build.coat,
         )  # fmt: skip
         P, points = surface_load(build)
-        frequencies, pressures = pressure_lines(scene.pressure, points)
-        lines = frequencies, (P @ pressures.T)[affine.free].T
-        probes, _ = probe_rows(body, build, scene.probe_points, scene.reading)
+        frequencies, forces = _moving(stage.scene, P, points)
+    few = stage.training(0)
     with clock("factorise and reduce"), one_thread():
-        few = _training(scene, keys, reference, training_shares(len(keys), 0))
         model = reduce_affine(
-            affine, [_relaxed(solids, tolerance) for solids in few], probes,
-            _moving(scene, lines), band=BAND, tolerance=SHARE * tolerance,
-            loads=P @ typical_spots(body, points), solver=solver,
+            affine, [_relaxed(solids, tolerance) for solids in few], stage.probes,
+            (frequencies, forces[:, affine.free]), band=BAND, tolerance=SHARE * tolerance,
+            loads=P @ typical_spots(stage.scene.body, points), solver=stage.solver,
             progress=partial(report, "reduce"),
         )  # fmt: skip
     with clock("lines"), one_thread():
-        many = _training(scene, keys, reference, training_shares(len(keys), INSIDE))
-        kept, bases, error = _bases(model, _moving(scene, lines)[0], few, many, tolerance, report)
+        kept, bases, error = _bases(
+            model, frequencies, few, stage.training(INSIDE), tolerance, report
+        )
     effort = Effort(
-        dofs=len(affine.free), reduced_dofs=len(model.outputs.T), solver=_used(solver),
+        dofs=len(affine.free), reduced_dofs=model.basis.shape[1],
+        solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
         estimate=model.error + error, factorisations=model.factorisations,
     )  # fmt: skip
-    load = np.zeros((affine.n_dofs, model.basis.shape[1]))
-    load[affine.free] = model.basis
-    return ParametricBody(
-        scene=scene, keys=keys, reference=reference, affine=model.affine, outputs=model.outputs,
-        load=P.T @ load, points=points, frequencies=kept, bases=bases,
-        effort=spent(effort, clock, build, h or default_size(body)),
-    )  # fmt: skip
+    return {
+        "meta": asdict(spent(effort, clock, build, h)), "outputs": model.outputs,
+        "load": P[affine.free].T @ model.basis, "points": points, "frequencies": kept,
+        **packed(model.affine, bases),
+    }  # fmt: skip
 
 
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
@@ -193,6 +242,7 @@ def _check(scene: Scene, tolerance: float) -> None:
     """Refuse what no affine sum gives."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    check_laws(scene.body, scene.pressure)
     if scene.body.air:
         raise ValueError(
             "a body with free materials has no air: its added mass is a dense operator; leave air "
@@ -212,22 +262,17 @@ def _check(scene: Scene, tolerance: float) -> None:
         )
 
 
-def _moving(scene: Scene, lines: tuple[Floats, fem.Complex]) -> tuple[Floats, fem.Complex]:
-    """The lines without the mean if the body is unconstrained, which drifts under it."""
-    frequencies, forces = lines
+def _moving(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
+    """Frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines, without the mean
+    if the body is unconstrained, which drifts under it.
+    """
+    frequencies, pressures = pressure_lines(scene.pressure, points)
     kept = (frequencies > 0) | scene.body.is_held
-    return frequencies[kept], forces[kept]
+    return frequencies[kept], (P @ pressures[kept].T).T
 
 
 def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
     return with_values(prepared.scene.body, prepared.keys, values)
-
-
-def _training(
-    scene: Scene, keys: Sequence[FreeKey], reference: Reference, shares: Floats
-) -> list[Solids]:
-    bodies = (with_values(scene.body, keys, values_at(keys, each)) for each in shares.tolist())
-    return [solids_of(reference, body) for body in bodies]
 
 
 def _relaxed(solids: Solids, tolerance: float) -> Solids:
@@ -257,7 +302,3 @@ def _bases(
         SHARE * tolerance, partial(report, "lines"),
     )  # fmt: skip
     return frequencies[kept], found, error
-
-
-def _used(solver: str) -> str:
-    return fem.available()[0] if solver == "auto" else solver

@@ -68,7 +68,7 @@ def full_lines(scene, body, frequencies, h=H):
 
 
 def test_lines_are_those_of_each_materials_own_reduction(slab, prepared):
-    for values in random_values(prepared.keys, 4):
+    for values in random_values(prepared.keys, 3):
         frequencies, found = parametric.lines(prepared, values)
         body = with_values(slab.body, prepared.keys, values)
         own = components(own_body(body, slab.probe_points, h=H), slab.pressure)
@@ -77,10 +77,10 @@ def test_lines_are_those_of_each_materials_own_reduction(slab, prepared):
         assert np.linalg.norm(expected) > 0.999 * np.linalg.norm(own.lines)  # those left out
 
 
-def test_lines_are_those_of_the_full_body_at_the_corners_of_the_ranges(slab, prepared):
+def test_lines_are_those_of_the_full_body_at_least_loss(slab, prepared):
     strong = [280.0, prepared.frequencies[2]]
     assert prepared.effort.estimate < 0.01
-    for shares in ((0, 0), (0, 1), (1, 0), (1, 1)):
+    for shares in ((0, 0), (1, 0)):
         values = values_at(prepared.keys, shares)
         frequencies, found = parametric.lines(prepared, values)
         body = with_values(slab.body, prepared.keys, values)
@@ -103,6 +103,23 @@ def test_the_waveform_from_rest_is_that_of_the_materials_own_body(slab, prepared
     expected = own_answer(own_body(body, slab.probe_points, h=H), scene).values
     found = own_answer(parametric.at(prepared, values), scene).values
     assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
+
+
+def test_the_offline_stage_is_cached(slab, tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    few = replace(slab, probes=slab.probes[:1])
+    free = {VISCOSITY: (9.0, 10.0)}
+    first = skinwave.prepare(few, free, 0.05, h=9e-3)
+    monkeypatch.setattr(parametric, "reduce_affine", None)  # of no use from here on
+    again = skinwave.prepare(few, free, 0.05, h=9e-3)
+    for function in (parametric.lines, lambda *given: vars(parametric.answer(*given)).values()):
+        for one, other in zip(
+            function(first, {VISCOSITY: 9.4}), function(again, {VISCOSITY: 9.4}), strict=True
+        ):
+            if isinstance(one, np.ndarray):
+                assert np.array_equal(one, other)
+    with pytest.raises(TypeError, match="not callable"):
+        skinwave.prepare(few, {VISCOSITY: (9.0, 11.0)}, 0.05, h=9e-3)
 
 
 def test_modulus_and_viscosity_are_fitted_without_a_further_factorisation(slab, prepared):
@@ -135,7 +152,7 @@ def test_layers_prony_terms_and_density_are_free_at_absorbing_sides():
         prony=(PronyTerm(modulus=10e3, time=1e-3),),
     )  # fmt: skip
     top = Layer(thickness=0.003, material=replace(soft, viscosity=8.0))
-    body = Body(material=soft, layers=(top,), width=0.03, height=0.03, depth=0.006)
+    body = Body(material=soft, layers=(top,), width=0.024, height=0.024, depth=0.005)
     scene = scene_of(body)
     free = {
         "body.layers.0.material.shear_modulus_pa": (30e3, 60e3),
@@ -155,7 +172,7 @@ def test_layers_prony_terms_and_density_are_free_at_absorbing_sides():
 def test_affine_sums_are_the_operators():
     """Two layers under a coat of two, on springs and dashpots, in an absorbing layer."""
     upper = Layer(thickness=0.004, material="dermis")
-    made = build(Body(material="fat", layers=(upper,), width=0.03, height=0.03, depth=0.01), 7e-3)
+    made = build(Body(material="fat", layers=(upper,), width=0.02, height=0.02, depth=0.01), 1e-2)
     prony = (PronyTerm(modulus=9e3, time=1e-3), PronyTerm(modulus=5e3, time=1e-2))
     materials = (
         fem.Material(density=1100, shear_modulus=90e3, poisson=0.45, viscosity=9.0),

@@ -45,12 +45,14 @@ class FreeKey:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
     """A body as it was meshed, the layer (r,) of each of its materials, None below all layers, and
-    the factors (r, 2) of modulus and density of a mesh that stands for a thinner body.
+    the factors (r, 2) of modulus and density of a mesh that stands for a thinner body; and whether
+    it rests on springs.
     """
 
     body: Body
     layers: tuple[int | None, ...]
     factors: Floats
+    is_sprung: bool
 
 
 def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
@@ -161,7 +163,8 @@ def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference
             f"{merged[0]} is of a layer that is one with its neighbour; change its range slightly"
         )
     factors = [_factors(m, s) for m, s in zip(meshed_materials(build), solids, strict=True)]
-    return Reference(body=body, layers=layers, factors=np.array(factors))
+    sprung = build.support is not None and bool(build.support.stiffness.any())
+    return Reference(body=body, layers=layers, factors=np.array(factors), is_sprung=sprung)
 
 
 def meshed_materials(build: Build) -> tuple[Material, ...]:
@@ -175,10 +178,11 @@ def solids_of(reference: Reference, body: Body) -> Solids:
     own = [solid_of(body.material if k is None else body.layers[k].material)
            for k in reference.layers]  # fmt: skip
     before, now = reference.body.solid, body.solid
-    held = [m.shear_modulus + m.fast_modulus for m in (before, now)]
+    # A modulus law has its own in a Prony series, which takes time to fit.
+    held = [m.shear_modulus + m.fast_modulus for m in (before, now) if reference.is_sprung]
     return Solids(
         materials=tuple(_times(m, *f) for m, f in zip(own, reference.factors, strict=True)),
-        springs=held[1] / held[0],
+        springs=held[1] / held[0] if held else 1.0,
         drag=now.shear_speed / before.shear_speed,
     )
 
