@@ -10,6 +10,7 @@ from skinwave.commands import (
     dispersion,
     doctor,
     film,
+    measured,
     mesh,
     plan,
     plot,
@@ -23,9 +24,11 @@ from skinwave.commands import (
     verify,
     web,
 )
+from skinwave.commands import map as map_command
 
 MODULES = (
-    run, compare, tradeoff, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
-    film, web, rerun, same, doctor, cache,
+    run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
+    verify, report, film, web, rerun, same, doctor, cache,
+    measured,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}
