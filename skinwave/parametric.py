@@ -24,6 +24,7 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, pressure_lines
+from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent
@@ -43,7 +44,7 @@ from skinwave.models.full import meshed, spent
 from skinwave.models.laws import check_laws, relaxing
 from skinwave.models.loads import line_factor, probe_rows, surface_load
 from skinwave.models.parametric_cache import packed, unpacked
-from skinwave.models.prepared import SERIES_ERROR, Prepared, entry_name, typical_spots
+from skinwave.models.prepared import Prepared, entry_name, typical_spots
 from skinwave.models.prepared import answer as answer_of
 from skinwave.models.reduction import BAND, ReducedBody
 from skinwave.scene import Body, Scene
@@ -113,7 +114,7 @@ def prepare(
     keys = free_keys(scene.body, free)
     _check(scene, tolerance)
     clock, report = Clock(), progress or silent
-    body = relaxing(with_values(scene.body, keys, meshing_values(keys)), SERIES_ERROR * tolerance)
+    body = relaxing(with_values(scene.body, keys, meshing_values(keys)), FIT_TOLERANCE)
     build = meshed(body, h, clock, report)
     reference = reference_of(body, build, keys)
     probes, _ = probe_rows(body, build, scene.probe_points, scene.reading)
@@ -170,7 +171,7 @@ def _reduced(stage: _Stage, clock: Clock, report: Progress, h: float) -> dict[st
     few = stage.training(0)
     with clock("factorise and reduce"), one_thread():
         model = reduce_affine(
-            affine, [_relaxed(solids, tolerance) for solids in few], stage.probes,
+            affine, [_relaxed(solids) for solids in few], stage.probes,
             (frequencies, forces[:, affine.free]), band=BAND, tolerance=SHARE * tolerance,
             loads=P @ typical_spots(stage.scene.body, points), solver=stage.solver,
             progress=partial(report, "reduce"),
@@ -215,7 +216,7 @@ def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
     """Reduced body of a material, for any Tacton."""
-    body = relaxing(_body(prepared, values), SERIES_ERROR * TOLERANCE)
+    body = relaxing(_body(prepared, values), FIT_TOLERANCE)
     small = operators_of(prepared.affine, solids_of(prepared.reference, body))
     upright = np.linalg.inv(np.linalg.cholesky(small.M)).T  # coordinates of unit mass
     K, C, R = (upright.T @ matrix @ upright for matrix in (small.K, small.C, small.R))
@@ -275,10 +276,9 @@ def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
     return with_values(prepared.scene.body, prepared.keys, values)
 
 
-def _relaxed(solids: Solids, tolerance: float) -> Solids:
+def _relaxed(solids: Solids) -> Solids:
     """The materials with Prony series for modulus laws of their own."""
-    own = tuple(m.relaxing(SERIES_ERROR * tolerance) for m in solids.materials)
-    return replace(solids, materials=own)
+    return replace(solids, materials=tuple(m.relaxing() for m in solids.materials))
 
 
 def _bases(

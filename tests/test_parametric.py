@@ -11,11 +11,22 @@ import skinwave
 from fem.affine import Solids, assemble_affine, operators_of, weights
 from fem.harmonic import dynamic_stiffness
 from fem.line_basis import line_bases, line_errors, steady_lines
+from fem.load_and_probe import facet_normals
+from meshes import boundary_facets
 from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
 from simple_model.load_spectrum import pressure_lines
 from skinwave import parametric
+from skinwave.bodies import hands
+from skinwave.bodies.absorbing_layer import layer_drag
 from skinwave.bodies.build import build, operators
-from skinwave.models.free_materials import free_keys, meshed_materials, values_at, with_values
+from skinwave.models.free_materials import (
+    free_keys,
+    meshed_materials,
+    reference_of,
+    solids_of,
+    values_at,
+    with_values,
+)
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.prepared import answer as own_answer
 from skinwave.models.prepared import components
@@ -146,13 +157,16 @@ def test_modulus_and_viscosity_are_fitted_without_a_further_factorisation(slab, 
     assert evaluated >= 20 * prepared.effort.factorisations
 
 
-def test_layers_prony_terms_and_density_are_free_at_absorbing_sides():
+def test_layers_prony_terms_and_density_are_free_on_an_absorbing_base():
     soft = fem.Material(
         density=1000, shear_modulus=20e3, poisson=0.45, viscosity=5.0,
         prony=(PronyTerm(modulus=10e3, time=1e-3),),
     )  # fmt: skip
     top = Layer(thickness=0.003, material=replace(soft, viscosity=8.0))
-    body = Body(material=soft, layers=(top,), width=0.024, height=0.024, depth=0.005)
+    body = Body(
+        material=soft, layers=(top,), width=0.024, height=0.024, depth=0.006, base="absorbing",
+        sides="clamped",
+    )  # fmt: skip
     scene = scene_of(body)
     free = {
         "body.layers.0.material.shear_modulus_pa": (30e3, 60e3),
@@ -167,6 +181,26 @@ def test_layers_prony_terms_and_density_are_free_at_absorbing_sides():
     expected = full_lines(scene, changed, frequencies[1:3], h=6e-3)
     errors = np.linalg.norm(found[1:3] - expected, axis=1) / np.linalg.norm(expected, axis=1)
     assert errors.max() < 0.02
+
+
+def test_springs_and_absorbing_layers_go_with_the_material():
+    soft = fem.Material(
+        density=1000, shear_modulus=30e3, poisson=0.45,
+        prony=(PronyTerm(modulus=10e3, time=1e-3),),
+    )  # fmt: skip
+    other = replace(soft, density=900.0, shear_modulus=24e3)
+    before, after = (Body(material=m, width=0.03, height=0.03, depth=0.01) for m in (soft, other))
+    made = build(before, 1e-2)
+    mesh = made.mesh
+    outward = facet_normals(mesh, boundary_facets(mesh.tets))
+    rests = [hands.support(body, mesh, outward, []).stiffness for body in (before, after)]
+    keys = free_keys(before, {MODULUS: (20e3, 40e3)})
+    on_springs = replace(made, support=hands.support(before, mesh, outward, []))
+    solids = solids_of(reference_of(before, on_springs, keys), after)
+    assert solids.materials == (other,)
+    assert rests[1] == pytest.approx(solids.springs * rests[0])
+    assert layer_drag(after, mesh) == pytest.approx(solids.drag * layer_drag(before, mesh))
+    assert solids.springs != pytest.approx(solids.drag)
 
 
 def test_affine_sums_are_the_operators():
