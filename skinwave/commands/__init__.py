@@ -10,6 +10,7 @@ from skinwave.commands import (
     dispersion,
     doctor,
     film,
+    fit,
     mesh,
     plan,
     plot,
@@ -25,7 +26,7 @@ from skinwave.commands import (
 )
 
 MODULES = (
-    run, compare, tradeoff, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
+    run, compare, tradeoff, relax, dispersion, fit, plan, sweep, plot, mesh, convert, verify, report,
     film, web, rerun, same, doctor, cache,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}
