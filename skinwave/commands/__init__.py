@@ -11,6 +11,7 @@ from skinwave.commands import (
     doctor,
     film,
     fit,
+    measured,
     mesh,
     plan,
     plot,
@@ -26,7 +27,9 @@ from skinwave.commands import (
 )
 
 MODULES = (
-    run, compare, tradeoff, relax, dispersion, fit, plan, sweep, plot, mesh, convert, verify, report,
+    run, compare, tradeoff, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
     film, web, rerun, same, doctor, cache,
+    measured,
+    fit,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}
