@@ -134,7 +134,7 @@ def _autocorrelation(ax: Axes, found: Fit) -> None:
     band = 2 / np.sqrt(n * series)
     ax.bar(np.arange(1, len(each) + 1), each, color=MEASURED, alpha=0.6)
     ax.axhspan(-band, band, color=FITTED, alpha=0.2)
-    limit = max(0.2, 1.1 * float(np.abs(each).max(initial=0.0)))
+    limit = 1.3 * max(2 * band, float(np.abs(each).max(initial=0.0)))
     ax.set_ylim(-limit, limit)
     ax.set_xlabel("lag, samples" if found.solution.problem.data.unit == "s" else "lag, lines")
     ax.set_ylabel("autocorrelation")
@@ -184,7 +184,9 @@ def correlation_figure(found: Fit, style: Style = REPORT) -> Figure:
     keys = found.solution.problem.parameters.keys
     k = len(keys)
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(2.9 + 0.75 * k, 1.3 + 0.55 * k), layout="constrained")
+        left = 0.09 * max(map(len, keys)) + 0.4
+        size = style.size(left + 1.2 + 0.62 * k, 0.5 + 0.62 * k)
+        figure = Figure(figsize=size, layout="constrained")
         ax = figure.subplots()
         drawn = ax.imshow(found.correlations, cmap="RdBu_r", vmin=-1, vmax=1)
         ax.set_xticks(range(k), range(1, k + 1))
@@ -194,5 +196,5 @@ def correlation_figure(found: Fit, style: Style = REPORT) -> Figure:
             text = "-" if np.isnan(value) else f"{value:.2f}"
             dark = not np.isnan(value) and abs(value) > 0.6
             ax.text(j, i, text, ha="center", va="center", color="white" if dark else MEASURED)
-        figure.colorbar(drawn, label="correlation")
+        figure.colorbar(drawn, label="correlation", shrink=0.9)
     return figure

@@ -39,7 +39,8 @@ THRESHOLD = 1e-5  # of the strongest line of the load: weaker ones are left out 
 SAME = 1e-3  # of a frequency: lines as near as that are one
 KEPT = 32  # predictions
 SETTLED = 1e-4  # of the largest motion: what is left of the transient where it is left out
-PARTS = (1 / 8, 1 / 4, 1 / 2)  # of a record, after which it may have decayed
+PARTS = (1 / 12, 1 / 4)  # of a record, after which it may have decayed
+BEFORE_END = 0.9  # of such a part: its last samples see it end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,8 +211,8 @@ def _flat_history(aim: Target, scene: Scene, times: Floats) -> Floats:
     later = steady(*asked, times)
     for part in PARTS:
         n = int(part * len(times))
-        begun = from_rest(*asked, times[:n])
-        left = np.abs(begun - later[:n])[3 * n // 4 :].max()
+        begun = from_rest(*asked, times[:n])[: int(BEFORE_END * n)]
+        left = np.abs(begun - later[: len(begun)])[2 * n // 3 :].max()
         if left <= SETTLED * np.abs(later).max():
-            return np.concatenate([begun, later[n:]])
+            return np.concatenate([begun, later[len(begun) :]])
     return from_rest(*asked, times)

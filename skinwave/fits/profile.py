@@ -12,10 +12,9 @@ import numpy as np
 from meshes.tetmesh import Floats
 from skinwave.effort import Progress
 from skinwave.fits.identify import covariance, width
-from skinwave.fits.solve import Solution
+from skinwave.fits.solve import CLOSE, Solution
 
 STEPS = 3  # of the other parameters at each value
-CLOSE = 0.02  # of a standard error: a step that no longer matters
 ATTEMPTS = 4  # at the end of an interval
 ACCURATE = 0.03  # of the excess there, as a root
 
@@ -105,7 +104,7 @@ def excess(solution: Solution, k: int, at: float) -> float:
         residual = problem.residual(u)
         best = min(best, float((residual**2).sum()))
         move = steps @ residual
-        if np.linalg.norm(slopes @ move) <= CLOSE * np.sqrt(solution.scale):
+        if np.linalg.norm(slopes @ move) <= 2 * CLOSE * np.sqrt(solution.scale):
             break
         u = u.copy()
         u[others] = np.clip(u[others] - move, 0, 1)
