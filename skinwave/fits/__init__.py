@@ -1,1 +1,1 @@
-"""Fits of a scene to a measurement: estimates, their intervals, and what the data do not resolve."""
+"""Fits of a scene to a measurement: estimates, intervals, and what the data do not resolve."""

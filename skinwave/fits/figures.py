@@ -1,4 +1,4 @@
-"""Figures of a fit: fitted against measured, residuals, profiles of the likelihood, correlations."""
+"""Figures of a fit: fitted against measured, residuals, likelihood profiles, correlations."""
 
 import matplotlib as mpl
 import numpy as np

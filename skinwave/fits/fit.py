@@ -1,4 +1,4 @@
-"""Fit of a scene to a measurement: estimates with intervals, and sentences on how far to trust it."""
+"""Fit of a scene to a measurement: estimates with intervals, and how far to trust them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from skinwave.fits.identify import (
 from skinwave.fits.observed import KINDS, data_of
 from skinwave.fits.parameters import check, of_scene, parse
 from skinwave.fits.posterior import Posterior, posterior
-from skinwave.fits.predicted import Target, target
+from skinwave.fits.predicted import Target, target, with_reduction
 from skinwave.fits.profile import Profile, profiles
 from skinwave.fits.solve import Problem, Solution, solve
 from skinwave.measurements import Measurement
@@ -124,6 +124,7 @@ def fit(
     kind = choose("kind", kind or ("lines" if measured.is_spectrum else "waveforms"), KINDS)
     aim = target(scene, _model(scene, model), measured.record, measured.places)
     check(scene, parameters)
+    aim = with_reduction(aim, parameters, progress)
     problem = Problem(
         parameters=parameters, data=data_of(kind, measured, aim), linear=aim.linear
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""What data tell about parameters: intervals, correlations, and directions that they do not resolve.
+"""Identifiability: intervals, correlations, and directions that the data do not resolve.
 
-At the solution the residual r changes by its slopes J over the unit cube. With J / s = U diag(S) V^T
-and s^2 the scale of the variances, a move by d along a column of V changes the residual by S d of
+At the solution the residual r changes by its slopes J over the unit cube. With s^2 the scale of the
+variances and J / s = U diag(S) V^T, a move by d along a column of V changes the residual by S d of
 its standard errors. Where the 95 % interval of such a direction is wider than the limits, the data
 do not resolve it, and of a parameter no interval is given whose own is as wide (Transtrum, Machta
 and Sethna, Phys Rev E 83:036701 (2011), of such sloppy directions).
@@ -154,7 +154,7 @@ def combined(solution: Solution, direction: Direction) -> tuple[float, float, fl
 
 
 def _singular(solution: Solution) -> tuple[Floats, Floats]:
-    """Singular values (k,) of the slopes over standard errors, none below round-off, and V (k, k)."""
+    """Singular values (k,) of slopes over standard errors, none below round-off, and V (k, k)."""
     scale = max(solution.scale, 1e-300)
     _, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
     least = ROUND_OFF * max(float(singular.max()), 1e-300)
@@ -173,6 +173,4 @@ def whiteness(residual: Floats) -> Whiteness:
     power = np.maximum((x**2).sum(axis=0), 1e-300)
     each = np.array([(x[lag:] * x[:-lag]).sum(axis=0) / power for lag in range(1, lags + 1)])
     terms = n * (n + 2) * each**2 / (n - np.arange(1, lags + 1))[:, None]
-    return Whiteness(
-        correlations=each.mean(axis=1), p=float(chi2.sf(terms.sum(), lags * series))
-    )
+    return Whiteness(correlations=each.mean(axis=1), p=float(chi2.sf(terms.sum(), lags * series)))

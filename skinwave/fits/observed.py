@@ -44,7 +44,6 @@ class Data:
     predict : values of the parameters -> (n, s)
     lines : names (f,) of the lines that are fitted, if it is to lines
     rough : data of the same record that cost less, for the search; None if there are none
-    remarks : sentences on what was left out
     """
 
     kind: str
@@ -58,7 +57,6 @@ class Data:
     predict: Callable[[Mapping[str, float]], Floats]
     lines: tuple[str, ...] = ()
     rough: "Data | None" = None
-    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,15 +94,16 @@ def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
     return KINDS[kind](measured, aim)
 
 
-def measured_lines(measured: Measurement, pressure: MovingPressure) -> Lines:
-    """Lines of a load in a measurement.
+def measured_lines(measured: Measurement, aim: Target) -> Lines:
+    """Lines of a load in a measurement, as far as they are predicted.
 
     Raises
     ------
     ValueError
         If there is none.
     """
-    found = (_of_spectra if measured.is_spectrum else _of_waveforms)(measured, pressure)
+    read = _of_spectra if measured.is_spectrum else _of_waveforms
+    found = _selected(read(measured, aim.scene.pressure), aim)
     if not len(found.frequencies):
         raise ValueError(
             "the measurement resolves no line of the scene's load; give the scene's Tacton the "
@@ -113,13 +112,22 @@ def measured_lines(measured: Measurement, pressure: MovingPressure) -> Lines:
     return found
 
 
+def _selected(found: Lines, aim: Target) -> Lines:
+    kept = aim.predicts(found.frequencies)
+    return replace(
+        found, names=tuple(np.array(found.names)[kept].tolist()),
+        frequencies=found.frequencies[kept], amplitudes=found.amplitudes[kept],
+        error=found.error[kept],
+    )  # fmt: skip
+
+
 def _of_spectra(measured: Measurement, pressure: MovingPressure) -> Lines:
     f, load = measured.frequencies, line_names(pressure)
-    at = np.abs(f[:, None] - load.frequencies).argmin(axis=0) if len(f) else np.empty(0, int)
+    at = np.abs(f[:, None] - load.frequencies).argmin(axis=0)
     near = np.abs(f[at] - load.frequencies) <= SAME * load.frequencies
     names = tuple(name for name, is_near in zip(load.names, near, strict=True) if is_near)
     a = measured.values[:, at[near]]
-    if len(a) > 1:
+    if len(a) > 1 and near.any():
         error, noise = _of_repetitions(a)
         return Lines(names=names, frequencies=load.frequencies[near], amplitudes=a.mean(axis=0),
                      error=error, is_known=True, noise=noise)  # fmt: skip
@@ -185,7 +193,7 @@ def _above_none(error: Floats, values: np.ndarray) -> Floats:
 
 
 def _lines(measured: Measurement, aim: Target) -> Data:
-    found = measured_lines(measured, aim.scene.pressure)
+    found = measured_lines(measured, aim)
     predict = predicted_lines(aim, found.frequencies)
     places = place_names(measured.places)
     return Data(
@@ -200,7 +208,7 @@ def _lines(measured: Measurement, aim: Target) -> Data:
 
 def _amplitudes(measured: Measurement, aim: Target) -> Data:
     """Moduli, with that of noise: the mean of Rice's distribution for weak noise."""
-    found = measured_lines(measured, aim.scene.pressure)
+    found = measured_lines(measured, aim)
     predict = predicted_lines(aim, found.frequencies)
     noise = found.error**2 if found.is_known else 0.0
     return Data(
@@ -219,7 +227,7 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
             f"the waveforms are {measured.times.size * len(measured.places):,} values, the limit "
             f"is {MOST:,}; select places or times, or fit lines"
         )
-    lines = _of_waveforms(measured, aim.scene.pressure)
+    lines = _selected(_of_waveforms(measured, aim.scene.pressure), aim)
     if len(lines.frequencies) and is_steady(measured, lines.frequencies):
         return _steady(measured, aim, lines)
     return _from_rest(measured, aim, lines)

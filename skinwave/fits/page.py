@@ -39,8 +39,8 @@ FITTED = {
     "Hz": "Lines of the load as measured, and as fitted.",
 }
 RESIDUALS = (
-    "Left: what is left of the data over its standard error; 95 of 100 lie between the dashed lines "
-    "if the errors are normal. Right: its autocorrelation, in the shaded band if it is white."
+    "Left: what is left of the data over its standard error; 95 of 100 lie between the dashed "
+    "lines if the errors are normal. Right: its autocorrelation, in the shaded band if it is white."
 )
 
 

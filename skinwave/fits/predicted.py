@@ -19,17 +19,22 @@ from simple_model.flat_quantities import from_rest, steady, surface_field
 from simple_model.material import Complex
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
+from skinwave import parametric
 from skinwave.bodies.analytic import exact_waves
+from skinwave.effort import Progress
 from skinwave.fits.parameters import (
     DELAY,
     GAIN,
     OFFSET_X,
     OFFSET_Y,
     PRESSURE,
+    Parameters,
     Values,
     of_scene,
 )
 from skinwave.models import Model, check_reading, named
+from skinwave.models.free_materials import free_keys
+from skinwave.parametric import ParametricBody
 from skinwave.scene import SAMPLE_RATE, Scene
 from skinwave.simulation import compute
 from skinwave.sweeps.variation import varied
@@ -46,13 +51,15 @@ BEFORE_END = 0.9  # of such a part: its last samples see it end
 @dataclass(frozen=True, kw_only=True)
 class Target:
     """Prediction's target: a `scene` whose parameters are varied, the model, and what it is
-    compared with: a quantity of the normal motion at places (p, 2) in metre.
+    compared with: a quantity of the normal motion at places (p, 2) in metre. A body that is reduced
+    once for all values of its materials is `reduced`.
     """
 
     scene: Scene
     model: str
     quantity: Quantity
     places: Floats
+    reduced: ParametricBody | None = None
 
     @property
     def record(self) -> Model:
@@ -82,6 +89,11 @@ class Target:
         """Values of all keys but the delay and the linear ones."""
         left_out = {GAIN, DELAY} | ({PRESSURE} if self._is_scaled(values) else set())
         return {key: value for key, value in values.items() if key not in left_out}
+
+    def predicts(self, frequencies: Floats) -> np.ndarray:
+        """Mask (f,) of lines that are predicted: a reduced body has no faint ones."""
+        known = frequencies if self.reduced is None else self.reduced.frequencies
+        return np.asarray((np.abs(known[:, None] - frequencies) <= SAME * frequencies).any(axis=0))
 
     def _is_scaled(self, values: Values) -> bool:
         return PRESSURE in values and PRESSURE in self.linear
@@ -126,6 +138,32 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     return found
 
 
+def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> Target:
+    """Target whose body is reduced once, where the model reduces bodies and of its scene only
+    materials and the pressure are varied.
+
+    Parameters
+    ----------
+    aim : Target
+    parameters : Parameters of the fit
+    progress : called with the name of the phase and the fraction done
+
+    Returns
+    -------
+    Target
+    """
+    ranges = {each.key: (each.low, each.high) for each in parameters.free}
+    ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
+    if not aim.record.is_reduced or parameters.ties or not ranges:
+        return aim
+    scene = aim.varied({})
+    try:
+        free_keys(scene.body, ranges)
+    except ValueError:  # of a key that changes more than materials
+        return aim
+    return replace(aim, reduced=parametric.prepare(scene, ranges, progress=progress))
+
+
 def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
     """Prediction of the complex amplitudes (f, p), SI, of Re a exp(2 pi i f t) at frequencies (f,)
     in Hz.
@@ -136,6 +174,7 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
         On evaluation, if the load has no line at one of them.
     """
     unscaled = _flat_lines if aim.record.is_infinite else _sampled_lines
+    unscaled = _reduced_lines if aim.reduced else unscaled
     base = _kept(lambda values: unscaled(aim, values, frequencies))
 
     def predict(values: Values) -> Complex:
@@ -177,6 +216,13 @@ def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     return np.asarray(a[at] * aim.quantity.factor(2j * pi * f[at])[:, None])
 
 
+def _reduced_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
+    """Lines of a body that is reduced for all of its materials."""
+    assert aim.reduced is not None
+    f, a = parametric.lines(aim.reduced, values)
+    return np.asarray(a[np.abs(f[:, None] - frequencies).argmin(axis=0)])
+
+
 def _check_lines(found: Floats, wanted: Floats, values: Values) -> None:
     apart = np.abs(found - wanted) > SAME * wanted
     if apart.any():
@@ -194,6 +240,9 @@ def _sampled_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
 
 def _history(aim: Target, values: Values, last: float) -> CubicSpline:
     """Interpolated waveforms (t, p) from rest up to `last` in s."""
+    if aim.reduced:
+        found = parametric.answer(aim.reduced, values)
+        return CubicSpline(found.times, found.values)
     scene = aim.varied(values)
     if not aim.record.is_infinite:
         found = compute(scene, aim.model)

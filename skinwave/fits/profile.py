@@ -1,8 +1,8 @@
 """Profile likelihood: the least chi squared at each value of a parameter, over all the others.
 
 Its 95 % interval is where it exceeds the least by the square of Student's t (Venzon and Moolgavkar,
-Appl Stat 37:87 (1988)); unlike that by the covariance it need not be symmetric. The other parameters
-follow by Gauss-Newton steps with the slopes at the solution, which cost one run of the model each.
+Appl Stat 37:87 (1988)); unlike that by the covariance it need not be symmetric. The other
+parameters follow by Gauss-Newton steps with the slopes at the solution, a run of the model each.
 """
 
 from dataclasses import dataclass
