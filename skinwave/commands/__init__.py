@@ -25,10 +25,11 @@ from skinwave.commands import (
     verify,
     web,
 )
+from skinwave.commands import map as map_command
 
 MODULES = (
-    run, compare, tradeoff, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
-    film, web, rerun, same, doctor, cache,
+    run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
+    verify, report, film, web, rerun, same, doctor, cache,
     measured,
     fit,
 )  # fmt: skip

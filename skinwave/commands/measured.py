@@ -30,7 +30,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quantity", default="", metavar="NAME",
                         help="displacement, velocity or acceleration")  # fmt: skip
     parser.add_argument("--unit", default="", metavar="UNIT", help='mm/s, um, g, or "20 mm/s" of 1')
-    parser.add_argument("--places", metavar="XY", help='places in mm, "0,0 5,0"')
+    parser.add_argument("--places", metavar="XY", help='places in mm, "0,0 5,0", or a file')
     parser.add_argument("--positive", choices=tuple(SIGNS), help="into the body or out of it")
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
     parser.add_argument("--variable", default="", metavar="NAME", help="array of a file of several")

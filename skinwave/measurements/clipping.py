@@ -7,7 +7,7 @@ from simple_model.trajectory import Floats
 RUN = 3  # samples in a row at the same extreme,
 RUNS = 2  # and so many of these, or
 LONG = 20  # one as long
-BELOW = 0.02  # of the half range: the band next to the extreme that is compared with it
+BELOW = 0.005  # of the half range: the band next to the extreme that is compared with it
 EXCESS = 6.0  # times the samples in the band; a sinusoid that is rounded has 2.4 at most
 
 

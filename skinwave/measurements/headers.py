@@ -8,7 +8,15 @@ import re
 from dataclasses import dataclass
 
 from simple_model.quantities import QUANTITIES
-from skinwave.measurements.units import FREQUENCIES, LENGTHS, MOTION, TIMES, length, plain
+from skinwave.measurements.units import (
+    FREQUENCIES,
+    LENGTHS,
+    MOTION,
+    TIMES,
+    length,
+    plain,
+    quantity_of,
+)
 
 TIME, FREQUENCY, X, Y, REPETITION, DRIVE = "time", "frequency", "x", "y", "repetition", "drive"
 NAMES = {
@@ -76,12 +84,18 @@ def column(text: str) -> Column:
         name, unit = _suffixed(found["name"].strip())
     return Column(
         text=said,
-        role=ROLE.get(name, ""),
+        role=ROLE.get(name, "") if found["place"] else _role(name, unit),
         part=(found["part"] or "").lower(),
         place=_place(found["place"]) if found["place"] else Column.place,
         repetition=int(found["rep"] or 1),
         unit=unit.strip(),
     )
+
+
+def _role(name: str, unit: str) -> str:
+    """Role of a name without a place; one letter may be a channel whose unit says what it is."""
+    role = ROLE.get(name, "")
+    return "" if len(name) == 1 and role in MOTION and quantity_of(unit) not in ("", role) else role
 
 
 def _suffixed(name: str) -> tuple[str, str]:
@@ -124,6 +138,22 @@ def cells(line: str, delimiter: str) -> list[str]:
     return [*found, cell.strip()]
 
 
+def split(line: str, delimiter: str) -> list[str]:
+    """Cells of a line between a delimiter, or between white space outside of brackets."""
+    if delimiter != " ":
+        return cells(line, delimiter)
+    joined = re.sub(r"\s+(?=[^\[\]]*\])|\s+(?=[\[#])", "", line.strip())
+    return joined.split()
+
+
+def is_unit(cell: str) -> bool:
+    """Whether a cell is a unit and nothing else, be it in brackets."""
+    return plain(cell) in {plain(unit) for unit in _SUFFIXES.values()}
+
+
 def delimiter_of(line: str) -> str:
-    """Tab, semicolon or comma, whichever a header has first in this order; else white space."""
-    return next((letter for letter in "\t;," if letter in line), " ")
+    """Tab, semicolon or comma, whichever a line has first in this order outside of brackets and
+    quotes; else white space.
+    """
+    bare = re.sub(r"\([^()]*\)|\[[^\[\]]*\]|\"[^\"]*\"", "", line)
+    return next((letter for letter in "\t;," if letter in bare), " ")

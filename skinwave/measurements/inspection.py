@@ -26,7 +26,7 @@ SAME = 4.0  # standard errors between a line and the drive's
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Inspection:
-    """What a measurement has.
+    """Content of a measurement, and what it lacks.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> Lin
 
 
 def _origins(measured: Measurement, spectrum: LineSpectrum | None, samples: int) -> tuple[str, ...]:
-    """Of each line: whether it is in the drive, or else mains hum."""
+    """Origins of the lines: the drive, or else mains hum."""
     if spectrum is None:
         return ()
     driven: tuple[SpectralLine, ...] = ()

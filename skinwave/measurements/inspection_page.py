@@ -21,13 +21,14 @@ WINDOW = 0.1  # s
 MOST_CELLS = 2_000_000  # of a CSV file
 MAP = 3  # known places, at least, of a map
 CAPTION = (
-    "Waveforms where they are largest, each above the last, mean of the repetitions. "
-    "Spectra of these, in the same colours: one-sided density of amplitude with a Hann window; "
-    "dashed: their noise floor without the lines; triangles: lines found, grey ones mains hum. Map: root mean square about the mean."
+    "Waveforms where they are largest, each above the last, mean of the repetitions. Spectra of "
+    "these, in the same colours: one-sided density of amplitude with a Hann window; dashed: their "
+    "noise floor without the lines; triangles: lines found, grey ones mains hum. Map: root mean "
+    "square about the mean."
 )
 SPECTRA = (
-    "Magnitudes at the places where they are largest; dashed: running median; triangles: "
-    "lines found. Map: root mean square over frequency."
+    "Magnitudes at the places where they are largest; dashed: running median; triangles: lines "
+    "found. Map: root mean square over frequency."
 )
 EXPLAINED = (
     "The false alarm is the probability that noise alone has any line as high in the whole file: "
@@ -58,7 +59,7 @@ def write(folder: Path, found: Inspection) -> None:
         document.picture(drawn, caption, "measured"),
         document.section("Lines", *lines),
         document.section(
-            "What is missing", *map(document.paragraph, found.missing or ["Nothing."])
+            "Missing or assumed", *map(document.paragraph, found.missing or ["Nothing."])
         ),
     ]
     title = f"{measured.name}: what was measured"

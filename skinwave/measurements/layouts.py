@@ -102,20 +102,23 @@ def long(table: Table) -> Recording:
     if len(series) > 1:
         raise ValueError(f"a table of a row a place has {len(series)} columns of motion; leave one")
     axis, row = np.unique(times if len(times) else frequencies, return_inverse=True)
-    places, spot = _distinct(_metres(columns, numbers, where))
+    places, spot = _distinct(in_metre(columns, numbers, where))
     again, run = table.of(headers.REPETITION), np.zeros(len(row), int)
     if again >= 0:
         run = np.unique(numbers[:, again], return_inverse=True)[1]
     values = _filled(series[0][1], (run, row, spot))
     name, sign, remarks = noted(table)
+    driven = _drive(columns, numbers)
     return Recording(
         values=values, quantity=quantity, unit=unit, places=places, sign=sign, name=name,
+        drive=_filled(driven, (run, row, spot))[0, :, 0] if len(driven) else driven,
         remarks=remarks, times=axis if len(times) else times,
         frequencies=frequencies if len(times) else axis,
     )  # fmt: skip
 
 
-def _metres(columns: tuple[Column, ...], numbers: Floats, where: tuple[int, int]) -> Floats:
+def in_metre(columns: tuple[Column, ...], numbers: Floats, where: tuple[int, int]) -> Floats:
+    """Places (p, 2) in metre of two columns; each has a unit."""
     found = []
     for k in where:
         unit = columns[k].unit

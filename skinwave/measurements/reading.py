@@ -2,7 +2,7 @@
 published sets.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +14,6 @@ from skinwave.measurements import arrays, matlab, skinsource, sound, text, unive
 from skinwave.measurements.measurement import Measurement
 from skinwave.measurements.recording import Given, Recording, completed
 from skinwave.measurements.units import length
-
-MOST_VALUES = 200_000_000  # of a measurement: 1.6 GB
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +87,7 @@ def read(
 
 
 def reader_of(path: Path) -> Reader:
-    """What reads a file of such a name; raises a ValueError if nothing does."""
+    """Reader of a file of such a name; raises a ValueError if nothing does."""
     for reader in READERS:
         if path.suffix.lower() in reader.suffixes:
             return reader
@@ -97,19 +95,22 @@ def reader_of(path: Path) -> Reader:
     raise ValueError(f"{path}: '{path.suffix}' is no known kind of file, use one of {known}")
 
 
-def places_of(words: str | Sequence[str]) -> Floats:
-    """Places (p, 2) in metre of words such as "0,0 5,0" in mm.
+def places_of(words: str) -> Floats:
+    """Places (p, 2) in metre of words such as "0,0 5,0" in mm, or of a text file with the columns
+    x and y.
 
     Raises
     ------
     ValueError
-        If a word is no pair of finite numbers.
+        If a word is no pair of finite numbers, or the file has none.
     """
+    if Path(words).is_file():
+        return text.places(Path(words))
     found = []
-    for word in words.split() if isinstance(words, str) else words:
+    for word in words.split():
         pair = word.strip("()").split(",")
         if len(pair) != 2:
-            raise ValueError(f"--places has '{word[:40]}', no x,y in mm; write 0,0 5,0")
+            raise ValueError(f"--places has '{word[:40]}', no x,y in mm; write 0,0 5,0, or a file")
         found.append([length(part, "mm") for part in pair])
     if not found or not np.isfinite(found).all():
         raise ValueError("--places must be pairs of finite numbers in mm; write 0,0 5,0")

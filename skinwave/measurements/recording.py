@@ -11,12 +11,13 @@ from simple_model.trajectory import Floats
 from skinwave.measurements import units
 from skinwave.measurements.measurement import Measurement
 
+LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
 EXAMPLE = "--quantity velocity --unit mm/s"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Given:
-    """What the user says of a file: each replaces what the file says, None or "" leaves it.
+    """Options of a user: each replaces what the file says, None or "" leaves it.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class Given:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """What a file holds.
+    """Content of a file.
 
     Parameters
     ----------
@@ -90,6 +91,10 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
     quantity, unit = _quantity(found, given)
     sign, said = _sign(found, given)
     values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
+    if values.size and not np.abs(values).max() < LARGEST:
+        raise ValueError(
+            f"values reach {np.abs(values).max():g} in SI; leave out nan and inf, and check --unit"
+        )
     times = _times(found, given)
     places, placed = _places(found, given)
     return Measurement(

@@ -44,4 +44,5 @@ def _of_full_scale(data: np.ndarray) -> np.ndarray:
         return (data.astype(np.float64) - 128) / 128
     if data.dtype.kind == "i":  # 24 bits are the upper ones of 32
         return data / float(2 ** (8 * data.dtype.itemsize - 1))
-    return data.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # of what is no number, which is refused later
+        return data.astype(np.float64)

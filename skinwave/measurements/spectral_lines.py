@@ -76,8 +76,8 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
     runs, count, places = values.shape
     if count < 32:
         raise ValueError(f"{count} samples are too few for a spectrum; measure 32 or more")
-    x = detrend(np.moveaxis(values, 0, 1).reshape(count, runs * places), axis=0)
-    density = densities(x, runs, rate)
+    x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
+    density = densities(detrend(x, axis=0), runs, rate)
     floor, bin_ = floor_of(density, runs), rate / count
     fit, chance = NONE, np.empty(0)
     for _ in range(PASSES):
@@ -88,19 +88,22 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
             break
         start, chance = np.append(fit.frequencies, new * bin_), np.append(chance, surely)
         fit = fitted(x, start, rate, _at(floor, start / bin_, runs), len(new))
-        if len(start) >= MOST:
+        fit, chance = _pruned(x, fit, chance, rate, floor, runs, alarm)
+        if len(chance) >= MOST:
             break
     return LineSpectrum(
-        lines=_lines(fit, chance, runs),
+        lines=_lines(fit, _errors(fit, rate, floor, runs), chance, runs),
         frequencies=np.arange(len(density)) * bin_,
         density=density,
         floor=floor,
     )
 
 
-def densities(x: Floats, runs: int, rate: float) -> Floats:
-    """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions."""
-    window = hann(len(x), sym=False)[:, None]
+def densities(x: Floats, runs: int, rate: float, window: Floats | None = None) -> Floats:
+    """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions, with a window
+    (t, 1), that of Hann if none is given.
+    """
+    window = hann(len(x), sym=False)[:, None] if window is None else window
     spectra = np.abs(np.fft.rfft(x * window, axis=0)) ** 2
     density = 2 * spectra / (rate * np.sum(window**2))
     return density.reshape(len(density), runs, -1).mean(axis=1)
@@ -148,19 +151,59 @@ def _side_lobe(bins: int) -> float:
     return 1.0 if bins < 2 else LEAK / (np.pi * bins * (bins**2 - 1)) ** 2
 
 
+def _pruned(
+    x: Floats, fit: LineFit, chance: Floats, rate: float, floor: Floats, runs: int, alarm: float
+) -> tuple[LineFit, Floats]:
+    """The lines that still rise above the noise beside all others, fitted without the rest.
+
+    What a fit of one line leaves before its neighbour is known may look like a line.
+    """
+    if not len(chance):
+        return fit, chance
+    count, places = len(x), floor.shape[1]
+    bins = np.clip(np.round(fit.frequencies * count / rate), 1, len(floor) - 1).astype(int)
+    squared = np.abs(fit.amplitudes.reshape(len(chance), runs, places)) ** 2
+    ratio = np.ones(floor.shape)
+    ratio[bins] = squared.mean(axis=1) * count / (2 * rate) / floor[bins]
+    tests = floor[LOWEST:-1].size
+    sure = tests * tail(ratio, runs, len(floor))[bins].min(axis=1) < alarm
+    if sure.all():
+        return fit, chance
+    if not sure.any():
+        return NONE, np.empty(0)
+    start = fit.frequencies[sure]
+    return fitted(x, start, rate, _at(floor, start * count / rate, runs)), chance[sure]
+
+
 def _at(floor: Floats, positions: Floats, runs: int) -> Floats:
     """Noise (l, r p) at bins, the same for all repetitions of a place."""
     bins = np.clip(np.round(positions), 1, len(floor) - 1).astype(int)
     return np.tile(floor[bins], (1, runs))
 
 
-def _lines(fit: LineFit, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
+def _errors(fit: LineFit, rate: float, floor: Floats, runs: int) -> Floats:
+    """Standard errors in Hz in the noise that least squares meet: what is left without a window,
+    where transients and drifting lines leave more than with one.
+    """
+    if not len(fit.frequencies):
+        return fit.errors
+    bins = fit.frequencies * len(fit.rest) / rate
+    bare = floor_of(densities(fit.rest, runs, rate, np.ones((len(fit.rest), 1))), runs)
+    noise = _at(floor, bins, runs)
+    weight = np.abs(fit.amplitudes) ** 2 / noise
+    excess = np.sum(weight * _at(bare, bins, runs) / noise, axis=1) / np.sum(weight, axis=1)
+    return fit.errors * np.sqrt(np.maximum(excess, 1.0))
+
+
+def _lines(fit: LineFit, errors: Floats, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
     """Lines by frequency."""
+    if not len(chance):
+        return ()
     squared = np.abs(fit.amplitudes.reshape(len(fit.frequencies), runs, -1)) ** 2
     return tuple(
         SpectralLine(
             frequency=float(fit.frequencies[k]),
-            error=float(fit.errors[k]),
+            error=float(errors[k]),
             amplitudes=np.sqrt(squared[k].mean(axis=0)),
             false_alarm=float(chance[k]),
         )

@@ -17,22 +17,23 @@ MOST_NAMED = 5
 
 
 def sentences(found: Inspection) -> list[str]:
-    """What the measurement is, its noise and clipping, a sentence each."""
+    """Sentences on what was measured, on noise and clipping."""
     return [_what(found.measured), *_noise(found), _clipping(found), *_constant(found)]
 
 
 def _what(measured: Measurement) -> str:
     count, runs = len(measured.places), len(measured.values)
-    said = f"{measured.record.name} at {count} place{'s' * (count > 1)}"
+    said = f"{measured.record.name.capitalize()} at {count} place{'s' * (count > 1)}"
     said += f", {runs} repetition{'s' * (runs > 1)}"
     axis = measured.axis
     if measured.is_spectrum:
         step = np.diff(axis)
-        apart = f" in steps of {significant(step.mean())} Hz" if len(step) else ""
+        even = len(step) and np.ptp(step) < 1e-3 * step.mean()
+        apart = f" in steps of {significant(step.mean())} Hz" if even else ""
         return f"{said}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz{apart}."
     lasts = len(axis) / measured.rate if len(axis) > 1 else 0.0
     return (
-        f"{said}: {len(axis):,} samples at {significant(measured.rate, 5)} Hz, "
+        f"{said}: {len(axis):,} samples at {measured.rate:,.6g} Hz, "
         f"{significant(lasts)} s, so that lines {significant(1 / lasts) if lasts else '-'} Hz "
         "apart are resolved."
     )
@@ -121,7 +122,7 @@ def text(found: Inspection) -> str:
         said += ["", *("  ".join(row).rstrip() for row in padded), ""]
     elif found.spectrum is not None:
         said.append("No line rises above the noise floor.")
-    return "\n".join([*said, *(f"missing: {sentence}" for sentence in found.missing)])
+    return "\n".join([*said, *(f"note: {sentence}" for sentence in found.missing)])
 
 
 def summary(found: Inspection) -> dict[str, Any]:

@@ -24,7 +24,7 @@ MOTION = {
         "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY,
     },
 }  # fmt: skip
-_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "\N{SUPERSCRIPT MINUS}": "-"})
+_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-"})
 _FACTOR = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(.*)", re.IGNORECASE)
 _LEVELS = re.compile(r"dB\w*(/.*)?", re.IGNORECASE)
 
@@ -44,7 +44,7 @@ def quantity_of(unit: str) -> str:
 
 
 def per_unit(unit: str, kind: str) -> float:
-    """What 1 in SI is in a unit of a quantity; of "20 mm/s", what 1 in a file is, 1/0.02.
+    """Divisor of a unit of a quantity: values over it are in SI; of "20 mm/s" it is 50.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def in_si(values: np.ndarray, per: float) -> np.ndarray:
 
 
 def scale(unit: str, units: dict[str, float], what: str) -> float:
-    """What 1 in SI is in a unit of times, frequencies or lengths.
+    """Divisor of a unit of times, frequencies or lengths.
 
     Raises
     ------
@@ -103,4 +103,4 @@ def length(text: str, unit: str) -> float:
 def _split(unit: str) -> tuple[float, str]:
     """Factor and name of a unit such as "20 mm/s"; the factor is 1 if there is none."""
     found = _FACTOR.fullmatch(unit.strip().strip("[]()"))
-    return (float(found[1]), plain(found[2])) if found else (1.0, plain(unit))
+    return (float(found[1]), plain(found[2])) if found and found[2] else (1.0, plain(unit))

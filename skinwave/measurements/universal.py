@@ -125,7 +125,7 @@ def _is_in_time(one: dict[str, Any]) -> bool:
 
 
 def _per_axis(one: dict[str, Any], in_time: bool) -> float:
-    """What 1 in SI is in the unit of the abscissa, SI if it has none."""
+    """Divisor of the unit of the abscissa, SI if it has none."""
     said = _text(one, "abscissa_axis_units_lab")
     known, what = (units.TIMES, "time") if in_time else (units.FREQUENCIES, "frequency")
     return units.scale(said, known, what) if said else 1.0
@@ -191,7 +191,7 @@ def _unit(one: dict[str, Any], per: float) -> tuple[str, str, list[str]]:
 
 
 def _per_metre(found: list[dict[str, Any]]) -> float:
-    """What 1 m is in the unit of length of the file."""
+    """Number of units of length of the file in a metre."""
     told = [float(one.get("length", 1.0)) for one in found if one.get("type") == LENGTH_UNIT]
     return told[0] if told and 0 < told[0] < np.inf else 1.0
 

@@ -58,20 +58,32 @@ def write_single(folder: Path, run: Run) -> None:
 def page_parts(
     folder: Path,
     groups: Mapping[str, list[Run]],
+    drawn_runs: Mapping[str, list[Run]],
     first: Shown | None,
     outcome: StudyOutcome,
     progress: Progress,
     figures: Mapping[str, Future[bytes]],
 ) -> list[str]:
-    """Parts of index.html, and a PNG of each figure in it."""
+    """Parts of index.html, and a PNG of each figure in it.
+
+    Parameters
+    ----------
+    folder : Path
+    groups : runs by Tacton
+    drawn_runs : runs that figures show, by Tacton
+    first : the Tacton of the first screen, if there is one
+    outcome : StudyOutcome
+    progress : called with the name of the phase and the fraction done
+    figures : by Tacton and "overview", as far as they are begun
+    """
     runs = [run for group in groups.values() for run in group]
     (folder / "figures").mkdir()
 
     def drawn(figure: Figure, caption: str) -> str:
-        return _kept(folder, "propagation", png(figure), caption)
+        return kept(folder, "propagation", figure, caption)
 
     begun = not figures["overview"].cancel()
-    overview = figures["overview"].result() if begun else overview_png(groups)
+    overview = figures["overview"].result() if begun else overview_png(drawn_runs)
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
@@ -89,7 +101,7 @@ def page_parts(
                          *map(document.paragraph, modelled(runs))),
         document.section("How far the models agree", tables.agreement_table(groups)),
     ]  # fmt: skip
-    images = _images(groups, figures, progress)
+    images = _images(drawn_runs, figures, progress)
     pictures = [_kept(folder, n, images[n], caption(n, group)) for n, group in groups.items()]
     return [*parts, document.section("Every Tacton", *pictures)]
 
@@ -141,6 +153,11 @@ def _images(
             progress("draw", len(here) / len(groups))
             here[name] = tacton_png(name, groups[name])
     return {name: here[name] if name in here else figures[name].result() for name in groups}
+
+
+def kept(folder: Path, name: str, figure: Figure, caption: str) -> str:
+    """A figure as a file, and inside the page."""
+    return _kept(folder, name, png(figure), caption)
 
 
 def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:
