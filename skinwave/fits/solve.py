@@ -20,7 +20,7 @@ from skinwave.fits.parameters import DELAY, Parameters
 FORWARD, CENTRAL = 1e-5, 1e-3  # steps of differences, of the unit interval
 MOST_EVALUATIONS = 40  # steps of one start
 TOLERANCE = 1e-8
-CANDIDATES = 4  # points of the hypercube, of which the best one is a start
+CANDIDATES = 8  # points of the hypercube, of which the best one is a start
 DELAYS = 4  # of a scan, to a period of the highest frequency
 MOST_DELAYS = 400
 POLISHED = 6  # steps, which get closer by a digit each
