@@ -16,6 +16,7 @@ from skinwave.pictures.styles import Style
 MEASURED, FITTED, LEFT = "#222222", "#0072B2", "#D55E00"
 MOST = 4  # places that are drawn
 SHOWN = 0.05  # s of waveforms
+FAINTEST = 1e-5  # of the largest amplitude, down to which lines are drawn
 ACROSS = 3  # profiles in a row
 
 
@@ -78,6 +79,8 @@ def _lines(found: Fit, style: Style) -> Figure:
         column[-1].set_xlabel("frequency, Hz")
         for ax in column:
             ax.grid(alpha=0.25)
+    largest = per_unit * float(np.abs(measured).max())
+    axes[0, 0].set_ylim(FAINTEST * largest, 3 * largest)
     axes[0, 0].set_ylabel(f"amplitude, {found.measured.record.shown}")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     if complex_ones:
