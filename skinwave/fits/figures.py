@@ -192,7 +192,7 @@ def correlation_figure(found: Fit, style: Style = REPORT) -> Figure:
         figure = Figure(figsize=size, layout="constrained")
         ax = figure.subplots()
         drawn = ax.imshow(found.correlations, cmap="RdBu_r", vmin=-1, vmax=1)
-        ax.set_xticks(range(k), range(1, k + 1))
+        ax.set_xticks(range(k), [str(n) for n in range(1, k + 1)])
         ax.set_yticks(range(k), [f"{key}  {n}" for n, key in enumerate(keys, 1)])
         for i, j in np.ndindex(k, k):
             value = found.correlations[i, j]

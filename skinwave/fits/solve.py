@@ -190,7 +190,7 @@ def _counted(problem: Problem) -> tuple[Problem, list[None]]:
     def counting(data: Data) -> Data:
         predict: Callable[..., Floats] = data.predict
 
-        def counted(values: dict[str, float]) -> Floats:
+        def counted(values: Mapping[str, float]) -> Floats:
             calls.append(None)
             return predict(values)
 
