@@ -5,7 +5,7 @@ its range, the gain or the peak pressure as linear least squares at each delay (
 Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)). From there a trust-region method takes over.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
