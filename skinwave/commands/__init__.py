@@ -10,6 +10,7 @@ from skinwave.commands import (
     dispersion,
     doctor,
     film,
+    fit,
     measured,
     mesh,
     plan,
@@ -30,5 +31,6 @@ MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
     verify, report, film, web, rerun, same, doctor, cache,
     measured,
+    fit,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

@@ -1,6 +1,6 @@
 """The page of a comparison, and that of a single run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,8 +37,8 @@ class StudyOutcome:
     peak_memory: int = 0
 
 
-def write_single(folder: Path, run: Run) -> None:
-    """The folder of one run, with its page."""
+def write_single(folder: Path, run: Run, more: Sequence[str] = ()) -> None:
+    """The folder of one run, with its page, which may have more parts before the effort."""
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
     group = beside_kernels(run) if run.is_motion else []
@@ -48,6 +48,7 @@ def write_single(folder: Path, run: Run) -> None:
         document.warnings_banner([("", run.response.effort)]),
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *map(document.paragraph, unresolved([run])),
+        *more,
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
         document.section("The scene", document.preformatted(dumps(run.scene))),
     ]
