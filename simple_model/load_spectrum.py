@@ -129,7 +129,20 @@ def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tup
     ValueError
         As `pressure.check_lines` does.
     """
-    lines = load_lines(pressure)
+    return load_lines(pressure).gather(path_forces(pressure, points, load))
+
+
+def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Complex:
+    """Reduced forces of unit pressure on the path, by harmonic of the path.
+
+    Parameters
+    ----------
+    pressure, points, load : as for `reduced_lines`; the modulation does not matter
+
+    Returns
+    -------
+    (n, r) complex, -n is harmonic -n
+    """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     forces = []
     for part in np.array_split(knots, len(knots) // 64 + 1):
@@ -137,7 +150,7 @@ def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tup
         near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
         forces.append(pressure.spot(points[near], part) @ load[near])
     weighted = np.vstack(forces) * path_weights(pressure)[:, None]
-    return lines.gather(path_fourier(weighted.T).T)
+    return path_fourier(weighted.T).T
 
 
 def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:

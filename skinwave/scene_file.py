@@ -3,6 +3,7 @@
 import re
 import tomllib
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,12 @@ from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
 from simple_model.trajectory import BY_POINTS
+from skinwave.bodies import BodyKind
+from skinwave.bodies.parts import check_material
+from skinwave.distributions import Distribution, parent_of, with_spreads, without_spreads
 from skinwave.material_file import with_tables
-from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of
-from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked, renamed
+from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
+from skinwave.scene_keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
@@ -34,7 +38,7 @@ def read(path: str | Path) -> Scene:
     """
     text = content(path)
     try:
-        scene = _scene(parsed(text, Path(path).parent))
+        scene = from_table(parsed(text, Path(path).parent))
         if scene.body.file:  # is named from where the scene is
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
@@ -64,7 +68,7 @@ def content(path: str | Path) -> str:
 
 def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
-    return _scene(parsed(text))
+    return from_table(parsed(text))
 
 
 def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
@@ -87,7 +91,9 @@ def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
     return renamed(with_tables(table, folder) if folder else table)
 
 
-def _scene(table: dict[str, Any]) -> Scene:
+def from_table(table: dict[str, Any]) -> Scene:
+    """The scene of a table by a scene file's keys; raises a ValueError as `loads` does."""
+    table, spreads = without_spreads(table)
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
     preset, table = _preset(table)
     top = checked("scene", table, sections)
@@ -100,11 +106,25 @@ def _scene(table: dict[str, Any]) -> Scene:
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
     )
-    return Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
+    scene = Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
+    return _with_spreads(scene, spreads) if spreads else scene
+
+
+def _with_spreads(scene: Scene, spreads: dict[str, Distribution]) -> Scene:
+    complete = to_table(scene)
+    for key in spreads:
+        if parent_of(complete, key)[0] is None:
+            raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
+    return replace(scene, spreads=tuple(sorted(spreads.items())))
 
 
 def dumps(scene: Scene) -> str:
     """The complete scene as TOML; `loads` gives it back."""
+    return tomli_w.dumps(to_table(scene))
+
+
+def to_table(scene: Scene) -> dict[str, Any]:
+    """The complete scene by a scene file's keys; `from_table` gives it back."""
     tacton, path, pressure, body = (
         scene.tacton,
         scene.tacton.trajectory,
@@ -122,6 +142,8 @@ def dumps(scene: Scene) -> str:
     for section, keys in SECTIONS.items():
         table[section] = {}
         for key, field in keys.items():
+            if key in DERIVED:
+                continue
             source = next(s for s in sources[section] if hasattr(s, field.name))
             if section != "tacton" or key not in unused(tacton):
                 table[section][key] = field.write(getattr(source, field.name))
@@ -130,7 +152,7 @@ def dumps(scene: Scene) -> str:
         del table["placement"]
     for key in _keys_of_kinds() - set(body.of_kind.keys):
         table["body"].pop(key, None)
-    return tomli_w.dumps(table)
+    return with_spreads(table, scene.spreads)
 
 
 def unused(tacton: Tacton) -> set[str]:
@@ -168,11 +190,30 @@ def _body(values: dict[str, Any], preset: Body | None) -> Body:
         takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
         raise ValueError(f'[body] {key} is for kind = {takers}, not "{kind.name}"')
     shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
+    missing = vars(preset) if preset else next(iter(kind.presets.values()), {})
+    if (grammage := shape.pop("grammage", None)) is not None:
+        shape |= _of_grammage(grammage, kind, {**missing, **shape}, "depth" in shape)
     if preset:
         placed = {**vars(preset.placement), **placement}
         return replace(preset, **shape, placement=Placement(**placed))
-    missing = next(iter(kind.presets.values()), {})
     return Body(**{**missing, **shape}, placement=Placement(**placement))
+
+
+def _of_grammage(
+    grammage: float, kind: BodyKind, values: dict[str, Any], thickness_is_given: bool
+) -> dict[str, Any]:
+    """The material of a sheet of so many kg/m2 and of a given thickness, or else its thickness."""
+    if not kind.is_plate:
+        raise ValueError(f'[body] grammage_g_m2 is for a sheet, not "{kind.name}"')
+    if not 0 < grammage < inf:
+        raise ValueError(f"grammage_g_m2 = {1e3 * grammage:g} must be a finite number above 0")
+    check_material(values["material"])
+    solid = solid_of(values["material"])
+    if not thickness_is_given:
+        return {"depth": grammage / solid.density}
+    if not values["depth"] > 0:
+        return {}  # which the body refuses
+    return {"material": replace(solid, density=grammage / values["depth"])}
 
 
 def _keys_of_kinds() -> set[str]:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partialmethod
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,14 @@ needs_browser = pytest.mark.skipif(
 def chromium() -> Iterator[Any]:
     """A browser, as Playwright has it."""
     playwright = pytest.importorskip("playwright.sync_api")
+    wait = playwright.Page.wait_for_function
+    # By itself it looks with every frame, for which the browser draws sixty of them a second.
+    playwright.Page.wait_for_function = partialmethod(wait, polling=50)
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         yield browser
         browser.close()
+    playwright.Page.wait_for_function = wait
 
 
 def served(*arguments: str) -> tuple[Any, str]:

@@ -14,7 +14,7 @@ from skinwave.cli import main
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
 
-LONGEST = 10.0  # s
+LONGEST = 10.0  # s of computing
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="paths differ")
 
@@ -33,10 +33,10 @@ def folder(tmp_path, monkeypatch):
 
 def said(capsys, folder, arguments, codes=(2,)):
     """Error message of a refused command, in its one line; "" if it was not refused."""
-    before, started = corpus.contents(folder), time.perf_counter()
+    before, started = corpus.contents(folder), time.process_time()
     code = main(arguments)
     printed = capsys.readouterr().err
-    assert time.perf_counter() - started < LONGEST
+    assert time.process_time() - started < LONGEST
     assert code in codes, printed
     if code == 2:
         assert printed.count("\n") == 1, printed
@@ -98,12 +98,12 @@ def test_what_no_machine_can_solve_is_refused_with_number_limit_and_cure(
 
 @pytest.mark.parametrize("name", MESHES)
 def test_no_mesh_is_refused_in_one_line(name):
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(ValueError) as error:  # noqa: PT011 - any sentence will do, but one
         MESHES[name]()
     assert str(error.value)
     assert "\n" not in str(error.value)
-    assert time.perf_counter() - started < LONGEST
+    assert time.process_time() - started < LONGEST
 
 
 REAL = [

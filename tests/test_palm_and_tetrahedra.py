@@ -415,9 +415,9 @@ def test_overlap_in_one_plane_is_a_crossing():
 
 def test_large_triangles_among_small_ones_are_no_burden():
     far = Surface(points=SPHERE.points * 1e-3 + 0.02, triangles=SPHERE.triangles)
-    started = time.perf_counter()
+    started = time.process_time()
     assert not len(self_intersections(together(cube(), far)))
-    assert time.perf_counter() - started < 5
+    assert time.process_time() - started < 5
 
 
 # The mesher itself
@@ -465,7 +465,7 @@ def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     started = time.perf_counter()
     with pytest.raises(TimeoutError, match="stopped after 3 s; take larger elements or a longer"):
         tetra._run(plain | infinite, 3.0)
-    assert time.perf_counter() - started < 6
+    assert time.perf_counter() - started < 30  # other work may share the machine
     assert not list(tmp_path.iterdir())
 
 
@@ -559,9 +559,11 @@ def test_an_interrupt_ends_the_mesher_too(tmp_path):
         children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text()
     time.sleep(2)
     parent.send_signal(signal.SIGINT)
-    parent.wait(20)
-    time.sleep(0.5)
+    parent.wait(60)
     assert children
+    deadline = time.time() + 20
+    while Path(f"/proc/{children.split()[0]}").exists() and time.time() < deadline:
+        time.sleep(0.1)
     assert not Path(f"/proc/{children.split()[0]}").exists()
     assert not list(tmp_path.iterdir())
 

@@ -164,6 +164,20 @@ def twice(scene):
     return first, shutil.copytree(first, scene.parent / "second")
 
 
+def test_a_record_that_lacks_a_number_of_threads_is_had_again_here(twice, monkeypatch):
+    """Each process would start the next one for it."""
+
+    def another(*given):
+        raise AssertionError("another process is started")
+
+    monkeypatch.setattr("skinwave.commands.rerun._with_threads", another)
+    kept = record_of(twice[0])
+    del kept["threads"][THREADS[0]]
+    (twice[0] / "record.json").write_text(json.dumps(kept))
+    assert main(["rerun", str(twice[0]), "--out", "again", "--quiet"]) == 0
+    assert same(twice[0], "again") == 0
+
+
 @pytest.mark.parametrize(
     ("change", "part"),
     [

@@ -176,8 +176,8 @@ def test_the_reduced_model_follows_the_transient_from_rest():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "h", "seconds"), [("skin", 0.0065, 0.1), ("sheet", 0.005, 0.05)])
-def test_reduction_alone_costs_less_than_a_thousandth(kind, h, seconds):
+@pytest.mark.parametrize(("kind", "h"), [("skin", 0.0065), ("sheet", 0.005)])
+def test_reduction_alone_costs_less_than_a_thousandth(kind, h):
     """Both marched by the same scheme at the same step, so that only the reduction differs."""
     ops, P, points, S, load, model = reduced_for_circling(kind, h)
     assert len(ops.free) > 5000
@@ -187,14 +187,12 @@ def test_reduction_alone_costs_less_than_a_thousandth(kind, h, seconds):
         R=sparse.csr_array((r, r)), free=np.arange(r), n_dofs=r,
     )  # fmt: skip
     project = model.basis.T @ P
-    full = marched(ops, S, lambda t: P @ load(points, t), 1e-4, seconds)
-    reduced = marched(small, model.outputs, lambda t: project @ load(points, t), 1e-4, seconds)
+    full = marched(ops, S, lambda t: P @ load(points, t), 1e-4, 0.05)
+    reduced = marched(small, model.outputs, lambda t: project @ load(points, t), 1e-4, 0.05)
     assert misfit(reduced, full) <= 1e-3
 
 
-@pytest.mark.parametrize(
-    ("kind", "h"), [("skin", 0.0075), ("sheet", 0.1 / 16), ("sheet", 0.1 / 20)]
-)
+@pytest.mark.parametrize(("kind", "h"), [("skin", 0.0075), ("sheet", 0.1 / 16)])
 def test_the_estimate_is_near_the_true_error(kind, h):
     """Also where moments converge ever faster, as those of sheets with little loss do."""
     mesh, ops = body(kind, h)

@@ -33,6 +33,7 @@ INNER = {
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"bodies", "models", "planning", "pictures"},
     "web": {"bodies", "models", "planning", "pictures", "reports", "studies"},
+    "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }
 
 # Rooms within meshes, likewise.

@@ -207,7 +207,7 @@ def test_the_token_is_not_on_the_command_line_of_the_browser(browser, tmp_path, 
     scene = tmp_path / "none.toml"
     scene.write_text("[body]\nkind = 'none'\n")
     process, address = served("--port", "0", "--open", str(scene))
-    for _ in range(100):
+    for _ in range(PATIENCE // 100):
         if told.exists():
             break
         time.sleep(0.1)

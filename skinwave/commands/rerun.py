@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.marks import within
 
     kept = record.read(options.folder)
-    if kept["threads"] != threads():  # which are set when a process begins
+    if kept["threads"].items() - threads().items():  # which are set when a process begins
         return _with_threads(options, kept["threads"])
     folder = options.folder.resolve()
     if options.out and within(folder, options.out):

@@ -1,0 +1,193 @@
+"""Ritz's method for plates against closed forms, published values and Rayleigh's integral."""
+
+import numpy as np
+import pytest
+
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.load_spectrum import load_lines, reduced_lines
+from simple_model.plate_air import air_mass
+from simple_model.plate_modes import Plate, plate_modes, steady_response
+from simple_model.plate_response import modal_path_forces, plate_lines
+from simple_model.polynomials import line_basis
+
+D, MASS, SIDE = 3.66e-4, 0.08, 0.1  # N m, kg/m2, m
+
+
+def edges(*supports):
+    return dict(zip(("left", "right", "front", "back"), supports, strict=True))
+
+
+def isotropic(size_x=SIDE, size_y=SIDE, nu=0.3, air_density=0.0, **more):
+    return Plate(
+        size_x=size_x, size_y=size_y, d11=D, d22=D, d12=nu * D, d66=(1 - nu) / 2 * D,
+        mass_per_area=MASS, air_density=air_density, **more,
+    )  # fmt: skip
+
+
+def parameters(plate, finest=350.0):
+    """Frequency parameters w a^2 sqrt(m/D), a the length along x."""
+    frequencies = plate_modes(plate, finest).frequencies
+    return 2 * np.pi * frequencies * plate.size_x**2 * np.sqrt(MASS / D)
+
+
+def navier(plate, orders=40):
+    """Wavenumbers (p, 1) and (1, q) and stiffness (p, q) of a simply supported plate."""
+    a = np.arange(1, orders)[:, None] * np.pi / plate.size_x
+    b = np.arange(1, orders) * np.pi / plate.size_y
+    bending = plate.d11 * a**4 + 2 * (plate.d12 + 2 * plate.d66) * a**2 * b**2 + plate.d22 * b**4
+    return a, b, bending + plate.tension_x * a**2 + plate.tension_y * b**2
+
+
+SIMPLY = Plate(
+    size_x=0.12, size_y=0.09, d11=5e-4, d22=2e-4, d12=0.5e-4, d66=1e-4, mass_per_area=MASS,
+    tension_x=20.0, tension_y=5.0, air_density=0.0, **edges(*["simply"] * 4),
+)  # fmt: skip
+
+
+def test_simply_supported_orthotropic_stretched_plates_have_their_closed_form():
+    _, _, stiffness = navier(SIMPLY)
+    exact = np.sort(np.sqrt(stiffness / MASS).ravel()) / (2 * np.pi)
+    found = plate_modes(SIMPLY).frequencies
+    np.testing.assert_allclose(found[:20], exact[:20], rtol=1e-8)
+
+
+def test_a_membrane_is_a_string_along_its_tension():
+    plate = Plate(
+        size_x=0.2, size_y=0.05, d11=1e-9, d22=1e-9, d12=0.0, d66=1e-9, mass_per_area=MASS,
+        tension_x=50.0, air_density=0.0, **edges("simply", "simply", "free", "free"),
+    )  # fmt: skip
+    string = np.sqrt(50.0 / MASS) / (2 * 0.2)
+    assert plate_modes(plate).frequencies[0] == pytest.approx(string, rel=1e-5)
+
+
+# Leissa, J Sound Vib 31:257 (1973), tables C: nu = 0.3; upper bounds, the free ones of 36 terms.
+@pytest.mark.parametrize(
+    ("supports", "published", "least", "most"),
+    [
+        (["clamped"] * 4, [35.992, 73.413, 73.413, 108.27, 131.64], -1e-3, 1e-4),
+        (["clamped", "clamped", "simply", "simply"], [28.951, 54.743, 69.327, 94.585], -1e-3, 1e-4),
+        (["clamped", "free", "free", "free"], [3.4917, 8.5246, 21.429, 27.331, 31.111], -8e-3, 0),
+        (["free"] * 4, [0, 0, 0, 13.489, 19.789, 24.432, 35.024], -1.1e-2, 1e-9),
+        (["simply", "simply", "free", "free"], [9.6314, 16.135, 36.726, 38.945], -1e-3, 1e-4),
+    ],
+)  # fmt: skip
+def test_frequencies_of_square_plates_are_those_published(supports, published, least, most):
+    found = parameters(isotropic(**edges(*supports)))[: len(published)]
+    rigid = np.array(published) == 0
+    assert (found[rigid] < 0.05).all()
+    error = found[~rigid] / np.array(published)[~rigid] - 1
+    assert (error > least).all()
+    assert (error < most).all()
+
+
+def test_a_strip_between_two_clamped_edges_is_a_beam():
+    # Without Poisson's ratio the beam's modes are the plate's, whatever its width.
+    plate = isotropic(0.1, 0.02, nu=0.0, **edges("clamped", "clamped", "free", "free"))
+    found = parameters(plate)
+    assert np.abs(found[:, None] - [22.3733, 61.6728, 120.9034]).min(axis=0).max() < 2e-3
+
+
+def test_static_and_steady_deflection_are_those_of_naviers_series():
+    modes = plate_modes(SIMPLY, 900.0)
+    points, loaded = np.array([[0.011, -0.007], [0.0, 0.0]]), np.array([[-0.013, 0.009]])
+    forces = np.repeat(modes.at(loaded), 2, axis=0)  # of 1 N
+    found = steady_response(modes, np.array([0.0, 90.0]), forces, modes.at(points), 0.0)
+    a, b, stiffness = navier(SIMPLY, 400)
+
+    def shapes(p):
+        along = np.sin(a * (p[0] + SIMPLY.size_x / 2))
+        return along * np.sin(b * (p[1] + SIMPLY.size_y / 2))
+
+    for line, f in zip(found, (0.0, 90.0), strict=True):
+        series = 4 / (SIMPLY.size_x * SIMPLY.size_y) / (stiffness - MASS * (2 * np.pi * f) ** 2)
+        exact = [(series * shapes(p) * shapes(loaded[0])).sum() for p in points]
+        np.testing.assert_allclose(line, exact, rtol=2e-3)
+
+
+def test_loss_is_of_bending_and_not_of_tension():
+    modes = plate_modes(SIMPLY)
+    a, b, stiffness = navier(SIMPLY)
+    pulled = SIMPLY.tension_x * a[0, 0] ** 2 + SIMPLY.tension_y * b[0] ** 2
+    first = np.argmin(modes.squared)
+    assert modes.elastic[first] == pytest.approx(1 - pulled / stiffness[0, 0], rel=1e-8)
+
+
+def test_air_is_rayleighs_integral():
+    # A square piston: iint iint 1/r = 4 a^3 [ln(1 + sqrt 2) + (1 - sqrt 2)/3].
+    (even, _) = line_basis(SIDE, ("free", "free"), 20, True)
+    piston = 4 * (np.log(1 + np.sqrt(2)) + (1 - np.sqrt(2)) / 3) * SIDE * 1.2 / np.pi
+    assert air_mass(even, even, 1.2)[0, 0] == pytest.approx(piston, rel=3e-3)
+    # Many half waves: 2 rho / k, and 2 % more of it at the edges of 31 by 31.
+    (line, _) = line_basis(SIDE, ("simply", "simply"), 80, True)
+    k2, waves = np.linalg.eigh(line.slope)
+    mode = np.kron(waves[:, 15], waves[:, 15])
+    found = mode @ air_mass(line, line, 1.2) @ mode
+    assert 1 < found / (2 * 1.2 / np.sqrt(2 * k2[15])) < 1.02
+
+
+def test_symmetric_halves_are_those_of_the_whole():
+    even_odd = line_basis(SIDE, ("clamped", "clamped"), 24, True)
+    (whole,) = line_basis(SIDE, ("clamped", "clamped"), 24, False)
+    for name in ("slope", "curvature"):
+        apart = np.concatenate([np.linalg.eigvalsh(getattr(line, name)) for line in even_odd])
+        np.testing.assert_allclose(np.sort(apart), np.linalg.eigvalsh(getattr(whole, name)),
+                                   rtol=1e-6)  # fmt: skip
+    mass = np.linalg.eigvalsh(air_mass(whole, even_odd[0], 1.2))
+    split = [np.linalg.eigvalsh(air_mass(line, even_odd[0], 1.2)) for line in even_odd]
+    np.testing.assert_allclose(np.sort(np.concatenate(split)), mass, rtol=1e-8)
+
+
+def test_clips_hold_the_plate_where_they_are():
+    corner = 0.045
+    clips = tuple((x, y) for x in (-corner, corner) for y in (-corner, corner))
+    free = edges(*["free"] * 4)
+    modes = plate_modes(isotropic(clips=clips, clip_radius=0.004, **free))
+    largest = np.abs(modes.at([[0.0, 0.0], [0.02, 0.0], [0.0, 0.03]])).max()
+    assert np.abs(modes.at(clips)).max() < 1e-9 * largest
+    assert len(modes.families) == 4
+    one_sided = plate_modes(isotropic(clips=clips[:1] + clips[3:], clip_radius=0.004, **free), 150)
+    assert len(one_sided.families) == 1
+    # Point supports at the four corners: w a^2 sqrt(m/D) = 7.111 (Leissa, Vibration of Plates).
+    at_corners = tuple((x, y) for x in (-0.05, 0.05) for y in (-0.05, 0.05))
+    assert parameters(isotropic(clips=at_corners, **free))[0] == pytest.approx(7.111, rel=2e-3)
+
+
+def test_the_moving_load_is_that_of_a_fine_grid():
+    path = Trajectory(shape="circle", size=0.02, speed=12.0)
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140.0, trajectory=path))
+    modes = plate_modes(isotropic(0.06, 0.05, air_density=1.2), 150.0)
+    middle = np.array([0.004, -0.006])  # the load reaches beyond the plate
+    x, y = (middle[k] + (np.arange(n) + 0.5) * 5e-4 - n * 2.5e-4 for k, n in ((0, 120), (1, 100)))
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    frequencies, expected = reduced_lines(pressure, grid, modes.at(grid - middle) * 5e-4**2)
+    path_forces = modal_path_forces(modes, pressure, middle)
+    found_at, found = load_lines(pressure).gather(path_forces)
+    np.testing.assert_array_equal(found_at, frequencies)
+    strong = np.abs(expected) > 1e-2 * np.abs(expected).max()
+    np.testing.assert_allclose(found[strong], expected[strong], rtol=2e-3)
+    probes = [[0.0, 0.0], [0.01, 0.0]]
+    f, u = plate_lines(modes, pressure, probes, 0.03, middle=middle)
+    shapes = modes.at(probes - middle)
+    np.testing.assert_allclose(u, steady_response(modes, f, found, shapes, 0.03), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"size_x": 0.0}, "size_x = 0.0"),
+        ({"tension_y": -1.0}, "tension_y = -1.0"),
+        ({"left": "glued"}, "left = 'glued' is none of clamped"),
+        ({"clips": ((0.06, 0.0),)}, "is off the plate"),
+        ({"d12": 4e-4}, "not below"),
+    ],
+)
+def test_plates_that_are_none_are_refused(change, said):
+    given = {"size_x": SIDE, "size_y": SIDE, "d11": D, "d22": D, "d12": 0.0, "d66": D / 2,
+             "mass_per_area": MASS}  # fmt: skip
+    with pytest.raises(ValueError, match=said):
+        Plate(**given | change)
+
+
+def test_plates_too_large_for_memory_are_refused():
+    with pytest.raises(ValueError, match="lower finest"):
+        plate_modes(isotropic(1.0, 1.0), 500.0)
