@@ -113,6 +113,7 @@ def test_all_sources_span_each_of_them():
     assert np.array(both[0].highs)[[0, 1, 3]].tolist() == [18.0, 10.0, 10.0]
     assert both[1].highs[1] == pytest.approx(0.081)
     assert both[1].lows[1] < 7.3e-3
+    assert both[1].frequencies == (100.0, 200.0, 300.0, 400.0)  # beyond, Potts alone
 
 
 def test_each_published_set_has_a_source_and_bodies_that_are_there(curves):
@@ -217,6 +218,17 @@ def test_lengths_are_found_again_in_files_of_skinsource(tmp_path, monkeypatch):
     assert [row.frequency for row in rows] == [200.0, 300.0]
     assert rows[0].factor == pytest.approx(20 / 42)
     assert rows[1].outcome == WITHIN
+
+
+@pytest.mark.slow
+def test_a_hand_loses_more_along_its_finger_at_a_higher_frequency(monkeypatch):
+    """Coarse: by 6.5 mm the lengths are 23, 14 and 9.8 mm at 200, 300 and 400 Hz."""
+    monkeypatch.setattr(finger, "SIZE", 0.009)
+    found = finger.of_hand(finger.EXAMPLE, lambda phase, fraction: None, (200.0, 300.0))
+    assert found.dofs > 10_000
+    assert found.lengths == pytest.approx([0.023, 0.014], rel=0.2)
+    assert found.amplitudes.max(axis=1).tolist() == [1.0, 1.0]
+    assert finger.compare_hand(found)[1].outcome == BELOW
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,8 @@ FOCUS = (
 ZIGZAG = (
     "RMS of the velocity normal to the skin in the middle of the zigzag, while it is drawn once "
     f"along {1e3 * zigzag.LENGTH:g} mm (assumed) and back, at full drive of 50 Pa, which is known "
-    "to a factor of 2. The hand is taken as a laterally infinite body."
+    "to a factor of 2. The hand is taken as a laterally infinite body. Black: the RMS over all of "
+    "a recording, silence included, along the line in which its places extend furthest."
 )
 FINGER = (
     "Blue: the palmar side of the finger that reaches furthest, of the material palm on an "

@@ -11,8 +11,6 @@ from functools import partial
 
 import numpy as np
 
-from simple_model.trajectory import Floats
-
 READ = "read in a stored copy"
 ABSTRACT = "seen in the abstract only"
 QUOTED = "read where another source quotes it"
@@ -239,24 +237,22 @@ NOT_COMPARED = (
 )  # fmt: skip
 
 
-def at(published: Published, frequency: float) -> tuple[float, float] | None:
-    """Lowest and highest value, SI, at a frequency in Hz that the source has; else None."""
-    known = np.flatnonzero(np.isclose(published.frequencies, frequency))
-    return published.between(int(known[0])) if len(known) else None
-
-
 ALL = "All sources"  # begins the name of a set of them
 
 
 def all_sources(quantity: Quantity) -> Published:
-    """Lowest and highest value of all sources of a quantity, whatever the site, as one set."""
-    f = np.array(_GRID[1:])
-    lows, highs = between_sources(quantity, f)
+    """Lowest and highest value, whatever the site, of all sources of a quantity as one set, at the
+    frequencies that two of them have or more.
+    """
+    sets = [each for each in wave_sets() if each.quantity is quantity]
+    found = {f: [pair for each in sets if (pair := at(each, f))] for f in _GRID[1:]}
+    shared = {f: pairs for f, pairs in found.items() if len(pairs) > 1}
     return Published(
         name=f"{ALL}: {quantity.name}", site="back of the hand, finger, forearm",
-        quantity=quantity, frequencies=_GRID[1:], values=(np.nan,) * len(f),
-        lows=tuple(lows.tolist()), highs=tuple(highs.tolist()),
-        conditions="lowest to highest of the sources here that have the frequency, of all sites",
+        quantity=quantity, frequencies=tuple(shared), values=(np.nan,) * len(shared),
+        lows=tuple(min(low for low, _ in pairs) for pairs in shared.values()),
+        highs=tuple(max(high for _, high in pairs) for pairs in shared.values()),
+        conditions="lowest to highest of the sources here, where two or more have the frequency",
         source="the sets of this page", how=COMPUTED,
         bodies=("forearm", "palm", "palm-stiff", "skin-slab", "palm-layers", "forearm-layers"),
         remark="Sites and methods differ, so that this is wider than people are at one site; the "
@@ -264,12 +260,7 @@ def all_sources(quantity: Quantity) -> Published:
     )  # fmt: skip
 
 
-def between_sources(quantity: Quantity, frequencies: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest value (f,), SI, of all sources that have one; nan where none has."""
-    of_quantity = [each for each in wave_sets() if each.quantity is quantity]
-    lows, highs = [], []
-    for f in frequencies:
-        found = [pair for each in of_quantity if (pair := at(each, f)) is not None]
-        lows.append(min((low for low, _ in found), default=np.nan))
-        highs.append(max((high for _, high in found), default=np.nan))
-    return np.array(lows), np.array(highs)
+def at(published: Published, frequency: float) -> tuple[float, float] | None:
+    """Lowest and highest value, SI, at a frequency in Hz that the source has; else None."""
+    known = np.flatnonzero(np.isclose(published.frequencies, frequency))
+    return published.between(int(known[0])) if len(known) else None
