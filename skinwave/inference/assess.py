@@ -108,9 +108,7 @@ def as_run(candidate: Candidate, tacton: str, f: Floats, u: Complex) -> Run:
         pressure=pressure(candidate, dict(tactons())[tacton]), body=BODIES["paper-sheet"],
         probes=tuple(map(tuple, places.tolist())), quantity=read.name,
     )  # fmt: skip
-    response = Response(
-        model=MODEL, times=TIMES, probes=places, values=values, quantity=read.name
-    )
+    response = Response(model=MODEL, times=TIMES, probes=places, values=values, quantity=read.name)
     return Run(tacton=tacton, body=BODY, scene=scene, response=response)
 
 

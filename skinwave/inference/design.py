@@ -4,7 +4,7 @@ A candidate is a value of each parameter; from it follow the plate, the load and
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import sqrt
 from typing import Any
@@ -189,10 +189,13 @@ def pressure(candidate: Candidate, tacton: Tacton) -> MovingPressure:
     )  # fmt: skip
 
 
-def in_words(candidate: Candidate, parameters: Sequence[Parameter] = PARAMETERS) -> str:
-    """A candidate as one line of its values."""
-    return ", ".join(
-        f"{p.words} {value if isinstance(value := candidate[p.key], str) else f'{value:.3g}'}"
-        f"{' ' + p.unit if p.unit else ''}"
-        for p in parameters
-    )
+def used(candidate: Candidate) -> set[str]:
+    """Keys of the parameters that make a difference to a candidate."""
+    support = SUPPORTS[candidate["support"]]
+    idle = {
+        "side_mm": candidate["size"] != SQUARE,
+        "tension_x_n_per_m": support.along == "free",
+        "tension_y_n_per_m": support.across == "free",
+        "depth_of_modulation": candidate["drive"] == "linear",
+    }
+    return {p.key for p in PARAMETERS if not idle.get(p.key)}

@@ -55,7 +55,9 @@ def open_folder(out: Path, command: Mapping[str, Any]) -> None:
         except ValueError:
             known = ""
         if known != COMMAND:
-            raise ValueError(f"{out} exists and is none of skinwave {COMMAND}; choose another --out")
+            raise ValueError(
+                f"{out} exists and is none of skinwave {COMMAND}; choose another --out"
+            )
     (out / dataset.ROWS).mkdir(parents=True, exist_ok=True)
     if not (out / record.FILE).exists():
         record.write(out, command)
