@@ -1,4 +1,4 @@
-"""Which sheets, supports and drive laws would show what was measured; goes on where it ended."""
+"""Sheets, supports and drive laws that would show what was measured; goes on where it ended."""
 
 import argparse
 import sys

@@ -136,12 +136,6 @@ def clips(candidate: Candidate) -> tuple[tuple[float, float], ...]:
     return tuple((side, row) for row in rows for side in (-x, x))
 
 
-def is_symmetric_across(candidate: Candidate) -> bool:
-    """Whether the sheet is supported alike at both ends of y."""
-    support = SUPPORTS[candidate["support"]]
-    return support.back_clips == support.front_clips
-
-
 def plate(candidate: Candidate) -> Plate:
     """The plate of a candidate."""
     support = SUPPORTS[candidate["support"]]

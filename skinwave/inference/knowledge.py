@@ -1,4 +1,4 @@
-"""What a table of candidates tells: shares, which parameter decides a claim, in which region it
+"""Knowledge from a table of candidates: shares, which parameter decides a claim, in which region it
 holds, and what one more measurement would tell.
 
 A claim's entropy H and the information I = H(claim) - H(claim | parameter) are in bits. Few rows in
@@ -113,7 +113,7 @@ def told(rows: Sequence[Row], outcome: Codes) -> list[Told]:
 
 
 def pattern(rows: Sequence[Row]) -> Codes:
-    """Which of the claims hold, as one number a row (r,)."""
+    """Claims that hold, as one number a row (r,)."""
     return np.array([holds(rows, claim) for claim in CLAIMED]).T @ (1 << np.arange(len(CLAIMED)))
 
 

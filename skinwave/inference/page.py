@@ -166,7 +166,7 @@ def region_table(fair: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
 
 
 def next_table(fair: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    """What each parameter would tell about which of the five claims hold."""
+    """Information of each parameter on which of the five claims hold."""
     rows = [
         [each.parameter.words, each.parameter.of, f"{each.bits:.3f}", f"{100 * each.fraction:.1f}"]
         for each in told(fair, pattern(fair))
