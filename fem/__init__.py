@@ -33,7 +33,7 @@ from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import harmonic
-from fem.interior import displacement_operator, locate
+from fem.interior import displacement_operator, is_inside, locate
 from fem.linear_solver import Factor, available, factorise
 from fem.load_and_probe import (
     facet_normals,
@@ -93,6 +93,7 @@ __all__ = [
     "from_young",
     "harmonic",
     "imbalance",
+    "is_inside",
     "line_response",
     "load_operator",
     "load_subspace",

@@ -1,7 +1,7 @@
 """Points inside a body: the element that each lies in, and the displacement there."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fem.elements import shape_functions
@@ -23,6 +23,20 @@ def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
         If a point is outside the body.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
+    owner, barycentric, inside = _located(mesh, points)
+    if not inside.all():
+        x, y, z = 1e3 * points[~inside][0]
+        raise ValueError(f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm is not in the body; move it inside")
+    return owner, barycentric
+
+
+def is_inside(mesh: TetMesh, points: ArrayLike) -> NDArray[np.bool_]:
+    """Mask (p,) of the points (p, 3) in metre that are in the body."""
+    return _located(mesh, np.atleast_2d(np.asarray(points, np.float64)))[2]
+
+
+def _located(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, NDArray[np.bool_]]:
+    """Element (p,) of each point (p, 3), its coordinates (p, 4), and whether it is inside of it."""
     corners = mesh.points[mesh.tets[:, :4]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     slack = REACH * (high - low).max(axis=1, keepdims=True)
@@ -30,29 +44,27 @@ def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
     found = [_containing(corners, low, high, point) for point in points]
     owner = np.array([element for element, _ in found])
     barycentric = np.array([coordinates for _, coordinates in found])
+    inside = np.isfinite(barycentric).all(axis=1)
     if mesh.order == 2:
-        barycentric = on_curved(mesh.points[mesh.tets[owner]], barycentric, points)
-    if (outside := barycentric.min(axis=1) < -BOWED * REACH - OUTSIDE).any():
-        raise _off_the_body(points[outside][0])
-    return owner, barycentric
+        nodes = mesh.points[mesh.tets[owner[inside]]]
+        barycentric[inside] = on_curved(nodes, barycentric[inside], points[inside])
+    inside[inside] = barycentric[inside].min(axis=1) >= -BOWED * REACH - OUTSIDE
+    return owner, barycentric, inside
 
 
 def _containing(corners: Floats, low: Floats, high: Floats, point: Floats) -> tuple[int, Floats]:
-    """The straight element that a point (3,) is in, or the least outside of those near it."""
+    """The straight element that a point (3,) is in, or the least outside of those near it; none of
+    its coordinates are numbers if none is near.
+    """
     near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
     if not len(near):
-        raise _off_the_body(point)
+        return 0, np.full(4, np.nan)
     first = corners[near, 0]
     edges = (corners[near, 1:] - first[:, None]).swapaxes(1, 2)
     inner = np.linalg.solve(edges, (point - first)[:, :, None])[:, :, 0]
     coordinates = np.column_stack([1 - inner.sum(axis=1), inner])
     best = int(coordinates.min(axis=1).argmax())
     return int(near[best]), coordinates[best]
-
-
-def _off_the_body(point: Floats) -> ValueError:
-    x, y, z = 1e3 * point
-    return ValueError(f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm is not in the body; move it inside")
 
 
 def displacement_operator(mesh: TetMesh, points: ArrayLike) -> sparse.csr_array:

@@ -29,6 +29,7 @@ unknown, because convergence may become steep or stall at any moment.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ RELAXING_POINT = 1.0
 FEWEST_BETWEEN = 3
 SHARE_BETWEEN = 1 / 16
 MOST_MOMENTS = 200
+LOOKED_AT, AT_FIRST = 41, 5  # frequencies that the error is looked at, and every which at first
 SMALLEST = np.finfo(np.float64).tiny
 DISTINCT = 1e-6  # of the largest singular value: probes that differ by less count as dependent
 ROUND_OFF = 1e-12  # of a direction: what orthogonalisation leaves of it is round-off
@@ -127,15 +129,21 @@ def reduce(
 
     independent = _independent(start_vectors)
     space = KrylovBasis(operators, independent.shape[1] * (MOST_MOMENTS + 1))
+    # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
+    fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, LOOKED_AT), np.complex128)
+    coarse = fine[::AT_FIRST]  # until the error is below the tolerance there
     moments, size, before = 0, 0, None
     errors: list[float] = []
     for moment in _moments(space, operators, point, factor, independent):
         if moment < moments + max(FEWEST_BETWEEN, SHARE_BETWEEN * moment):
             continue
         weights = None if loads is None else space.basis.T @ loads[free]
-        now = _band_response(space, space.basis.T @ start_vectors, weights, band)
+        respond = partial(_band_response, space, space.basis.T @ start_vectors, weights)
+        now = respond(coarse, space.size)
         if before is not None:
             errors.append(_largest_change(before, now))
+            if errors[-1] <= tolerance:
+                errors[-1] = _largest_change(respond(fine, size), respond(fine, space.size))
             if errors[-1] <= tolerance:
                 break
             report(max(0.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
@@ -218,11 +226,10 @@ class KrylovBasis:
         """Vectors (n, size)."""
         return self._columns[:, : self.size]
 
-    @property
-    def model(self) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
-        """Projected K, C, M and Maxwell branches."""
-        K, C, *relaxing = self.projected
-        return K, C, np.eye(self.size), _branches(relaxing, self._branches)
+    def model(self, size: int) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
+        """Projected K, C, M and Maxwell branches, in the first vectors."""
+        K, C, *relaxing = (part[:size, :size] for part in self.projected)
+        return K, C, np.eye(size), _branches(relaxing, self._branches)
 
     def forces(self, y: Floats, z: Floats, stretches: Sequence[Floats]) -> Floats:
         """Nodal forces C y + M z + sum_j K_j s_j (n, k) of coordinates (size, k) in the basis."""
@@ -367,15 +374,16 @@ def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBr
 
 
 def _band_response(
-    space: KrylovBasis, start_vectors: Floats, loads: Floats | None, band: float
+    space: KrylovBasis, start_vectors: Floats, loads: Floats | None, s: Complex, size: int
 ) -> Complex:
-    """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, r, p)."""
-    # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
-    s = 2j * np.pi * np.linspace(1e-3 * band, band, 41)
+    """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, size, p), at
+    complex frequencies s (f,) in rad/s, by the first vectors of the basis.
+    """
+    K, C, M, branches = space.model(size)
+    loads = loads if loads is None else loads[:size]
     # One by one: all at once would be as large as the body's own factors.
-    K, C, M, branches = space.model
     fields: Iterator[Any] = (
-        np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors) for at in s
+        np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors[:size]) for at in s
     )
     return np.array([x if loads is None else loads.T @ x for x in fields])
 

@@ -104,7 +104,7 @@ def propagation(
     )
     if surface is None or kernel_surface is None or not surface.rms.any():
         return found
-    away = distance_from_path(run.scene, surface)
+    away = distance_from_path(run.scene, surface.places)
     return Propagation(
         **vars(found)
         | {
@@ -131,9 +131,9 @@ def reach_of(inside: np.ndarray, away: Floats) -> Reach:
     return Reach(metre=float(away[inside].max()), beyond=bool((inside & edge).any()))
 
 
-def distance_from_path(scene: Scene, surface: SurfaceMap) -> Floats:
-    """Distance (ny, nx) in metre of each place of a map from the path of the focus."""
-    return np.asarray(cKDTree(path_points(scene, 1441)).query(surface.places)[0])
+def distance_from_path(scene: Scene, places: Floats) -> Floats:
+    """Distance (...) in metre of places (..., 2) from the path of the focus."""
+    return np.asarray(cKDTree(path_points(scene, 1441)).query(places)[0])
 
 
 def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | None:

@@ -91,7 +91,9 @@ def read(folder: Path) -> dict[str, Any]:
     """
     path = folder / FILE
     if not path.exists():
-        raise ValueError(f"{path} cannot be read; name a folder that run, compare or report wrote")
+        raise ValueError(
+            f"{path} cannot be read; name a folder that run, compare, report or dispersion wrote"
+        )
     try:
         record = fitting(reading.parsed(path), FITTING, "record")
         if record["format"] != FORMAT:

@@ -10,9 +10,10 @@ import tomli_w
 
 from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.choices import choose
 from simple_model.trajectory import BY_POINTS
 from skinwave.material_file import with_tables
-from skinwave.scene import KINDS, Body, Placement, Scene, kind_of
+from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of
 from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked, renamed
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
@@ -88,12 +89,13 @@ def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
 
 def _scene(table: dict[str, Any]) -> Scene:
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
+    preset, table = _preset(table)
     top = checked("scene", table, sections)
     parts = {
         section: checked(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()
     }
-    body = _body(parts["body"] | parts["placement"])
+    body = _body(parts["body"] | parts["placement"], preset)
     tacton, path = _split(parts["tacton"], PATH)
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
@@ -139,12 +141,36 @@ def unused(tacton: Tacton) -> set[str]:
     return keys if tacton.trajectory.shape in BY_POINTS else keys | {"points_mm"}
 
 
-def _body(values: dict[str, Any]) -> Body:
-    kind = kind_of(values.get("kind", Body.kind))
+def _preset(scene: dict[str, Any]) -> tuple[Body | None, dict[str, Any]]:
+    """The body that `preset` of [body] names, and the table without it."""
+    body = scene.get("body")
+    if not isinstance(body, dict):
+        return None, scene
+    named = body.get("preset")
+    if named is None:
+        if (kind := str(body.get("kind"))) in BODIES and kind not in KINDS:
+            raise ValueError(
+                f"body kind '{kind}' is unknown, but there is a preset of that name; write "
+                f'preset = "{kind}" instead'
+            )
+        return None, scene
+    name = choose("body preset", as_text("preset", named), BODIES)
+    return BODIES[name], scene | {"body": {k: v for k, v in body.items() if k != "preset"}}
+
+
+def _body(values: dict[str, Any], preset: Body | None) -> Body:
+    kind = kind_of(values.get("kind", preset.kind if preset else Body.kind))
+    if preset and kind is not preset.of_kind:
+        raise ValueError(
+            f'[body] has kind = "{kind.name}" and a preset of kind = "{preset.kind}"; leave out one'
+        )
     for key in (_keys_of_kinds() - set(kind.keys)) & values.keys():
         takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
         raise ValueError(f'[body] {key} is for kind = {takers}, not "{kind.name}"')
     shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
+    if preset:
+        placed = {**vars(preset.placement), **placement}
+        return replace(preset, **shape, placement=Placement(**placed))
     missing = next(iter(kind.presets.values()), {})
     return Body(**{**missing, **shape}, placement=Placement(**placement))
 

@@ -15,6 +15,7 @@ from simple_model.material import Material, PronyTerm
 from simple_model.modulus_laws import COLUMNS
 from simple_model.trajectory import Points
 from skinwave.material_file import material_of, values_of, written_table
+from skinwave.plain_text import number_in
 from skinwave.scene import Layer, Relief
 
 # Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
@@ -255,6 +256,18 @@ def _one_depth(key: str, value: Any) -> float:
     if isinstance(value, str):
         return RECEPTORS[choose(key, value, RECEPTORS)]
     return _number(key, value) / 1e3
+
+
+def depth_of(word: str) -> float:
+    """Depth in metre of a word on the command line: a number in mm, or a receptor.
+
+    Raises
+    ------
+    ValueError
+        If it is neither.
+    """
+    number = number_in(word)
+    return _one_depth("--depth", word if number is None else number)
 
 
 def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:

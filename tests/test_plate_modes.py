@@ -157,9 +157,9 @@ def test_a_clip_bends_as_a_disc_that_is_clamped():
     elements = [23.244, 37.922, 47.453, 49.900, 71.232, 82.117, 90.712, 105.793]
     at = 0.0894768154 / 2 - 0.005
     plate = Plate(
-        size_x=0.0894768154, size_y=0.0894768154, d11=3.333825e-04, d22=1.405014e-04, d12=4.215043e-05,
-        d66=8.713837e-05,
-        mass_per_area=0.06414087, air_density=0.0, clip_radius=0.005,
+        size_x=0.0894768154, size_y=0.0894768154, d11=3.333825e-04, d22=1.405014e-04,
+        d12=4.215043e-05, d66=8.713837e-05, mass_per_area=0.06414087, air_density=0.0,
+        clip_radius=0.005,
         clips=tuple((x, y) for y in (at, -at) for x in (-at, at)), **edges(*["free"] * 4),
     )  # fmt: skip
     np.testing.assert_allclose(plate_modes(plate).frequencies[:8], elements, rtol=0.016)

@@ -136,6 +136,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "film": ["out", "--out", "film.gif"],
         "relax": small,
         "dispersion": ["small.toml", "--quiet"],
+        "map": ["small.toml", "--step", "10", "--quiet"],
         "tradeoff": ["small.toml", "--quiet"],
         "verify": ["--quick", "--quiet"],
     }  # fmt: skip

@@ -124,6 +124,20 @@ def test_a_comparison_and_its_runs_are_had_again(scene):
     assert len(meshes) == 2  # that of the slab, and none
 
 
+@pytest.mark.usefixtures("in_one_process")
+def test_dispersion_curves_are_had_again(scene):
+    assert main(["dispersion", str(scene), "--highest", "300", "--modes", "2", "--quiet"]) == 0
+    scene.unlink()
+    assert main(["rerun", "short-dispersion", "--quiet"]) == 0
+    first, again = (
+        np.genfromtxt(f"{folder}/dispersion.csv", delimiter=",", names=True)
+        for folder in ("short-dispersion", "short-dispersion-rerun")
+    )
+    assert first.dtype.names == again.dtype.names
+    for name in first.dtype.names:
+        np.testing.assert_allclose(again[name], first[name], rtol=1e-9)
+
+
 def page_alone(results, out, *given, **options):
     """A report without its pictures, which `same` does not look at."""
     open_album(results)

@@ -68,6 +68,10 @@ def test_units_of_the_file_are_those_of_its_keys():
 WRONG = {
     "[tacton]\nshape = 'circel'": "did you mean 'circle'",
     "[tacton]\nsize = 20": "unknown key 'size'; did you mean 'size_mm'",
+    '[body]\nkind = "palm-layers"': 'a preset of that name; write preset = "palm-layers" instead',
+    '[body]\npreset = "palm-layer"': "'palm-layer' is unknown, use one of none,",
+    '[body]\npreset = ["palm"]': "must be a text in quotes",
+    '[body]\npreset = "palm"\nkind = "slab"': 'kind = "slab" and a preset of kind = "palm"',
     "[tactons]\nsize_mm = 20": "unknown key 'tactons'; did you mean 'tacton'",
     "[tacton]\nshape = 'circle'\nsize_mm = 61": "size = 61 mm is outside 0..60 mm",
     "[tacton]\nam_frequency_hz = -80": "am_frequency = -80",
@@ -156,3 +160,11 @@ def test_a_scene_of_0_2_loads_with_a_warning():
     assert "thickness_mm = 12.0" in dumps(replace(loads("[body]"), body=body))
     with pytest.raises(ValueError, match="both depth_mm and thickness_mm"):
         loads("[body]\ndepth_mm = 12\nthickness_mm = 12")
+
+
+def test_a_preset_is_changed_by_other_keys():
+    body = loads('[body]\npreset = "palm-layers"\nthickness_mm = 20\n[placement]\nlift_mm = 1').body
+    known = BODIES["palm-layers"]
+    assert body.layers == known.layers
+    assert (body.depth, body.placement.lift) == (0.020, 0.001)
+    assert loads(dumps(replace(loads(""), body=body))).body == body

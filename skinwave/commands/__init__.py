@@ -24,9 +24,10 @@ from skinwave.commands import (
     verify,
     web,
 )
+from skinwave.commands import map as map_command
 
 MODULES = (
-    run, compare, tradeoff, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
-    film, infer, web, rerun, same, doctor, cache,
+    run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
+    verify, report, film, infer, web, rerun, same, doctor, cache,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

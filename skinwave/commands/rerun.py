@@ -14,18 +14,22 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from skinwave.commands import compare, report
+from skinwave.commands import compare, dispersion, report
+from skinwave.commands import map as map_command
 from skinwave.commands import run as run_command
 from skinwave.commands.common import add_output, progress_of, summarise
 
-REPEATED = {"run": run_command, "compare": compare, "report": report}
+REPEATED = {
+    "run": run_command, "compare": compare, "report": report, "dispersion": dispersion,
+    "map": map_command,
+}  # fmt: skip
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "folder", type=Path, metavar="DIR", help="folder that run, compare or report wrote, or a "
-        "folder of one run in it; the new one is DIR-rerun",
+        "folder", type=Path, metavar="DIR", help="folder that run, compare, report, dispersion or "
+        "map wrote, or a folder of one run in it; the new one is DIR-rerun",
     )  # fmt: skip
     add_output(parser)
 

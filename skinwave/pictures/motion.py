@@ -10,6 +10,7 @@ from meshes import TetMesh, part
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import path_samples
+from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
 from skinwave.models import reduction
@@ -35,6 +36,16 @@ class Waves:
     effort: Effort
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrivenBody:
+    """The same as `Waves`, with all that the mesh was built from."""
+
+    build: Build
+    basis: Floats
+    motion: reduction.ReducedResponse
+    effort: Effort
+
+
 def probe_response(scene: Scene, moved: Waves) -> Response:
     """Displacement of the surface at the probes of a scene, from its body's motion."""
     times, points = sample_times(scene), scene.probe_points
@@ -54,6 +65,32 @@ def waves(
     solver: str = "auto",
 ) -> Waves:
     """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
+    moved = driven(scene, tolerance, progress, h=h, solver=solver)
+    mesh, basis = moved.build.mesh, moved.basis
+    if moved.build.drag is not None:  # the layer around a body is none of it
+        mesh, nodes = part(mesh, moved.build.drag == 0)
+        basis = basis.reshape(-1, 3, basis.shape[1])[nodes].reshape(3 * len(nodes), -1)
+    return Waves(mesh=mesh, basis=basis, motion=moved.motion, effort=moved.effort)
+
+
+def driven(
+    scene: Scene,
+    tolerance: float,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> DrivenBody:
+    """A meshed body under a load, reduced to the subspace of its path.
+
+    Parameters
+    ----------
+    scene, tolerance, progress, h, solver : as for `waves`, with its errors
+
+    Returns
+    -------
+    DrivenBody
+    """
     check_options(solver, h=h)
     clock, report = Clock(), progress or silent
     body = relaxing(scene.body, series_tolerance(tolerance))
@@ -75,11 +112,7 @@ def waves(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
         radiated=motion.radiated,
     )  # fmt: skip
-    mesh, basis = build.mesh, model.basis
-    if build.drag is not None:  # the layer around a body is none of it
-        mesh, nodes = part(mesh, build.drag == 0)
-        basis = basis.reshape(-1, 3, basis.shape[1])[nodes].reshape(3 * len(nodes), -1)
-    return Waves(mesh=mesh, basis=basis, motion=motion, effort=effort)
+    return DrivenBody(build=build, basis=model.basis, motion=motion, effort=effort)
 
 
 def check_values(frames: int, nodes: int) -> None:

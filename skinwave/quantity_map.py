@@ -1,0 +1,163 @@
+"""Map of any quantity at any depth: RMS about the mean of its steady state, on a grid of places.
+
+By wavenumber integrals where they stand for the body, else by finite elements.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fem
+from fem.load_and_probe import surface_frame
+from meshes.tetmesh import Floats
+from simple_model.flat_body import field_lines
+from simple_model.flat_quantities import quantity_field, surface_field
+from simple_model.load_spectrum import synthesise
+from simple_model.quantities import Quantity
+from skinwave.bodies.analytic import exact_waves, stack
+from skinwave.bodies.sizes import default_size
+from skinwave.effort import Progress
+from skinwave.models.loads import line_factor, probe_rows
+from skinwave.models.reduction import oscillating, read_at
+from skinwave.pictures.motion import DrivenBody, driven
+from skinwave.scene import Reading, Scene
+from skinwave.surface import FAINT, Lines, grid, has_wavenumber_integral
+
+TOLERANCE = 0.02  # relative error of the reduced-order model
+COARSER, ORDER = 1.5, 2  # element size of a second map, and its order: Richardson extrapolation
+# Times at which an invariant is looked at, in steps of s that are no multiple of any period. Its
+# mean over all phases of a load of several frequencies is that of a smooth window over them: Das,
+# Saiki, Sander and Yorke, Nonlinearity 30:4111 (2017).
+MANY, BETWEEN = 1024, 0.01 * (1 + 5**0.5) / 2
+AT_ONCE = 2_000_000  # values in time of places that are looked at together
+MOST_PLACES = 40_000
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class QuantityMap:
+    """RMS (ny, nx) of a quantity about its mean at a depth in metre, in its SI unit, at x (nx,) and
+    y (ny,) in metre; not a number off the body. `note` is how it was computed, `error` what is
+    expected of it over the largest, not a number where it is not estimated.
+    """
+
+    x: Floats
+    y: Floats
+    rms: Floats
+    asked: Quantity
+    depth: float
+    note: str
+    error: float = np.nan
+
+
+def quantity_map(
+    scene: Scene,
+    progress: Progress | None = None,
+    *,
+    reach: float,
+    step: float,
+    h: float | None = None,
+    solver: str = "auto",
+) -> QuantityMap:
+    """Map of the quantity that a scene's probes read, at the depth of the first of them.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress, h, solver : as for `simulate`
+    reach : metre either way from the middle, at most to the edges of the body
+    step : metre between places
+
+    Returns
+    -------
+    QuantityMap
+
+    Raises
+    ------
+    ValueError
+        If there is no body or too many places, or the quantity cannot be read there.
+    """
+    if not scene.body.of_kind.discretise:
+        raise ValueError("a map is of a body, and the scene has none; give it one under [body]")
+    if not (0 < step <= reach and (2 * reach / step + 1) ** 2 <= MOST_PLACES):
+        raise ValueError(
+            f"a map of {1e3 * reach:g} mm either way in steps of {1e3 * step:g} mm has no places "
+            f"or more than {MOST_PLACES:,}; choose another step"
+        )
+    depth, (x, y) = scene.depths[0], grid(scene, reach, step)
+    asked, places = scene.reading.asked, np.stack(np.meshgrid(x, y), axis=-1)
+    if has_wavenumber_integral(scene):
+        return QuantityMap(
+            x=x, y=y, rms=_flat_rms(scene, depth, places), asked=asked, depth=depth,
+            note="wavenumber integral of the laterally infinite body",
+        )  # fmt: skip
+    size = h or default_size(scene.body)
+    rms, coarse = (
+        _element_rms(
+            scene, driven(scene, TOLERANCE, progress, h=each, solver=solver), depth, places
+        )
+        for each in (size, COARSER * size)
+    )
+    error = np.nanmax(np.abs(coarse - rms)) / (COARSER**ORDER - 1) / np.nanmax(rms)
+    note = f"finite elements of {1e3 * size:.2g} mm"
+    return QuantityMap(x=x, y=y, rms=rms, asked=asked, depth=depth, note=note, error=float(error))
+
+
+def _flat_rms(scene: Scene, depth: float, places: Floats) -> Floats:
+    """RMS (ny, nx) at places (ny, nx, 2) of a laterally infinite body."""
+    body, asked = scene.body, scene.reading.asked
+    field = (
+        quantity_field(asked, stack(body), depth)
+        if body.of_kind.is_layer
+        else surface_field(asked, exact_waves(body, "flat-body-harmonic"))
+    )
+    f, found = field_lines(field, scene.pressure, places.reshape(-1, 2), threshold=FAINT)
+    rms = _rms(asked, (f, found.reshape(len(f), -1)), found.shape[1])
+    return rms.reshape(places.shape[:2])
+
+
+def _element_rms(scene: Scene, moved: DrivenBody, depth: float, places: Floats) -> Floats:
+    """RMS (ny, nx) at places (ny, nx, 2) of a meshed body; not a number off it."""
+    asked, flat = scene.reading.asked, places.reshape(-1, 2)
+    seen = fem.on_surface(moved.build.mesh, flat)
+    seen[seen] = _is_above(moved, flat[seen], depth)
+    reading = Reading(quantity=asked.name, depths=(depth,) * int(seen.sum()) if depth else ())
+    rows, solids = probe_rows(scene.body, moved.build, flat[seen], reading)
+    motion = read_at(oscillating(moved.motion), rows @ moved.basis)
+    s = 2j * np.pi * motion.frequencies
+    lines = motion.lines * line_factor(asked, s, solids, rows.shape[0])
+    rms = np.full(len(flat), np.nan)
+    rms[seen] = _rms(asked, (motion.frequencies, lines), int(seen.sum()))
+    return rms.reshape(places.shape[:2])
+
+
+def _is_above(moved: DrivenBody, places: Floats, depth: float) -> NDArray[np.bool_]:
+    """Mask of places (p, 2) below which the body has a depth in metre along its normal."""
+    if not depth:
+        return np.ones(len(places), bool)
+    points, normals = surface_frame(moved.build.mesh, places)
+    return fem.is_inside(moved.build.mesh, points - depth * normals)
+
+
+def _rms(asked: Quantity, lines: Lines, places: int) -> Floats:
+    """RMS (p,) about the mean of lines (f,), (f, p c) of the components of a quantity."""
+    moving = lines[0] > 1e-9
+    f, a = lines[0][moving], lines[1][moving].reshape(int(moving.sum()), places, -1)
+    if asked.invariant is None:
+        return np.asarray(np.sqrt((np.abs(a[..., 0]) ** 2).sum(axis=0) / 2))
+    if not len(f):
+        return np.zeros(places)
+    return np.concatenate([*_parts(asked, f, a)])
+
+
+def _parts(asked: Quantity, f: Floats, a: fem.Complex) -> Iterator[Floats]:
+    """RMS (q,) of some places after the other, of an invariant of components (f, p, c) in time."""
+    times = BETWEEN * np.arange(1.0, MANY)
+    window = np.sin(np.pi * np.arange(1, MANY) / MANY) ** 4
+    window /= window.sum()
+    many = max(1, AT_ONCE // (len(times) * a.shape[2]))
+    for start in range(0, a.shape[1], many):
+        part = a[:, start : start + many]
+        here = asked.waveforms(synthesise(f, part.reshape(len(f), -1), times), part.shape[1])
+        yield np.sqrt(window @ (here - window @ here) ** 2)
