@@ -76,14 +76,14 @@ def assessed(candidate: Candidate) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def finest(candidate: Candidate) -> Floats:
-    """Wavenumbers (2,) in rad/m that are resolved along x and y, by bending in vacuum without
+def finest(candidate: Candidate) -> tuple[float, float]:
+    """Wavenumbers in rad/m that are resolved along x and y, by bending in vacuum without
     tension, D k^4 = m w^2, both of which air makes up for.
     """
     own = plate(candidate)
     inertia = own.mass_per_area * (2 * np.pi * RESOLVED) ** 2
-    k = (inertia / np.array([own.d11, own.d22])) ** 0.25
-    return np.maximum(FINEST * k, COARSEST)
+    k, across = ((inertia / d) ** 0.25 for d in (own.d11, own.d22))
+    return max(FINEST * k, COARSEST), max(FINEST * across, COARSEST)
 
 
 def responses(
