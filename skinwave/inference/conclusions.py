@@ -80,8 +80,9 @@ def sheets(rows: Sequence[Row]) -> list[Row]:
 
 
 def decider(rows: Sequence[Row], mask: Mask) -> Told | None:
-    """The parameter that tells most of a mask (r,); None of one that never changes."""
-    return told(rows, mask.astype(int))[0] if 0 < mask.sum() < len(mask) else None
+    """The parameter that tells most of a mask (r,); None if none does."""
+    best = told(rows, mask.astype(int))[0]
+    return best if best.bits > 0 else None
 
 
 def readings(rows: Sequence[Row]) -> list[tuple[str, Share, Share]]:
@@ -128,13 +129,19 @@ def _deciders(fair: Sequence[Row]) -> Iterator[str]:
         mask = holds(fair, claim)
         best = decider(fair, mask)
         if best is None:
-            yield f"{claim} {'always' if mask.all() else 'never'} holds."
+            yield f"{claim} {_undecided(mask)}."
             continue
         verb = "is decided by" if best.fraction > CERTAIN else "depends most on"
         yield (
             f"{claim} {verb} the {best.parameter.words} ({_percent(best.fraction)} % of its "
             f"entropy){_where(region(fair, mask))}."
         )
+
+
+def _undecided(mask: Mask) -> str:
+    if 0 < mask.sum() < len(mask):
+        return f"holds in too few or too many of {len(mask):,} to say what decides it"
+    return "always holds" if mask.all() else "never holds"
 
 
 def _where(found: Region) -> str:

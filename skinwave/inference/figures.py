@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from skinwave.inference.assess import CLAIMED
-from skinwave.inference.conclusions import SIZES, decider, together
+from skinwave.inference.conclusions import SIZES, together
 from skinwave.inference.design import PARAMETERS, Parameter
 from skinwave.inference.knowledge import (
     BINS,
@@ -56,7 +56,7 @@ def decision_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
     """How much of each claim's entropy, and of the variance of the strongest rival's level, each
     parameter takes away.
     """
-    claims = [claim for claim in CLAIMED if decider(rows, holds(rows, claim))]
+    claims = [claim for claim in CLAIMED if 0 < holds(rows, claim).sum() < len(rows)]
     columns = []
     for claim in claims:
         by_key = {t.parameter.key: t.fraction for t in told(rows, holds(rows, claim).astype(int))}

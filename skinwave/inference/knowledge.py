@@ -2,7 +2,8 @@
 holds, and what one more measurement would tell.
 
 A claim's entropy H and the information I = H(claim) - H(claim | parameter) are in bits. Few rows in
-a bin make I too large; what it is of shuffled rows, on average, is taken off.
+a bin make I too large: its average over shuffled rows is taken off, and what is not above all of
+these is taken as none.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 CONFIDENCE = 0.95
 BINS = 5  # of a number, of equal width
-SHUFFLES = 20
+SHUFFLES = 40
 QUARTERS = (0.25, 0.5, 0.75)  # of a range, where a region may end
 FEWEST = 20  # rows in a region
 CONDITIONS = 3  # of a region
@@ -106,8 +107,9 @@ def told(rows: Sequence[Row], outcome: Codes) -> list[Told]:
     total, found = _entropy(outcome), []
     for parameter in PARAMETERS:
         bins = binned(rows, parameter)
-        by_chance = float(np.mean([total - _entropy_given(each, bins) for each in shuffled]))
-        bits = max(0.0, total - _entropy_given(outcome, bins) - by_chance)
+        gain = total - _entropy_given(outcome, bins)
+        by_chance = [total - _entropy_given(each, bins) for each in shuffled]
+        bits = gain - float(np.mean(by_chance)) if gain > max(by_chance) else 0.0
         found.append(Told(parameter=parameter, bits=bits, entropy=total))
     return sorted(found, key=lambda each: -each.bits)
 

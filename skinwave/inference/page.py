@@ -32,7 +32,6 @@ from skinwave.inference.knowledge import (
     told,
     value_words,
 )
-from skinwave.numbers import significant
 from skinwave.pictures.figures import png
 from skinwave.studies.claims import TEXTS
 
@@ -41,14 +40,14 @@ METHOD = (
     "Each candidate is one value of every parameter below. Its sheet is a rectangular, "
     "orthotropic, stretched thin plate with the air on both sides as in a baffle; modes by Ritz's"
     " method; the steady displacement or velocity at five points, 5 mm apart, under all 15 "
-    "Tactons; then the claims as `skinwave compare` assesses them, M4 in the quantity that was "
+    "Tactons; then the claims as skinwave compare assesses them, M4 in the quantity that was "
     "read. Intervals are those of Clopper and Pearson at 95 %. Information is of numbers in five "
     "bins, less what chance makes of as many rows."
 )
 LEFT_OUT = (
     "Left out: the mean deflection, which stretches a sheet on fixed edges. A clamped disc of "
     "office paper, 100 mm in radius, deflects by three thicknesses under 2.6 mN, and its edge "
-    "then pulls by about 4 N/m, within the tensions of the candidates; curl, humidity and "
+    "then pulls by a few N/m, within the tensions of the candidates; curl, humidity and "
     "creases; sheets that touch or leave their support, which rattle; radiation of sound; the "
     "flow of air around edges without a baffle; the noise and the resolution of the vibrometer; "
     "what the device does to a focus that moves fast. M1 asks for a third harmonic, which no "
@@ -179,7 +178,7 @@ def parameter_table() -> tuple[list[str], list[list[str]]]:
     """The parameters and their values."""
     rows = [
         [p.words, p.of, ", ".join(map(value_words, p.values)) if p.bounds is None
-         else f"{significant(p.bounds[0])} to {significant(p.bounds[1])} {p.unit}".strip()]
+         else f"{p.bounds[0]:g} to {p.bounds[1]:g} {p.unit}".strip()]
         for p in sorted(PARAMETERS, key=lambda p: (SHEET, MEASUREMENT).index(p.of))
     ]  # fmt: skip
     return ["parameter", "of", "values, all equally likely"], rows
