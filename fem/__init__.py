@@ -14,7 +14,7 @@ einsum in this package:
     i j  components of displacement
     c    components of a symmetric tensor: xx, yy, zz, xy, xz, yz
     k l  directions at rest, of which a membrane has two
-    v w  linear pressure functions of a macroelement
+    v w  linear pressure functions of a macroelement; in-plane strains xx, yy and 2 xy
     n    node, or degree of freedom
     p    probe, or point
     m    mode, or vector of a basis
@@ -46,8 +46,10 @@ from fem.load_and_probe import (
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles
+from fem.plane_stiffness import Tension
 from fem.reduced import ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
+from fem.shallow_shell import shell_stiffness
 from fem.static import modes, static
 from fem.stress import (
     materials_at,
@@ -80,6 +82,7 @@ __all__ = [
     "State",
     "StretchingModes",
     "Support",
+    "Tension",
     "added_mass",
     "assemble",
     "at_rest",
@@ -111,6 +114,7 @@ __all__ = [
     "reduce",
     "relaxation",
     "relaxed",
+    "shell_stiffness",
     "static",
     "stored",
     "strain_operator",

@@ -10,15 +10,17 @@
     K      += int k delta_ij N_a N_b dA where a surface rests on springs of k per area
     K_j     = (mu_j/mu) K of the elements with a Prony term of one relaxation time: the stiffness
               of a generalised Maxwell branch, see `maxwell`
-    and likewise of thin layers at a surface, see `coat`
+    and likewise of thin layers at a surface, see `coat`; K of a sheet that is orthotropic or in
+    tension has further parts, see `plane_stiffness`
 
 Where nu > 0.45 most of lam acts on a projection of the dilatation, see `pressure_projection`;
 without that volumetric locking makes displacements some wavelengths away several per cent too
 small.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,9 +29,16 @@ from scipy import sparse
 from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.coat import Coat, coat_operators
 from fem.elements import shape_functions, tetrahedron_rule
-from fem.geometry import gradients, jacobians, shape_nodes
+from fem.geometry import gradient_products, jacobians, shape_nodes
 from fem.materials import Material
 from fem.maxwell import Branch, on_free
+from fem.plane_stiffness import (
+    SIDES,
+    Tension,
+    directional_parts,
+    orthotropic_stiffness,
+    tension_stiffness,
+)
 from fem.pressure_projection import projected_divergence
 from fem.sparsity import UPPER, SparsityPattern, from_components, from_nodal, slabs
 from fem.viscoelastic import Matrices, property_of, together, viscoelastic
@@ -76,6 +85,9 @@ def assemble(
     drag: Floats | None = None,
     support: Support | None = None,
     coat: Coat | None = None,
+    tension: Tension | None = None,
+    axes: Floats = SIDES,
+    stiffener: sparse.csr_array | None = None,
 ) -> Operators:
     """Assemble the operators of a body.
 
@@ -89,6 +101,10 @@ def assemble(
     drag : (m,) float, 1/s, mass-proportional damping of each element in an absorbing layer
     support : springs and dashpots of a surface as functions of position, or None
     coat : thin layers at a surface, in place of the material that is meshed there, or None
+    tension : in-plane tension of a sheet along its sides, or None
+    axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched
+    stiffener : (3 n, 3 n) N/m, elastic stiffness beside that of the elements, such as that of a
+        `shallow_shell`, which scales with the modulus of the first material; or None
 
     Returns
     -------
@@ -108,7 +124,9 @@ def assemble(
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
-    K, C, M, branches = _volume_operators(mesh, pattern, materials, region)
+    K, C, M, branches = _volume_operators(
+        mesh, pattern, materials, region, axes, tension.share if tension else None, stiffener
+    )
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
         K, C, M, branches = together((K, C, M, branches), added)
@@ -119,6 +137,8 @@ def assemble(
         K = (K + springs(mesh, support)).tocsr()
     if support is not None and support.absorbed.any():
         R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
+    if tension is not None:
+        K = (K + tension_stiffness(mesh, pattern, tension, axes)).tocsr()
     if drag is not None:
         R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
     if R.nnz:
@@ -130,24 +150,37 @@ def assemble(
 
 
 def _volume_operators(
-    mesh: TetMesh, pattern: SparsityPattern, materials: list[Material], region: Ints
+    mesh: TetMesh,
+    pattern: SparsityPattern,
+    materials: list[Material],
+    region: Ints,
+    axes: Floats,
+    share: Callable[[Floats], Floats] | None,
+    stiffener: sparse.csr_array | None,
 ) -> Matrices:
     """K, C, M and the branches of all materials, on all dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
     D = {
         m: projected_divergence(elements_of(mesh, region == m))
-        for m in np.flatnonzero(lam > direct)
+        for m in np.flatnonzero(lam > direct).tolist()
     }
-    projected = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
+    beside: dict[int, Any] = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
+    for m, added in directional_parts(materials).items():
+        own = region == m
+        part = replace(pattern, slot=pattern.slot[own])
+        extra = orthotropic_stiffness(elements_of(mesh, own), part, added, axes)
+        beside[m] = beside.get(m, 0) + extra
+    if stiffener is not None:
+        beside[0] = beside.get(0, 0) + stiffener
 
     def stiffness(share: Floats) -> sparse.csr_array:
         """K with a share (r,) of each material's moduli."""
         blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
         summed = from_components(pattern, pattern.sum(blocks, 6))
-        return sum((share[m] * part for m, part in projected.items()), start=summed).tocsr()
+        return sum((share[m] * part for m, part in beside.items()), start=summed).tocsr()
 
-    return viscoelastic(materials, stiffness, lambda rho: _mass(mesh, pattern, rho[region]))
+    return viscoelastic(materials, stiffness, lambda rho: _mass(mesh, pattern, rho[region]), share)
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:
@@ -174,15 +207,10 @@ def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[
     blocks : (6, e, a, b) float, N/m, for the components (i, j) in UPPER; those below the diagonal
         are these, transposed
     """
-    n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
-    for slab in slabs(len(mesh.tets)):
-        slopes, volumes = gradients(shapes[slab], n_nodes, 2, slab.start)
-        e, q = volumes.shape
-        G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
-        H = np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
+    for slab, H in gradient_products(mesh):
         l2, m2 = lam[slab, None, None], mu[slab, None, None]
         shear = m2 * np.einsum("eiaib->eab", H)
-        blocks = np.empty((6, e, n_nodes, n_nodes))
+        blocks = np.empty((6, *shear.shape))
         for block, (i, j) in zip(blocks, UPPER, strict=True):
             np.multiply(l2, H[:, i, :, j], out=block)
             block += m2 * H[:, j, :, i]

@@ -7,7 +7,8 @@ The material is St. Venant-Kirchhoff: Bonet and Wood, Nonlinear Continuum Mechan
 Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at rest, of which a solid
 has three and a horizontal membrane two, T being the first rows of the unit matrix; the same code
 serves both. G contains shape gradients at four points of a tetrahedron and three of a triangle, as
-in the linear `assembly`, whose K is the tangent at rest.
+in the linear `assembly`, whose K is the tangent at rest. Orthotropic sheets add (Q - Q_iso) to the
+in-plane stress, and tension its forces on the normal displacement, as in `plane_stiffness`.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,6 +22,7 @@ from fem.assembly import Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
+from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
 from fem.sparsity import UPPER, SparsityPattern, from_components, slabs
 from fem.viscoelastic import LOSS_BAND
 from meshes import MeshError, TetMesh
@@ -64,6 +66,7 @@ class Membrane:
 class Part:
     """Elements of one kind: nodes (e, a), gradients G (e, q, k, a) and volumes (e, q) at the
     quadrature points, Lame's parameters lam and mu (e,), and D (e q k, n) with D u = G_ka u_a.
+    `along` (e, 3, 3) in Pa is what orthotropy adds for the strains xx, yy and 2 xy, or None.
     """
 
     nodes: Ints
@@ -74,6 +77,7 @@ class Part:
     D: sparse.csr_array
     D_transposed: sparse.csr_array
     pattern: SparsityPattern
+    along: Floats | None = None
 
     @staticmethod
     def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> "Part":
@@ -93,6 +97,7 @@ def finite_strain(
     *,
     fixed: str | Mapping[str, str] | ArrayLike = "clamped",
     membrane: Membrane | None = None,
+    tension: Tension | None = None,
 ) -> Elastic:
     """Hyperelastic body at large displacement, of tetrahedra and a membrane if there is one.
 
@@ -103,6 +108,7 @@ def finite_strain(
     ----------
     mesh, material, fixed : as for `assemble`
     membrane : Membrane among the nodes of the mesh, or None
+    tension : in-plane tension at rest of a horizontal sheet along x and y, or None
 
     Returns
     -------
@@ -116,7 +122,8 @@ def finite_strain(
         material has Prony terms or a law of its own; else as `assemble`.
     """
     n = len(mesh.points)
-    solid, operators = solid_part(mesh, material), assemble(mesh, material, fixed=fixed)
+    solid = solid_part(mesh, material)
+    operators = assemble(mesh, material, fixed=fixed, tension=tension)
     if operators.branches:
         raise ValueError(
             "Prony terms and other modulus laws are not implemented at large displacement; leave "
@@ -127,12 +134,15 @@ def finite_strain(
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
 
+    T = sparse.csr_array((len(free), len(free)))
+    if tension is not None:
+        T = tension_stiffness(mesh, solid.pattern, tension, SIDES)[free][:, free]
     body = Elastic(
         operators=operators,
-        internal=lambda u: internal_force(solid, spread(u)).ravel()[free],
-        tangent=lambda u: tangent(solid, spread(u))[free][:, free],
+        internal=lambda u: internal_force(solid, spread(u)).ravel()[free] + T @ u,
+        tangent=lambda u: tangent(solid, spread(u))[free][:, free] + T,
         viscous=lambda u, v: operators.C @ v,
-        energy=lambda u: stored_energy(solid, spread(u)),
+        energy=lambda u: stored_energy(solid, spread(u)) + float(u @ (T @ u)) / 2,
     )
     if membrane is None:
         return body
@@ -167,7 +177,17 @@ def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Pa
             )
     lam, mu = np.array([(m.first_lame, m.shear_modulus) for m in materials])[region].T
     G, volume = gradients(shape_nodes(mesh), mesh.tets.shape[1], 2, 0)
-    return Part.of(mesh.tets, G, volume, lam, mu, len(mesh.points))
+    part = Part.of(mesh.tets, G, volume, lam, mu, len(mesh.points))
+    return _with_orthotropy(part, materials, region)
+
+
+def _with_orthotropy(part: Part, materials: list[Material], region: Ints) -> Part:
+    """The part with what the orthotropy of its materials, by their index (e,), adds."""
+    added = directional_parts(materials)
+    if not added:
+        return part
+    each = np.array([added.get(m, np.zeros((3, 3))) for m in range(len(materials))])
+    return replace(part, along=each[region])
 
 
 def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
@@ -193,7 +213,8 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
     volume = membrane.thickness * area[:, None] * weights
     lam = 2 * m.first_lame * m.shear_modulus / (m.first_lame + 2 * m.shear_modulus)
     alike = np.ones(len(nodes))
-    return Part.of(nodes, G, volume, lam * alike, m.shear_modulus * alike, len(mesh.points))
+    part = Part.of(nodes, G, volume, lam * alike, m.shear_modulus * alike, len(mesh.points))
+    return _with_orthotropy(part, [m], np.zeros(len(nodes), np.int64))
 
 
 def internal_force(part: Part, u: Floats) -> Floats:
@@ -248,6 +269,13 @@ def stress(part: Part, E: Floats) -> Floats:
     pressure = part.lam[:, None] * np.trace(E, axis1=2, axis2=3)
     for k in range(E.shape[2]):
         S[..., k, k] += pressure
+    if part.along is not None:
+        strains = np.stack([E[..., 0, 0], E[..., 1, 1], 2 * E[..., 0, 1]], axis=-1)
+        xx, yy, xy = np.moveaxis(np.einsum("evw,eqw->eqv", part.along, strains), -1, 0)
+        S[..., 0, 0] += xx
+        S[..., 1, 1] += yy
+        S[..., 0, 1] += xy
+        S[..., 1, 0] += xy
     return S
 
 
@@ -265,13 +293,24 @@ def tangent(part: Part, u: Floats) -> sparse.csr_array:
     F, E = deformation(part, u)
     S = stress(part, E)
     blocks = (
-        (slab, _tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs(len(part.nodes))
+        (slab, tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs(len(part.nodes))
     )
     return from_components(part.pattern, part.pattern.sum(blocks, 6))
 
 
-def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
-    """Element blocks (6, e, a, b) of the tangent."""
+def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
+    """Element blocks of the tangent.
+
+    Parameters
+    ----------
+    part : Part
+    slab : its elements
+    F, S : (e, q, k, i) and (e, q, k, l) float, their deformation gradient, and stress in Pa
+
+    Returns
+    -------
+    (6, e, a, b) float, N/m
+    """
     V, G = part.volume[slab, :, None, None], part.G[slab]
     G_transposed = G.swapaxes(2, 3)
     A = G_transposed @ F  # (e, q, a, i)
@@ -279,6 +318,7 @@ def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
     stretch = part.mu[slab, None, None, None] * (F.swapaxes(2, 3) @ F)
     geometric = (V * (G_transposed @ (S @ G))).sum(axis=1)
     lam, mu = part.lam[slab, None, None], part.mu[slab, None, None]
+    along = None if part.along is None else part.along[slab]
     blocks = np.empty((6, *geometric.shape))
     for block, (i, j) in zip(blocks, UPPER, strict=True):
         across = np.einsum("eqa,eqb->eab", V[..., 0] * A[..., i], A[..., j], optimize=True)
@@ -286,4 +326,15 @@ def _tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
         block += np.einsum("eqab,eq->eab", slopes, stretch[..., i, j])
         if i == j:
             block += geometric
+        if along is not None:
+            one, other = (_plane_strains(G, F[..., c]) for c in (i, j))
+            block += np.einsum("eqva,evw,eqwb->eab", V * one, along, other, optimize=True)
     return blocks
+
+
+def _plane_strains(G: Floats, F: Floats) -> Floats:
+    """Rates (e, q, 3, a) of the strains xx, yy and 2 xy with one component of displacement, of
+    gradients (e, q, k, a) and that column (e, q, k) of the deformation gradient.
+    """
+    (x, y), (along, across) = (np.moveaxis(G, 2, 0)[:2], np.moveaxis(F, 2, 0)[:2, ..., None])
+    return np.stack([x * along, y * across, x * across + y * along], axis=2)

@@ -1,8 +1,11 @@
 """The map from the reference element to the elements of a mesh."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from fem.elements import shape_derivatives, tetrahedron_rule
+from fem.sparsity import slabs
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import EDGES, Floats
 
@@ -46,6 +49,22 @@ def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Flo
     cofactors, determinants, volumes = jacobians(nodes, degree, first)
     inverse = cofactors / determinants[..., None, None]
     return np.matmul(inverse.swapaxes(2, 3), derivatives.transpose(0, 2, 1)), volumes
+
+
+def gradient_products(mesh: TetMesh) -> Iterator[tuple[slice, Floats]]:
+    """Integrals of products of shape gradients, some elements at a time.
+
+    Yields
+    ------
+    slice of the elements
+    H : (e, i, a, j, b) float, metre, int N_a,i N_b,j dV
+    """
+    n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
+    for slab in slabs(len(mesh.tets)):
+        slopes, volumes = gradients(shapes[slab], n_nodes, 2, slab.start)
+        e, q = volumes.shape
+        G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
+        yield slab, np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
 
 
 def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:

@@ -23,6 +23,7 @@ def viscoelastic(
     materials: list[Material],
     stiffness: Callable[[Floats], sparse.csr_array],
     mass: Callable[[Floats], sparse.csr_array],
+    share: Callable[[Floats], Floats] | None = None,
 ) -> Matrices:
     """K, C, M and the branches of all materials.
 
@@ -31,6 +32,7 @@ def viscoelastic(
     materials : list of Material, r
     stiffness : shares (r,) of each material's moduli -> their stiffness, linear in the shares
     mass : densities (r,) in kg/m3 -> their mass, linear in them
+    share : elastic share of the stiffness, as of `rayleigh_damping`
 
     Returns
     -------
@@ -38,7 +40,7 @@ def viscoelastic(
     """
     rho, mu = (property_of(materials, name) for name in ("density", "shear_modulus"))
     mass_rate, hysteretic_lag = np.array(
-        [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in materials]
+        [rayleigh_damping(m.loss_factor, LOSS_BAND, share) for m in materials]
     ).T
     K, M = stiffness(np.ones(len(materials))), mass(rho)
 

@@ -16,7 +16,7 @@ from simple_model.joined import evenly, joined
 from simple_model.layers import Stack
 from simple_model.line_names import named_lines
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
-from simple_model.material import Material, from_young, of_law, tabulated
+from simple_model.material import Material, from_young, of_law, orthotropic, tabulated
 from simple_model.modulus_laws import (
     MODULUS_LAWS,
     FractionalKelvinVoigt,
@@ -24,6 +24,7 @@ from simple_model.modulus_laws import (
     ModulusTable,
     modulus_table,
 )
+from simple_model.orthotropy import Orthotropy
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.pressure import MovingPressure
 from simple_model.prony import PronySeries, PronyTerm, fit_prony
@@ -46,6 +47,7 @@ __all__ = [
     "Material",
     "ModulusTable",
     "MovingPressure",
+    "Orthotropy",
     "PressureMap",
     "PronySeries",
     "PronyTerm",
@@ -73,6 +75,7 @@ __all__ = [
     "modulus_table",
     "named_lines",
     "of_law",
+    "orthotropic",
     "pattern_period",
     "phasors",
     "point_kernel",

@@ -67,9 +67,13 @@ def half_space(material: Material, *, poisson: float | None = None) -> Complianc
 
 
 def thin_sheet(
-    material: Material, thickness: float, *, air_density: float = AIR_DENSITY
+    material: Material,
+    thickness: float,
+    *,
+    air_density: float = AIR_DENSITY,
+    tension: float = 0.0,
 ) -> Compliance:
-    """Infinite thin sheet: G = 1 / [D* k^4 - (m + 2 rho_air/k) w^2].
+    """Infinite thin sheet: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2].
 
     m = rho d, D* = mu* d^3 / 6 (1 - nu). The deflection of an infinite sheet under a static load
     has no bound: motion is given about a mean that is left out, G = 0 at w = 0.
@@ -79,6 +83,7 @@ def thin_sheet(
     material : Material
     thickness : metre
     air_density : kg/m3; 0 for vacuum
+    tension : N/m, the same in all directions
 
     Returns
     -------
@@ -91,15 +96,16 @@ def thin_sheet(
 
     def compliance(k: Complex, w: Complex) -> Complex:
         inertia = (mass_per_area + 2 * air_density / k) * w**2
-        return np.where(w == 0, 0, 1 / (bending(w) * k**4 - inertia))
+        return np.where(w == 0, 0, 1 / (bending(w) * k**4 + tension * k**2 - inertia))
 
     def clearance(w: Complex) -> float:
-        """Height above the real axis of the evanescent pole: D* k^5 - m w^2 k - 2 rho_air w^2 = 0
-        in the first quadrant, at 90 degrees for a real w, but at 45 in vacuum and 36 in air for a w
-        that is purely imaginary.
+        """Height above the real axis of the evanescent pole: D* k^5 + T k^3 - m w^2 k
+        - 2 rho_air w^2 = 0 in the first quadrant, at 90 degrees for a real w, but without tension
+        at 45 in vacuum and 36 in air for a w that is purely imaginary.
         """
         companion = np.zeros((len(w), 5, 5), np.complex128)
         companion[:, range(1, 5), range(4)] = 1
+        companion[:, 0, 1] = -tension / bending(w)
         companion[:, 0, 3] = mass_per_area * w**2 / bending(w)
         companion[:, 0, 4] = 2 * air_density * w**2 / bending(w)
         k = np.linalg.eigvals(companion)

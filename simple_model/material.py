@@ -8,7 +8,8 @@ With viscosity alone that is the Kelvin-Voigt model, with Prony terms a generali
 (Simo and Hughes, Computational Inelasticity (1998), chapter 10), with one of them the standard
 linear solid (C. Zener, Elasticity and Anelasticity of Metals, 1948): mu in slow and mu + sum mu_j
 in fast motion. A `law` replaces all of it, and models that need internal variables take its Prony
-series. Poisson's ratio is constant, so that the whole stiffness scales with mu.
+series. Poisson's ratio is constant, so that the whole stiffness scales with mu; that of an
+orthotropic sheet is of its isotropic mean.
 """
 
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from simple_model.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
+from simple_model.orthotropy import Orthotropy
 from simple_model.prony import (
     FIT_TOLERANCE,
     Complex,
@@ -41,6 +43,7 @@ __all__ = [
     "PronyTerm",
     "from_young",
     "of_law",
+    "orthotropic",
     "tabulated",
 ]
 
@@ -48,7 +51,7 @@ __all__ = [
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """An isotropic solid; give `shear_modulus`, or build it with `from_young`, `of_law` or
-    `tabulated`.
+    `tabulated`, or that of a sheet with `orthotropic`.
 
     Parameters
     ----------
@@ -61,11 +64,14 @@ class Material:
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa, in place of all
         other terms, or None: a record of `modulus_laws`, or any function that is analytic at
         frequencies with imaginary part <= 0; `shear_modulus` is its value at rest
+    orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`,
+        or None
 
     Raises
     ------
     ValueError
-        If a value is not finite or outside these limits, or a law is given beside other losses.
+        If a value is not finite or outside these limits, or a law is given beside other losses or
+        an orthotropy.
     """
 
     density: float
@@ -75,6 +81,7 @@ class Material:
     loss_factor: float = 0.0
     prony: tuple[PronyTerm, ...] = ()
     law: ModulusLaw | None = None
+    orthotropy: Orthotropy | None = None
 
     def __post_init__(self) -> None:
         for name in ("density", "shear_modulus"):
@@ -100,6 +107,23 @@ class Material:
             raise ValueError(
                 f"shear_modulus = {self.shear_modulus:g} Pa is not that of the material's modulus "
                 f"law at rest, {at_rest:g} Pa; build the material with of_law"
+            )
+        if self.orthotropy is not None:
+            self._check_orthotropy(self.orthotropy)
+
+    def _check_orthotropy(self, along: Orthotropy) -> None:
+        if self.law is not None:
+            raise ValueError(
+                "a modulus law is one of an isotropic material, and this one is orthotropic; give "
+                "it a viscosity, a loss_factor or Prony terms"
+            )
+        if not np.allclose(
+            (self.shear_modulus, self.poisson), (along.shear, along.poisson), rtol=1e-6
+        ):
+            raise ValueError(
+                f"shear_modulus = {self.shear_modulus:g} Pa and poisson = {self.poisson:g} are not "
+                f"those of the material's isotropic mean, {along.shear:g} Pa and "
+                f"{along.poisson:g}; build the material with orthotropic"
             )
 
     @property
@@ -172,7 +196,17 @@ class Material:
             loss_factor=loss * self.loss_factor,
             prony=tuple(replace(term, modulus=both * term.modulus) for term in self.prony),
             law=law,
+            orthotropy=self.orthotropy and self.orthotropy.scaled(modulus),
         )
+
+    @property
+    def plane_stress(self) -> Floats:
+        """Stiffness Q (3, 3) in Pa at equilibrium in plane stress, for the strains xx, yy, 2 xy."""
+        if self.orthotropy is not None:
+            return self.orthotropy.plane_stress
+        inner = self.young / (1 - self.poisson**2)
+        across = self.poisson * inner
+        return np.array([[inner, across, 0], [across, inner, 0], [0, 0, self.shear_modulus]])
 
     @property
     def shear_speed(self) -> float:
@@ -198,6 +232,43 @@ class Material:
 def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
     """Material by its Young's modulus in Pa; the rest as in `Material`."""
     return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
+
+
+def orthotropic(
+    *,
+    density: float,
+    young_x: float,
+    young_y: float,
+    poisson_xy: float,
+    shear_xy: float | None = None,
+    **losses: Any,
+) -> Material:
+    """Material of a sheet by its moduli along x and y; its losses, `viscosity`, `loss_factor` and
+    `prony` as of `Material`, are the same in all directions.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    young_x, young_y, poisson_xy, shear_xy : as of `Orthotropy`
+
+    Returns
+    -------
+    Material
+        Whose shear modulus and Poisson's ratio are those of the isotropic mean.
+
+    Raises
+    ------
+    ValueError
+        As `Orthotropy` and `Material` do.
+    """
+    along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
+    return Material(
+        density=density,
+        shear_modulus=along.shear,
+        poisson=along.poisson,
+        orthotropy=along,
+        **losses,
+    )
 
 
 def of_law(*, density: float, poisson: float, law: Any) -> Material:
@@ -300,4 +371,9 @@ PRESETS: Mapping[str, Material] = {
     "forearm-hypodermis": _tissue(young=15e3),
     # 80 g/m2 office paper of 0.1 mm, geometric mean of the two in-plane directions.
     "paper": from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03),
+    # The same with its grain along x; values of handbooks, 5-8 and 2-4 GPa, whose mean is that of
+    # "paper". No sheet was measured.
+    "paper-grain": orthotropic(
+        density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03
+    ),
 }

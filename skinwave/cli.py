@@ -19,7 +19,7 @@ from skinwave.streams import CLOSED, explained, flushed, reader_gone
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
 # Commands that compute nothing, or always anew.
-UNCACHED = ("cache", "convert", "doctor", "plot", "same", "tradeoff")
+UNCACHED = ("cache", "convert", "doctor", "measured", "plot", "same", "tradeoff")
 
 
 @flushed

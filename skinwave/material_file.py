@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from meshes import reading
-from simple_model import MODULUS_LAWS, Material, ModulusTable, modulus_table, of_law
+from simple_model import MODULUS_LAWS, Material, ModulusTable, modulus_table, of_law, orthotropic
 from simple_model.choices import choose
 from simple_model.modulus_laws import COLUMNS
 
 PLAIN = ("density", "shear_modulus", "poisson")  # and losses, which may be left out
 LOSSES = ("viscosity", "loss_factor", "prony")
+ALONG = ("young_x", "young_y", "poisson_xy")  # of an orthotropic sheet, and shear_xy
 TABULATED = ("density", "poisson", "table")
 
 
@@ -44,6 +45,8 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
     rest = {name: value for name, value in values.items() if name not in ("law", "table")}
     if "table" in values:
         return of_law(**rest, law=values["table"])
+    if "young_x" in values:
+        return orthotropic(**values)
     if "law" not in values:
         return Material(**values)
     solid = {name: rest.pop(name) for name in ("density", "poisson")}
@@ -58,6 +61,8 @@ def _kind(values: Mapping[str, Any]) -> tuple[str, tuple[str, ...], tuple[str, .
         law = MODULUS_LAWS[choose("material law", values["law"], MODULUS_LAWS)]
         own = (field.name for field in fields(law) if field.name != "shear_modulus")
         return f"of law '{values['law']}'", (*PLAIN, "law", *own), ()
+    if not {*ALONG, "shear_xy"}.isdisjoint(values):
+        return "orthotropic", ("density", *ALONG), ("shear_xy", *LOSSES)
     return "without a law", PLAIN, LOSSES
 
 
@@ -71,8 +76,11 @@ def values_of(material: Material) -> dict[str, Any]:
     """
     law = material.law
     if law is None:
+        along = material.orthotropy
         found = {name: getattr(material, name) for name in (*PLAIN, *LOSSES)}
-        return {name: value for name, value in found.items() if value != ()}
+        if along is not None:
+            found = {name: found[name] for name in ("density", *LOSSES)} | vars(along)
+        return {name: value for name, value in found.items() if value not in ((), None)}
     if isinstance(law, ModulusTable):
         return {"density": material.density, "poisson": material.poisson, "table": law}
     for name, kind in MODULUS_LAWS.items():

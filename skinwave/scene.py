@@ -14,6 +14,7 @@ from skinwave.bodies import (
     KINDS,
     Body,
     Layer,
+    Mounting,
     Placement,
     Relief,
     body_name,
@@ -23,7 +24,7 @@ from skinwave.bodies import (
 
 __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
-    "Body", "Layer", "Placement", "Reading", "Relief", "Scene",
+    "Body", "Layer", "Mounting", "Placement", "Reading", "Relief", "Scene",
     "body_name", "check_motion", "kind_of", "solid_of", "with_body",
 ]  # fmt: skip
 

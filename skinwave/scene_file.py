@@ -3,6 +3,7 @@
 import re
 import tomllib
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,11 @@ from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
 from simple_model.trajectory import BY_POINTS
+from skinwave.bodies import BodyKind
+from skinwave.bodies.parts import check_material
 from skinwave.material_file import with_tables
-from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of
-from skinwave.scene_keys import PATH, SECTIONS, as_table, as_text, checked, renamed
+from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
+from skinwave.scene_keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
@@ -122,6 +125,8 @@ def dumps(scene: Scene) -> str:
     for section, keys in SECTIONS.items():
         table[section] = {}
         for key, field in keys.items():
+            if key in DERIVED:
+                continue
             source = next(s for s in sources[section] if hasattr(s, field.name))
             if section != "tacton" or key not in unused(tacton):
                 table[section][key] = field.write(getattr(source, field.name))
@@ -168,11 +173,30 @@ def _body(values: dict[str, Any], preset: Body | None) -> Body:
         takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
         raise ValueError(f'[body] {key} is for kind = {takers}, not "{kind.name}"')
     shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
+    missing = vars(preset) if preset else next(iter(kind.presets.values()), {})
+    if (grammage := shape.pop("grammage", None)) is not None:
+        shape |= _of_grammage(grammage, kind, {**missing, **shape}, "depth" in shape)
     if preset:
         placed = {**vars(preset.placement), **placement}
         return replace(preset, **shape, placement=Placement(**placed))
-    missing = next(iter(kind.presets.values()), {})
     return Body(**{**missing, **shape}, placement=Placement(**placement))
+
+
+def _of_grammage(
+    grammage: float, kind: BodyKind, values: dict[str, Any], thickness_is_given: bool
+) -> dict[str, Any]:
+    """The material of a sheet of so many kg/m2 and of a given thickness, or else its thickness."""
+    if not kind.is_plate:
+        raise ValueError(f'[body] grammage_g_m2 is for a sheet, not "{kind.name}"')
+    if not 0 < grammage < inf:
+        raise ValueError(f"grammage_g_m2 = {1e3 * grammage:g} must be a finite number above 0")
+    check_material(values["material"])
+    solid = solid_of(values["material"])
+    if not thickness_is_given:
+        return {"depth": grammage / solid.density}
+    if not values["depth"] > 0:
+        return {}  # which the body refuses
+    return {"material": replace(solid, density=grammage / values["depth"])}
 
 
 def _keys_of_kinds() -> set[str]:

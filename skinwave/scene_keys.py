@@ -16,7 +16,7 @@ from simple_model.modulus_laws import COLUMNS
 from simple_model.trajectory import Points
 from skinwave.material_file import material_of, values_of, written_table
 from skinwave.plain_text import number_in
-from skinwave.scene import Layer, Relief
+from skinwave.scene import Layer, Mounting, Relief
 
 # Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
 # the base of the epidermis, Meissner's corpuscles in the papillae beside them, Pacini's in the deep
@@ -101,6 +101,12 @@ def _numbers(key: str, value: Any) -> tuple[float, ...]:
     if not isinstance(value, list):
         raise ValueError(f"{key} = {_shown(value)} must be a list of numbers")
     return tuple(_number(key, x) for x in value)
+
+
+def _words(key: str, value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise ValueError(f'{key} = {_shown(value)} must be a list of words, such as ["left"]')
+    return tuple(as_text(key, word) for word in value)
 
 
 def _switch(key: str, value: Any) -> bool:
@@ -219,6 +225,13 @@ def _relief(key: str, value: Any) -> Relief:
     return Relief(**checked(f"[body.{key}]", as_table(f"body.{key}", value), RELIEF))
 
 
+def _mounting(key: str, value: Any) -> Mounting:
+    values = checked(f"[body.{key}]", as_table(f"body.{key}", value), MOUNTING)
+    if values.get("clips"):  # alone, unless edges are named, too
+        values = {"edges": ()} | values
+    return Mounting(**values)
+
+
 def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     x, y = _pair(key, value)
     return x / 1e3, y / 1e3
@@ -281,6 +294,10 @@ MATERIAL = {
     "density_kg_m3": _scaled("density"),
     "shear_modulus_pa": _scaled("shear_modulus"),
     "poisson": _scaled("poisson"),
+    "young_x_pa": _scaled("young_x"),
+    "young_y_pa": _scaled("young_y"),
+    "poisson_xy": _scaled("poisson_xy"),
+    "shear_xy_pa": _scaled("shear_xy"),
     "viscosity_pa_s": _scaled("viscosity"),
     "loss_factor": _scaled("loss_factor"),
     "law": _word("law"),
@@ -293,6 +310,16 @@ MATERIAL = {
 MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
     "relaxing_modulus_pa": "modulus_pa",
     "relaxation_time_s": "time_s",
+}
+MOUNTING = {
+    "edges": SceneKey("edges", _words, list),
+    "support": _word("support"),
+    "clips_mm": SceneKey("clips", _points, _write_points),
+    "clip_radius_mm": _scaled("clip_radius", 1e3),
+    "tension_x_n_per_m": _scaled("tension_x"),
+    "tension_y_n_per_m": _scaled("tension_y"),
+    "curl_x_mm": _scaled("curl_x", 1e3),
+    "curl_y_mm": _scaled("curl_y", 1e3),
 }
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {
@@ -350,6 +377,8 @@ SECTIONS = {
         "unit": _word("unit"),
         "up": _word("up"),
         "air": SceneKey("air", _switch, bool),
+        "mounting": SceneKey("mounting", _mounting, partial(written, MOUNTING)),
+        "grammage_g_m2": _scaled("grammage", 1e3),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
@@ -364,6 +393,9 @@ SECTIONS = {
     },
 }
 
+
+# Keys that others are computed from, and that no file is written with.
+DERIVED = {"grammage_g_m2"}
 
 # Keys of [body] in version 0.2, which load for one release.
 RENAMED = {"width_mm": "size_x_mm", "height_mm": "size_y_mm", "depth_mm": "thickness_mm"}

@@ -119,6 +119,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     run_there(hostile, "run", "nothing.toml", code=2)
     small = ["small.toml", "--h", "10", "--quiet"]
     hand(hostile[1] / "body.stl", 6e-3)
+    (hostile[1] / "wave.csv").write_text("t [s], v(0,0) [m/s]\n0, 1\n1, 2\n")
     asked = {
         "run": [*small, "--out", "out"],
         "plan": ["small.toml"],
@@ -131,6 +132,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "convert": ["small.toml", "out.csv"],
         "mesh": ["body.stl", "--h", "20", "--out", "body.vtu"],
         "doctor": [],
+        "measured": ["wave.csv", "--out", "measured"],
         "cache": [],
         "report": ["out", "--quiet"],
         "film": ["out", "--out", "film.gif"],

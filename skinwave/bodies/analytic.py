@@ -36,11 +36,13 @@ def exact_waves(body: Body, model: str) -> Compliance:
     """
     if body.placement != FLAT:
         raise ValueError(f"{model} takes a body that lies flat across the beam; use fem")
+    body.of_kind.check_exact(body)
     return compliance(body)
 
 
 def compliance(body: Body) -> Compliance:
-    """Compliance of an infinite body of the same section.
+    """Compliance of an infinite body of the same section; where its directions differ, that of
+    their means.
 
     Raises
     ------

@@ -15,6 +15,7 @@ from simple_model.compliance import Compliance
 from simple_model.dispersion import DispersionCurves
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import FLAT, PLAIN, Layer, Placement, Relief, check_material, solid_of
 
 BASES = ("clamped", "absorbing", "free")
@@ -41,6 +42,7 @@ class Body:
     file, unit, up : of a mesh, as `meshes.body_from_file` takes them
     placement : how the body lies under the device
     air : bool, whether air moves along on both sides of a sheet, as if in a baffle; or vacuum
+    mounting : which of the sides of a sheet are held, and how it is stretched
 
     Raises
     ------
@@ -62,6 +64,7 @@ class Body:
     up: str = "+z"
     placement: Placement = FLAT
     air: bool = False
+    mounting: Mounting = FRAME
 
     def __post_init__(self) -> None:
         kind = self.of_kind
@@ -95,13 +98,42 @@ class Body:
                 f"air = true is for a sheet, which weighs little more than the air that it moves, "
                 f"not a {self.kind}; leave it out"
             )
+        self._check_sheet()
         kind.check(self)
+
+    def _check_sheet(self) -> None:
+        """Refuse what only a sheet has, and supports that contradict each other."""
+        if self.solid.orthotropy is not None and not self.of_kind.is_plate:
+            raise ValueError(
+                f"an orthotropic material is for a sheet, not a {self.kind}; give it a "
+                "shear_modulus and a Poisson's ratio"
+            )
+        if self.mounting == FRAME:
+            return
+        if "mounting" not in self.of_kind.keys:
+            raise ValueError(
+                f"a mounting holds and stretches a sheet, not a {self.kind}; leave it out"
+            )
+        if self.sides != "clamped":
+            raise ValueError(
+                f"a mounting says how the sides of a sheet are held, and they are {self.sides}; "
+                'take sides = "clamped", or leave it out'
+            )
+        shaped = self.mounting.support == "simply" or self.mounting.is_curled
+        if shaped and self.placement.is_tilted:
+            raise ValueError(
+                "a simple support and a curl are implemented for a sheet that lies across the "
+                "beam, not a tilted one; clamp and flatten it, or leave out its tilt"
+            )
+        check_extent(self.mounting, self.width, self.height)
 
     def _check_layers(self) -> None:
         if not self.layers:
             return
         if not self.of_kind.may_be_layered:
             raise ValueError(f"a body of kind '{self.kind}' has no layers; leave them out")
+        if any(solid_of(layer.material).orthotropy is not None for layer in self.layers):
+            raise ValueError("layers are isotropic; an orthotropic material is for a sheet")
         if (below := sum(layer.thickness for layer in self.layers)) >= self.depth:
             raise ValueError(
                 f"the layers are {1e3 * below:g} mm thick in all, but the body is "
@@ -177,6 +209,7 @@ class BodyKind:
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
     compliance : wavenumber integral of a laterally infinite body; None without any
+    check_exact : raises a ValueError for a body of which that is an estimate alone
     dispersion : dispersion curves of a laterally infinite body of the same section, at
         frequencies (f,) in Hz and of at most so many modes; None without any
     wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
@@ -203,6 +236,7 @@ class BodyKind:
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3
     compliance: Callable[[Body], Compliance] | None = None
+    check_exact: Callable[[Body], object] = lambda body: None
     dispersion: Callable[[Body, Floats, int], DispersionCurves] | None = None
     wave_speed: Callable[[Body, float], float] = lambda body, frequency: _rayleigh(body, frequency)
     is_plate: bool = False

@@ -1,14 +1,17 @@
 """A body that is meshed, with its materials and boundary conditions, under the device."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
 from fem.assembly import Operators, assemble
-from fem.boundary import Support
+from fem.boundary import Support, fixed_dofs
 from fem.coat import Coat
 from fem.materials import Material
+from fem.plane_stiffness import SIDES, Tension
 from meshes import TetMesh, half
 from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.body import Body
@@ -22,7 +25,8 @@ COMPARED = 4 / 3
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Build:
     """Meshed body: arguments of `fem.assemble`; `coat` and `support` of a hand, or None; `drag`
-    (m,) in 1/s of the absorbing layer, or None.
+    (m,) in 1/s of the absorbing layer, or None; `held` (n, 3) components beside those `fixed`, or
+    None; `stiffener` and `tension` of a sheet, or None, and `axes` (2, 3) along its sides.
     """
 
     mesh: TetMesh
@@ -33,6 +37,17 @@ class Build:
     drag: Floats | None = None
     support: Support | None = None
     symmetry: str = ""
+    held: NDArray[np.bool_] | None = None
+    tension: Tension | None = None
+    stiffener: sparse.csr_array | None = None
+    axes: Floats = field(default_factory=lambda: SIDES)
+
+    @property
+    def constraints(self) -> dict[str, str] | NDArray[np.bool_]:
+        """All components that are fixed."""
+        if self.held is None:
+            return self.fixed
+        return self.held | fixed_dofs(self.mesh, self.fixed).reshape(-1, 3)
 
 
 def build(
@@ -67,13 +82,18 @@ def build(
     mesh = made.mesh
     ends = {"bottom": body.base, "sides": body.sides}
     ends = {name: end for name, end in ends.items() if len(mesh.facets.get(name, ()))}
+    if made.held:
+        del ends["sides"]
     fixed = {name: "xyz" for name, end in ends.items() if end == "clamped"}
     for axis in symmetry:
         mesh = half(mesh, axis)
         fixed[f"mirror_{axis}"] = axis
     drag = made.drag(mesh) if made.drag else None
     support = made.support(mesh) if made.support else None
-    if body.is_held and "xyz" not in fixed.values() and not (support and support.stiffness.any()):
+    held = made.held(mesh) if made.held else None
+    stiffener = made.stiffener(mesh) if made.stiffener else None
+    is_fixed = "xyz" in fixed.values() or held is not None
+    if body.is_held and not is_fixed and not (support and support.stiffness.any()):
         raise ValueError(
             f"the sides are clamped, but {body.file} has no facets 'sides' or 'cut' to fix; clamp "
             "its base, or name them in the file"
@@ -89,6 +109,10 @@ def build(
         drag=drag,
         support=support,
         symmetry=symmetry,
+        held=held,
+        tension=made.tension,
+        stiffener=stiffener,
+        axes=body.placement.rotation.T[:2],
     )
 
 
@@ -97,9 +121,12 @@ def operators(build: Build) -> Operators:
     return assemble(
         build.mesh,
         build.material,
-        fixed=build.fixed,
+        fixed=build.constraints,
         absorbing=build.absorbing,
         drag=build.drag,
         support=build.support,
         coat=build.coat,
+        tension=build.tension,
+        stiffener=build.stiffener,
+        axes=build.axes,
     )

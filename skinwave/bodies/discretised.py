@@ -4,10 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
 from fem.boundary import Support
 from fem.coat import Coat
 from fem.materials import Material
+from fem.plane_stiffness import Tension
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 
@@ -21,8 +24,10 @@ class Discretised:
     `sides` where conditions of these names hold.
 
     `materials` by region; `coat`: thin layers at the top; `drag`: mass-proportional damping (m,) in
-    1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh. Both are
-    called with the part of the mesh that symmetry leaves.
+    1/s of the elements of a mesh; `support`: elastic and absorbing support of a mesh; `held`:
+    components (n, 3) of its nodes that are held, in place of all of its sides: called with the part
+    of the mesh that symmetry leaves. `tension` of a sheet; `stiffener` (3 n, 3 n) in N/m of a
+    mesh, as `fem.assemble` takes it.
     """
 
     mesh: TetMesh
@@ -30,6 +35,9 @@ class Discretised:
     coat: Coat | None = None
     drag: Callable[[TetMesh], Floats] | None = None
     support: Callable[[TetMesh], Support] | None = None
+    held: Callable[[TetMesh], NDArray[np.bool_]] | None = None
+    tension: Tension | None = None
+    stiffener: Callable[[TetMesh], sparse.csr_array] | None = None
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:

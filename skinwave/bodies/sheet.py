@@ -1,13 +1,20 @@
 """Thin sheet, which bends: paper in a frame. Its waves, its air, and its mesh."""
 
 from dataclasses import replace
-from math import pi
+from functools import partial
+from math import pi, sqrt
+
+import numpy as np
+from scipy import sparse
 
 from fem.added_mass import AddedMass, added_mass
 from fem.assembly import Operators
+from fem.finite_strain import Membrane
 from fem.materials import Material, rayleigh_damping
+from fem.plane_stiffness import Tension
+from fem.shallow_shell import shell_stiffness
 from fem.viscoelastic import LOSS_BAND
-from meshes import sheet
+from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
 from meshes.tetmesh import Floats
 from simple_model.compliance import AIR_DENSITY, Compliance, thin_sheet
@@ -16,11 +23,14 @@ from simple_model.sheet_modes import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.mounting import FRAME, held
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and thicker elements are far more accurate: thin ones lock.
 SHEET_THICKNESS = 0.01
+PAPER = {"depth": 1e-4, "base": "free", "sides": "clamped"}
+OF_A_SIZE = {"material": "paper-grain", "air": True, **PAPER}
 AIR_TURNS = 30  # each leaves a quarter of the error, or less
 
 
@@ -42,7 +52,49 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     return Discretised(
         mesh=sheet(body.width, body.height, thickness, h),
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
+        held=None if _is_clamped_frame(body) else partial(held, body.mounting),
+        tension=tension(body),
+        stiffener=partial(_curl, body) if body.mounting.is_curled else None,
     )
+
+
+def _curl(body: Body, mesh: TetMesh) -> sparse.csr_array:
+    """Membrane stiffness of a sheet that is curved at rest."""
+    middle = Membrane(triangles=middle_plane(mesh), thickness=body.depth, material=body.solid)
+    rise = np.array([body.mounting.curl_x, body.mounting.curl_y])
+    curvature = -8 * rise / np.array([body.width, body.height]) ** 2
+    meshed = (body.depth / float(np.ptp(mesh.points[:, 2]))) ** 2  # as of `bending_equivalent`
+    return shell_stiffness(mesh, middle, lambda at: curvature * at, meshed=meshed)
+
+
+def tension(body: Body) -> Tension | None:
+    """Tension of a sheet; None without any."""
+    if not body.mounting.is_stretched:
+        return None
+    x, y = body.mounting.tension_x, body.mounting.tension_y
+    return Tension(x=x, y=y, share=partial(elastic_share, body))
+
+
+def elastic_share(body: Body, omega: Floats) -> Floats:
+    """Elastic share D k^2 / (D k^2 + T) (f,) of the stiffness of bending waves at angular
+    frequencies (f,) in rad/s, of the means of an infinite sheet's directions.
+    """
+    k = np.array([bending_wavenumber(body, w / 2 / pi) for w in omega.tolist()])
+    bent = body.bending_stiffness * k**2
+    return bent / (bent + body.mounting.mean_tension)
+
+
+def damping(body: Body) -> tuple[float, float]:
+    """Rayleigh damping of a sheet, by mass in 1/s and by stiffness in s."""
+    stretched = tension(body)
+    return rayleigh_damping(
+        body.solid.loss_factor, LOSS_BAND, None if stretched is None else stretched.share
+    )
+
+
+def _is_clamped_frame(body: Body) -> bool:
+    """Whether its sides are as `sides` says, all alike."""
+    return body.mounting.is_frame and body.mounting.support == FRAME.support
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
@@ -58,9 +110,30 @@ def _check_size(body: Body, h: float) -> None:
     check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
 
 
+def check_alike(body: Body) -> None:
+    """Refuse a sheet whose waves depend on their direction, as an infinite one.
+
+    Raises
+    ------
+    ValueError
+        If it is orthotropic or curled, or its tensions differ.
+    """
+    x, y = body.mounting.tension_x, body.mounting.tension_y
+    if body.solid.orthotropy is not None or x != y or body.mounting.is_curled:
+        what = "orthotropic" if x == y else f"stretched by {x:g} and {y:g} N/m along x and y"
+        what = "curled" if body.mounting.is_curled else what
+        raise ValueError(
+            f"the wavenumber integral is of waves alike in all directions, and this sheet is {what}"
+            "; use --model fem, or a flat sheet of an isotropic material and equal tensions"
+        )
+
+
 def compliance(body: Body) -> Compliance:
-    """Compliance of an infinite sheet."""
-    return thin_sheet(body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0)
+    """Compliance of an infinite sheet; of one whose directions differ, that of their means."""
+    return thin_sheet(
+        body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0,
+        tension=body.mounting.mean_tension,
+    )  # fmt: skip
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
@@ -76,19 +149,27 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
     -------
     DispersionCurves
     """
-    air_density = AIR_DENSITY if body.air else 0.0
-    return sheet_curves(body.solid, body.depth, frequencies, air_density=air_density)
+    check_alike(body)
+    return sheet_curves(
+        body.solid, body.depth, frequencies, air_density=AIR_DENSITY if body.air else 0.0,
+        tension=body.mounting.mean_tension,
+    )  # fmt: skip
 
 
 def bending_wavenumber(body: Body, frequency: float) -> float:
     """Bending wavenumber k of an infinite sheet, rad/m, at a frequency in Hz:
-    D k^4 = (m + 2 rho / k) w^2.
+    D k^4 + T k^2 = (m + 2 rho / k) w^2, with the means D and T of an orthotropic one's directions.
     """
-    w = 2 * pi * frequency
-    k = (body.mass_per_area * w**2 / body.bending_stiffness) ** 0.25
+    w, D = 2 * pi * frequency, body.bending_stiffness
+    half = body.mounting.mean_tension / 2 / D
+
+    def without_air(mass: float) -> float:
+        return sqrt(sqrt(half**2 + mass * w**2 / D) - half)
+
+    k = without_air(body.mass_per_area)
     for _ in range(AIR_TURNS if body.air and w else 0):
-        k = ((body.mass_per_area + 2 * AIR_DENSITY / k) * w**2 / body.bending_stiffness) ** 0.25
-    return float(k)
+        k = without_air(body.mass_per_area + 2 * AIR_DENSITY / k)
+    return k
 
 
 def air_mass(body: Body, frequency: float) -> float:
@@ -119,12 +200,15 @@ def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
     """
     if not body.air:
         return None
-    if body.sides != "clamped":
+    if body.sides != "clamped" or not body.mounting.is_frame:
+        how, cure, other = f"with {body.sides} sides", "clamp them", "flat-body"
+        if body.sides == "clamped":
+            how, cure, other = f"one {body.mounting.words}", "hold all its edges", "plate-modes"
         raise ValueError(
-            f"elements have air around a sheet in a frame, not with {body.sides} sides; clamp "
-            "them, leave air out, or use --model flat-body"
+            f"elements have air around a sheet in a frame, not {how}; {cure}, leave air out, or "
+            f"use --model {other}"
         )
-    by_mass, _ = rayleigh_damping(body.solid.loss_factor, LOSS_BAND)
+    by_mass, _ = damping(body)
     sides = body.placement.rotation.T[:2]
     return added_mass(
         build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry, rate=by_mass
@@ -134,16 +218,20 @@ def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
 SHEET = register(
     BodyKind(
         name="sheet",
-        keys=("air",),
-        # 80 g/m2 office paper in a frame.
+        keys=("air", "mounting"),
+        # 80 g/m2 office paper in a frame; the A sizes lie across, with air and their grain along x.
         presets={
-            "paper-sheet": {"material": "paper", "depth": 1e-4, "base": "free", "sides": "clamped"}
+            "paper-sheet": {"material": "paper", **PAPER},
+            "a4-sheet": {"width": 0.297, "height": 0.210, **OF_A_SIZE},
+            "a5-sheet": {"width": 0.210, "height": 0.148, **OF_A_SIZE},
+            "a6-sheet": {"width": 0.148, "height": 0.105, **OF_A_SIZE},
         },
         discretise=discretise,
         check_size=_check_size,
         default_size=lambda body: min(body.width, body.height) / SHEET_CELLS,
         interactive_size=2.5e-3,
         compliance=compliance,
+        check_exact=check_alike,
         dispersion=dispersion,
         wave_speed=lambda body, frequency: 2 * pi * frequency / bending_wavenumber(body, frequency),
         is_plate=True,

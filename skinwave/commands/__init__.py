@@ -11,6 +11,7 @@ from skinwave.commands import (
     doctor,
     film,
     infer,
+    measured,
     mesh,
     plan,
     plot,
@@ -28,6 +29,7 @@ from skinwave.commands import map as map_command
 
 MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
-    verify, report, film, infer, web, rerun, same, doctor, cache,
+    verify, report, film, web, rerun, same, doctor, cache,
+    measured, infer,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

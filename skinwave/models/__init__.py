@@ -30,6 +30,7 @@ BUILT_IN = {  # name -> the file that registers it
     "fem-transient": "linear_elements",
     "fem-nonlinear": "nonlinear_elements",
     "fem-nonlinear-transient": "nonlinear_elements",
+    "plate-modes": "plate_modes",
 }
 
 

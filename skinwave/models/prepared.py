@@ -131,7 +131,8 @@ def _entry_name(
     read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
-        build.fixed, build.absorbing, build.coat, build.drag, *rests, probes, BAND, tolerance, used,
+        build.fixed, build.absorbing, build.coat, build.drag, build.held, build.tension,
+        *rests, probes, BAND, tolerance, used,
         versions(), *read,
     )  # fmt: skip
 

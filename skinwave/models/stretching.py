@@ -63,6 +63,8 @@ def sheet_only(body: Body, model: str) -> None:
             f"{body.solid.fast_modulus:g} Pa; leave them out, or use --model fem, fem-harmonic "
             "or fem-transient"
         )
+    if body.mounting.is_curled:
+        raise ValueError(f"{model} is for a flat sheet, not a curled one; use --model fem")
     if body.placement.is_tilted:
         raise ValueError(
             f"{model} is for a sheet that lies across the beam, not a tilted one; leave out its "
@@ -111,8 +113,9 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
     return fem.finite_strain(
         made.mesh,
         made.material,
-        fixed=made.fixed,
+        fixed=made.constraints,
         membrane=missing if missing.thickness > 1e-9 * body.depth else None,
+        tension=made.tension,
     )
 
 

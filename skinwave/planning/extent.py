@@ -8,7 +8,9 @@ from simple_model.focus import spot_width
 from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.coat import AT, layer_name
 from skinwave.bodies.coat import coat as coat_of
+from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import air_mass
+from skinwave.models.plate_modes import middle_compliance
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
 
@@ -34,7 +36,11 @@ def symmetry(scene: Scene) -> str:
         return ""
     path = scene.tacton.trajectory
     path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
-    return "".join(a for a, x in zip("xy", path_points.T, strict=True) if np.abs(x).max() < 1e-9)
+    return "".join(
+        axis
+        for axis, x in zip("xy", path_points.T, strict=True)
+        if np.abs(x).max() < 1e-9 and axis in scene.body.mounting.symmetry
+    )
 
 
 def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[PlanRow]]:
@@ -126,10 +132,15 @@ def left_out(scene: Scene, highest: float) -> list[PlanRow]:
 
 
 def mean_sag(scene: Scene) -> float:
-    """Deflection in metre of a clamped sheet's middle under its mean load, if applied there.
+    """Linear deflection in metre of a held sheet's middle under its mean load, if applied there.
 
-    0.0056 F a^2 / D of a square (Timoshenko and Woinowsky-Krieger 1959, table 37).
+    0.0056 F a^2 / D of a clamped square (Timoshenko and Woinowsky-Krieger 1959, table 37); of other
+    supports, and of orthotropic or stretched sheets, by the modes of the plate.
     """
     body = scene.body
     force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
-    return float(0.0056 * force * min(body.width, body.height) ** 2 / body.bending_stiffness)
+    if body.mounting == FRAME and body.solid.orthotropy is None:
+        sag = 0.0056 * min(body.width, body.height) ** 2 / body.bending_stiffness
+    else:
+        sag = middle_compliance(body)
+    return float(force * sag)

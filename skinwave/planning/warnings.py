@@ -8,6 +8,7 @@ from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.focus import spot_width
 from simple_model.quantities import DISPLACEMENT
+from skinwave.bodies.sheet import tension
 from skinwave.models import named
 from skinwave.planning.estimates import mean_gain, response_spectrum
 from skinwave.planning.extent import mean_sag
@@ -111,9 +112,13 @@ def damping_misfit(
     """
     if not any(solid.loss_factor for _, solid in scene.body.strata):
         return ()
-    by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND)
-    w = 2 * np.pi * np.maximum(frequencies, 1e-9)
-    ratio = by_mass / w + by_stiffness * w
+    stretched = tension(scene.body)
+    w, share = 2 * np.pi * np.maximum(frequencies, 1e-9), np.ones(len(frequencies))
+    known = stretched.share if stretched else None
+    if known:
+        share = known(np.maximum(w, 2 * np.pi))
+    by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND, known)
+    ratio = by_mass / w / share + by_stiffness * w
     heard = (frequencies > 0) & (np.sqrt(shares.max(axis=1)) > tolerance)
     beyond = heard & (abs(ratio - 1) > LOSS_ERROR)
     if not beyond.any():

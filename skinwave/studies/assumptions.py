@@ -51,16 +51,17 @@ def droppable(scene: Scene) -> tuple[str, ...]:
     Raises
     ------
     ValueError
-        If the scene has no body.
+        If the scene has no body, or one whose directions differ, without a wavenumber integral.
     """
     body, path = scene.body, scene.tacton.trajectory
     if not body.of_kind.discretise:
         raise ValueError("a scene without a body keeps every assumption; give it one")
+    body.of_kind.check_exact(body)
     sheet, slab, solid = body.of_kind.is_plate, body.of_kind.is_layer, body.solid
     kept = {
         "little loss": slab and solid.has_loss,
         "viscous loss": slab and solid.fast_modulus > 0,
-        "vacuum": sheet,
+        "vacuum": sheet and body.mounting.is_frame,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
         "one material": slab
@@ -92,9 +93,13 @@ def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
     """
     if name == "sinc^2 profile":
         return "main lobe only" not in names
-    body, infinite = scene.body, replace(scene.body, sides="absorbing")
-    flat = body.of_kind.is_layer and "flat" not in names
-    return name != "laterally-infinite" or (flat and infinite != body and infinite.is_held)
+    if name != "laterally-infinite":
+        return True
+    body = scene.body
+    if not body.of_kind.is_layer or "flat" in names:
+        return False
+    infinite = replace(body, sides="absorbing")
+    return infinite != body and infinite.is_held
 
 
 def relaxed(

@@ -6,6 +6,7 @@ import numpy as np
 
 from fem.materials import Material
 from simple_model import MovingPressure, Tacton
+from skinwave.bodies.mounting import FRAME
 from skinwave.models import named
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
@@ -110,6 +111,8 @@ def levels_of(tacton: Tacton) -> list[str]:
 def extent(body: Body) -> str:
     """Kind, size and boundary conditions of a body."""
     size = body.of_kind.words(body)
+    if body.mounting != FRAME:
+        return f"{size}, {body.mounting.words}"
     return f"{size}, base {body.base}, sides {body.sides}" if body.of_kind.discretise else size
 
 
@@ -143,10 +146,16 @@ def above(body: Body) -> str:
 
 
 def _material(solid: Material) -> str:
-    text = (
-        f"density {solid.density:g} kg/m3, shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
-        f"Poisson's ratio {solid.poisson:g}, "
-    )
+    text = f"density {solid.density:g} kg/m3, "
+    if (along := solid.orthotropy) is None:
+        text += f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
+        text += f"Poisson's ratio {solid.poisson:g}, "
+    else:
+        text += (
+            f"Young's moduli {along.young_x / 1e9:.3g} and {along.young_y / 1e9:.3g} GPa along x "
+            f"and y, shear modulus {along.plane_stress[2, 2] / 1e9:.3g} GPa, Poisson's ratio "
+            f"{along.poisson_xy:g}, "
+        )
     if solid.law is not None:
         return text + getattr(solid.law, "words", "a complex modulus of its own")
     text += f"viscosity {solid.viscosity:g} Pa s"

@@ -72,6 +72,7 @@ MANY = 264  # knots, of which every second spans the same pressures
 NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 # As in `skinwave.steps`; a body that is cached begins with the third.
 STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.15, "reduce": 0.7, "read the surface": 0.05}
+SHEET_CELLS = 40  # along the shorter side of a large sheet, at most
 KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
 
 
@@ -264,6 +265,8 @@ def _steady(pressure: MovingPressure) -> MovingPressure:
 def _assembled(body: Body, progress: Progress) -> tuple[Any, Any]:
     progress("mesh", 0.0)
     size, body = body.of_kind.interactive_size, relaxing(body, FIT_TOLERANCE)
+    if body.of_kind.is_plate:
+        size = max(size, min(body.width, body.height) / SHEET_CELLS)
     made = build(body, size if body.of_kind.is_plate else min(size, body.depth))
     progress("assemble", 0.0)
     return made, operators(made)

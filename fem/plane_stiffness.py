@@ -1,0 +1,108 @@
+"""Stiffness of a sheet beyond that of an isotropic solid: orthotropy, and in-plane tension.
+
+    K_ab,ij += int (Q - Q_iso)_kl,mn N_a,l N_b,n dV       on the in-plane strains alone
+    K_ab,ij += n_i n_j int (T_k / h) N_a,k N_b,k dV       k along the sides x and y of the sheet
+
+Plane stress relaxes the stress across the sheet with D_zz and D_z,kl alone, which are those of the
+isotropic mean: so that Q is the plane stress stiffness of the sum whatever that mean is, and the
+sum is positive where Q is. Bending stiffnesses are int Q z^2 dz, for all directions alike. The
+tension acts on the slopes of the normal displacement alone: a thicker sheet of the same bending
+stiffness is so much softer in its plane that the tension would bend it otherwise. (Reddy, Mechanics
+of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from fem.geometry import gradient_products
+from fem.materials import Material
+from fem.sparsity import UPPER, SparsityPattern, from_components
+from meshes import TetMesh
+from meshes.tetmesh import Floats
+
+SIDES = np.eye(3)[:2]  # unit vectors (2, 3) along the sides x and y of a sheet that lies flat
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tension:
+    """Uniform in-plane tension of a sheet, `x` and `y` in N/m along its sides.
+
+    It has no loss. `share`, if given, is the elastic share (f,) of the stiffness of bending waves
+    at angular frequencies (f,) in rad/s, which the damping is fitted to.
+    """
+
+    x: float
+    y: float
+    share: Callable[[Floats], Floats] | None = None
+
+
+def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
+    """Plane stress stiffness (3, 3) in Pa of each orthotropic material, by its index, less that of
+    its isotropic mean.
+    """
+    return {
+        m: solid.plane_stress - replace(solid, orthotropy=None).plane_stress
+        for m, solid in enumerate(materials)
+        if solid.orthotropy is not None
+    }
+
+
+def orthotropic_stiffness(
+    mesh: TetMesh, pattern: SparsityPattern, added: Floats, axes: Floats
+) -> sparse.csr_array:
+    """Stiffness matrix of in-plane strains.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    pattern : SparsityPattern, of the elements
+    added : (3, 3) float, Pa, for the strains xx, yy and 2 xy
+    axes : (2, 3) float, unit vectors along x and y of the sheet
+
+    Returns
+    -------
+    (3 n, 3 n) sparse, N/m
+    """
+    x, y = axes
+    # 2 u_(x,y) = y . grad u . x + x . grad u . y
+    strains = np.array([np.outer(x, x), np.outer(y, y), np.outer(x, y) + np.outer(y, x)])
+    by_strain = strains.reshape(3, 9)
+    tensor = (by_strain.T @ added @ by_strain).reshape(3, 3, 3, 3)  # (i, k, j, l)
+
+    def blocks() -> Iterator[tuple[slice, Floats]]:
+        for slab, H in gradient_products(mesh):
+            found = [np.einsum("kl,ekalb->eab", tensor[i, :, j], H) for i, j in UPPER]
+            yield slab, np.array(found)
+
+    return from_components(pattern, pattern.sum(blocks(), 6))
+
+
+def tension_stiffness(
+    mesh: TetMesh, pattern: SparsityPattern, tension: Tension, axes: Floats
+) -> sparse.csr_array:
+    """Geometric stiffness of a uniform in-plane tension on the normal displacement of a sheet.
+
+    Parameters
+    ----------
+    mesh : TetMesh, of one thickness
+    pattern : SparsityPattern, of the elements
+    tension : Tension
+    axes : (2, 3) float, unit vectors along x and y
+
+    Returns
+    -------
+    (3 n, 3 n) sparse, N/m
+    """
+    normal = np.cross(*axes)
+    stress = axes.T @ np.diag([tension.x, tension.y]) @ axes / np.ptp(mesh.points @ normal)
+    outer = np.outer(normal, normal)
+
+    def blocks() -> Iterator[tuple[slice, Floats]]:
+        for slab, H in gradient_products(mesh):
+            scalar = np.einsum("kl,ekalb->eab", stress, H)
+            yield slab, np.array([outer[i, j] * scalar for i, j in UPPER])
+
+    return from_components(pattern, pattern.sum(blocks(), 6))

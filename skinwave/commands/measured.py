@@ -1,0 +1,69 @@
+"""Inspect a measurement: duration, rate, places, lines, noise floor, mains hum, clipping, lacks."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skinwave.commands.common import add_output, summarise
+
+if TYPE_CHECKING:
+    from skinwave.measurements.inspection import Inspection
+
+SIGNS = {"in": 1, "out": -1}
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """Declare the command-line options."""
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help=".csv .tsv .npz .wav .mat .uff .f32"
+    )
+    add_reading(parser)
+    parser.add_argument(
+        "--false-alarm", type=float, default=0.01, metavar="P",
+        help="probability that noise alone has any line (default: 0.01)",
+    )  # fmt: skip
+    add_output(parser)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Options of what a file does not say."""
+    parser.add_argument("--quantity", default="", metavar="NAME",
+                        help="displacement, velocity or acceleration")  # fmt: skip
+    parser.add_argument("--unit", default="", metavar="UNIT", help='mm/s, um, g, or "20 mm/s" of 1')
+    parser.add_argument("--places", metavar="XY", help='places in mm, "0,0 5,0", or a file')
+    parser.add_argument("--positive", choices=tuple(SIGNS), help="into the body or out of it")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
+    parser.add_argument("--variable", default="", metavar="NAME", help="array of a file of several")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; the exit code."""
+    from skinwave.measurements.inspection import inspect
+    from skinwave.measurements.reading import places_of, read
+    from skinwave.measurements.summary import summary, text
+
+    measured = read(
+        options.file, quantity=options.quantity, unit=options.unit,
+        places=places_of(options.places) if options.places else None,
+        sign=SIGNS[options.positive] if options.positive else None,
+        rate=options.rate, variable=options.variable,
+    )  # fmt: skip
+    found = inspect(measured, alarm=options.false_alarm)
+    told = summary(found)
+    said = text(found)
+    if options.out:
+        _write(options, found)
+        told["out"] = str(options.out)
+        said += f"\nopen {options.out}/index.html"
+    summarise(options, told, said)
+    return 0
+
+
+def _write(options: argparse.Namespace, found: "Inspection") -> None:
+    from skinwave import record
+    from skinwave.measurements.inspection_page import write
+    from skinwave.outputs import output_folder
+
+    with output_folder(options.out, overwrite=options.overwrite, inputs=[options.file]) as folder:
+        write(folder, found)
+        record.write(folder, record.of_command(options))

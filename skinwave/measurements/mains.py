@@ -1,0 +1,45 @@
+"""Mains hum: lines at multiples of one frequency near 50 or 60 Hz."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from skinwave.measurements.spectral_lines import SpectralLine
+
+MAINS = (50.0, 60.0)
+WANDER = 0.004  # of its frequency: how far the mains of any grid are from it
+SURE = 4.0  # standard errors
+HIGHEST = 20  # multiple
+
+
+def hum_of(lines: Sequence[SpectralLine], duration: float) -> dict[int, str]:
+    """Names of lines that are mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
+
+    It takes a line at the mains frequency, or at twice and three times it: 200, 400 and 600 Hz are
+    multiples of 50 Hz as well, and a load's own. A multiple goes with it if it is one of the found
+    mains frequency, not of 50 Hz, within its standard error and a twentieth of 1/duration.
+    """
+    found: dict[int, str] = {}
+    for mains in MAINS:
+        at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
+        first = next((n for n in (1, 2) if at[n] is not None), 0)
+        if at[1] is None and (at[2] is None or at[3] is None):
+            continue
+        line = lines[at[first]]  # type: ignore[index]
+        base, spread = line.frequency / first, line.error / first
+        for k, other in enumerate(lines):
+            n = round(other.frequency / base)
+            apart = abs(other.frequency - n * base)
+            limit = SURE * float(np.hypot(other.error, n * spread)) + 0.05 / duration
+            if 1 <= n <= HIGHEST and apart <= limit:
+                found.setdefault(k, f"mains {n} x {mains:g} Hz" if n > 1 else f"mains {mains:g} Hz")
+    return found
+
+
+def _nearest(lines: Sequence[SpectralLine], frequency: float, within: float) -> int | None:
+    """Number of the line nearest to a frequency, if it is within so many Hz."""
+    if not lines:
+        return None
+    apart = [abs(line.frequency - frequency) for line in lines]
+    k = int(np.argmin(apart))
+    return k if apart[k] <= within else None

@@ -1,0 +1,48 @@
+"""WAV: each channel a place, full scale the unit that is given."""
+
+import io
+import warnings
+from pathlib import Path
+
+import numpy as np
+from scipy.io import wavfile
+
+from meshes import reading
+from skinwave.measurements.recording import Given, Recording, nowhere
+
+LARGEST = 500_000_000  # bytes
+
+
+def read(path: Path, given: Given) -> Recording:
+    """The samples of a WAV; those that are whole numbers are fractions of full scale.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or has fewer than two samples.
+    """
+    content = reading.content(path, LARGEST)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of chunks beside the samples
+            rate, data = wavfile.read(io.BytesIO(content))
+    except Exception as error:  # whatever is made of spoilt bytes
+        said = " ".join(str(error).split())[:80]
+        raise ValueError(f"not a WAV file that can be read ({said}); export it anew") from None
+    if len(data) < 2:
+        raise ValueError(f"the WAV has {len(data)} samples; give two or more")
+    values = _of_full_scale(data.reshape(len(data), -1))
+    return Recording(
+        values=values[None],
+        rate=float(rate),
+        places=nowhere(values.shape[1]),
+    )
+
+
+def _of_full_scale(data: np.ndarray) -> np.ndarray:
+    if data.dtype == np.uint8:
+        return (data.astype(np.float64) - 128) / 128
+    if data.dtype.kind == "i":  # 24 bits are the upper ones of 32
+        return data / float(2 ** (8 * data.dtype.itemsize - 1))
+    with np.errstate(invalid="ignore"):  # of what is no number, which is refused later
+        return data.astype(np.float64)

@@ -1,0 +1,106 @@
+"""Skin velocity under a focus that draws a zigzag along the hand, by a scanning laser vibrometer.
+
+Reardon et al., Sci. Adv. 9, eadf2037 (2023), doi 10.1126/sciadv.adf2037; data by the record
+10.5281/zenodo.7686560: a .mat file a speed and direction, raw output of the vibrometer, whose
+variable y (N, M, 2) is the velocity along the laser in m/s at N places, M times, 2 repetitions.
+Places are measured one after the other, and the reference signal r tells when each began.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.signal import correlate
+
+from simple_model.trajectory import Floats
+from skinwave.measurements import named
+from skinwave.measurements.recording import Recording, nowhere
+
+SOURCE = "https://zenodo.org/records/7686560"
+LARGEST_HAND = 3.0  # of the spread of places: beyond it these are in mm, not in m
+LEAST_LEFT = 0.5  # of the samples, after what is not common to all places is cut off
+
+
+def fits(arrays: Mapping[str, Any]) -> bool:
+    """Whether arrays by name are of this set: y (N, M, 2) and a reference r."""
+    y = arrays.get("y")
+    return y is not None and np.ndim(y) == 3 and np.shape(y)[2] == 2 and "r" in arrays
+
+
+def recording(arrays: Mapping[str, Any]) -> Recording:
+    """The recording, its places aligned in time by the reference where each has its own.
+
+    Raises
+    ------
+    ValueError
+        If y holds no real numbers.
+    """
+    y = np.asarray(arrays["y"])
+    if y.dtype.kind not in "fiu" or not y.size:
+        raise ValueError(f"y holds no real numbers; download the file anew from {SOURCE}")
+    values = np.transpose(y, (2, 1, 0)).astype(np.float64)
+    reference = _references(np.asarray(arrays["r"]), y.shape)
+    values, drive, said = _aligned(values, reference)
+    times = named.vector(arrays, named.TIMES)
+    rate = named.rate(arrays)
+    if np.isnan(rate) and len(times) > 1:
+        rate = (len(times) - 1) / float(np.ptp(times))
+    return Recording(
+        values=values, rate=rate, quantity="velocity", unit="m/s", places=_places(arrays, len(y)),
+        drive=drive,
+        remarks=("velocity along the laser, taken as normal to the skin", said),
+    )  # fmt: skip
+
+
+def _references(r: np.ndarray, shape: tuple[int, ...]) -> Floats:
+    """Reference signals (2, M, N), (M,) if there is one for all, or none."""
+    if r.dtype.kind not in "fiu":
+        return np.empty(0)
+    if r.shape == shape:
+        return np.transpose(r, (2, 1, 0)).astype(np.float64)
+    if r.shape == shape[:2]:
+        return np.repeat(r.T[None], 2, axis=0).astype(np.float64)
+    return r.ravel().astype(np.float64) if r.size == shape[1] else np.empty(0)
+
+
+def _aligned(values: Floats, reference: Floats) -> tuple[Floats, Floats, str]:
+    """Values (r, t, p) from where the reference of each begins, that reference, and a sentence."""
+    if reference.ndim < 3:
+        return values, reference, "places are as the file has them, not aligned in time"
+    lags = delays(reference)
+    least, most = int(lags.min()), int(lags.max())
+    left = values.shape[1] - (most - least)
+    if left < LEAST_LEFT * values.shape[1]:
+        said = f"places are not aligned: their references lie up to {most - least} samples apart"
+        return values, np.empty(0), said
+    begin = lags - least
+    cut = begin[:, None, :] + np.arange(left)[None, :, None]
+    moved = np.take_along_axis(values, cut, axis=1)
+    drive = np.take_along_axis(reference, cut, axis=1)[0, :, 0]
+    said = f"places aligned by the reference, by up to {most - least} samples, to half a sample"
+    return moved, drive, said
+
+
+def delays(reference: Floats) -> np.ndarray:
+    """Delay (r, p) in samples of each reference (r, t, p) behind the first, where their
+    cross-correlation is largest.
+    """
+    centred = reference - reference.mean(axis=1, keepdims=True)
+    n = centred.shape[1]
+    found = np.zeros((centred.shape[0], centred.shape[2]), int)
+    for r, p in np.ndindex(*found.shape):
+        match = correlate(centred[r, :, p], centred[0, :, 0], method="fft")
+        found[r, p] = int(np.argmax(match)) - (n - 1)
+    return found
+
+
+def _places(arrays: Mapping[str, Any], count: int) -> Floats:
+    """Places (p, 2) in metre of the point map; nan where there is none."""
+    for name, found in arrays.items():
+        points = np.asarray(found)
+        if name not in ("y", "r") and points.ndim == 2 and count in points.shape:
+            points = points if points.shape[0] == count else points.T
+            if points.shape[1] in (2, 3) and points.dtype.kind in "fiu":
+                spread = float(np.nanmax(np.ptp(points, axis=0), initial=0.0))
+                return points[:, :2] / (1e3 if spread > LARGEST_HAND else 1.0)
+    return nowhere(count)
