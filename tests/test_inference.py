@@ -17,6 +17,8 @@ from skinwave.inference.conclusions import conclusions, readings, sheets, togeth
 from skinwave.inference.knowledge import Share, holds, pattern, region, told, variance_share
 from skinwave.inference.page import drawings, page
 from skinwave.inference.scenes import scene_text
+from skinwave.models.plate_modes import plate_of
+from skinwave.scene_file import loads
 from skinwave.studies.paper15 import tactons
 from skinwave.sweeps import dataset
 
@@ -289,7 +291,8 @@ def test_a_search_stays_within_bounds_and_near_the_best():
 
 @pytest.mark.parametrize("support", design.SUPPORTS)
 def test_scenes_of_candidates_say_how_the_sheet_is_held(support):
-    written = tomllib.loads(scene_text(SMALL | {"support": support}))
+    text = scene_text(SMALL | {"support": support})
+    written = tomllib.loads(text)
     body, plate = written["body"], design.plate(SMALL | {"support": support})
     mounting = body["mounting"]
     held = {edge for edge in ("left", "right", "front", "back") if getattr(plate, edge) != "free"}
@@ -302,4 +305,11 @@ def test_scenes_of_candidates_say_how_the_sheet_is_held(support):
     assert body["thickness_mm"] * 780e-3 == pytest.approx(0.080)
     assert body["material"]["young_y_pa"] == 3e9
     assert written["focus"]["drive"] == drive_laws.COMPRESSED.name
+    # The model of that name has the same plate of it.
+    found = plate_of(loads(text).body)
+    for name, value in vars(plate).items():
+        if name == "clip_radius" and not plate.clips:
+            continue
+        own = getattr(found, name)
+        assert own == (value if isinstance(value, str) else pytest.approx(np.array(value)))
     assert knowledge.value_words("two_clips") == "hung from two clips"
