@@ -25,7 +25,8 @@ class Effort:
 
     `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
     process in bytes; element size `h` in metre and time step `dt` in s, 0 where there are none;
-    SHA-256 of the `mesh`; `solver` used; `estimate` of the relative error of the reduction;
+    SHA-256 of the `mesh`; `solver` used, with so many `factorisations` of the body where these are
+    counted; `estimate` of the relative error of the reduction;
     `energy_imbalance`, relative error of the energy balance, and the share of the losses that was
     `radiated` through absorbing boundaries;
     `versions` of the software; `warnings`, sentences on where it falls short of what was asked for.
@@ -35,6 +36,7 @@ class Effort:
     dofs: int = 0
     steps: int = 0
     reduced_dofs: int = 0
+    factorisations: int = 0
     peak_memory: int = 0
     h: float = 0.0
     dt: float = 0.0

@@ -28,6 +28,8 @@ _HOMES = {
     "Agreement": "comparison",
     "compare": "comparison",
     "plan": "planning.plan",
+    "ParametricBody": "parametric",
+    "prepare": "parametric",
 }
 __all__ = sorted(_HOMES)
 

@@ -11,6 +11,7 @@ from typing import NoReturn
 import skinwave
 from skinwave import extensions
 from skinwave.commands import COMMANDS
+from skinwave.commands.common import note_central_values
 from skinwave.plain_text import printable, say
 from skinwave.processes import SAFE_PATH, ended_by_signals, environment
 from skinwave.safe_path import leave_out_working_settings
@@ -46,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
         with environment({**SAFE_PATH, **no_cache}), ended_by_signals():
+            note_central_values(options)
             return int(options.command(options))
     except KeyboardInterrupt as interrupt:
         kept = str(interrupt) or "nothing was finished"

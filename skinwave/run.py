@@ -1,10 +1,11 @@
 """Response of one model to a scene, and its lines by name."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from meshes.tetmesh import Floats
-from simple_model import LineTable, Response, Unnamed, line_table
+from simple_model import LineTable, Response, Unnamed, line_table, spectrum
 from simple_model.line_names import SAME, line_frequency
 from skinwave.scene import Scene
 
@@ -62,6 +63,16 @@ class Run:
         """Amplitudes (p,) by the names of `frequencies`, in the unit of the response."""
         return {name: self.table.amplitudes[own] for name, own in self._own.items()}
 
+    @cached_property
+    def spectrum(self) -> tuple[Floats, Floats]:
+        """Frequencies (f,) in Hz and amplitudes (f, p) of the whole response."""
+        return spectrum(self.response)
+
+    @property
+    def places(self) -> Floats:
+        """The probes (p, 2) in metre."""
+        return self.response.probes
+
     @property
     def unresolved(self) -> tuple[str, ...]:
         """Unresolved lines: too close to 0 Hz or to each other for the length of the response."""
@@ -70,13 +81,7 @@ class Run:
     @cached_property
     def _own(self) -> dict[str, str]:
         """The listed name of each name."""
-        tacton, same = self.scene.tacton, SAME / self.scene.tacton.duration
-        own = {name: name for name in self.listed}
-        for name in ASSESSED:
-            f = line_frequency(tacton, name)
-            near = [] if f is None else [n for n, g in self.listed.items() if abs(f - g) <= same]
-            own |= {name: near[0]} if near else {}
-        return own
+        return own_names(self.scene, self.listed)
 
     @property
     def is_motion(self) -> bool:
@@ -99,3 +104,14 @@ class Run:
     def is_stm(self) -> bool:
         """Whether the focus moves."""
         return self.scene.tacton.trajectory.drawing_frequency > 0
+
+
+def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:
+    """Listed names, with frequencies in Hz, by themselves and each name that claims are about."""
+    same = SAME / scene.tacton.duration
+    own = {name: name for name in listed}
+    for name in ASSESSED:
+        f = line_frequency(scene.tacton, name)
+        near = [] if f is None else [n for n, g in listed.items() if abs(f - g) <= same]
+        own |= {name: near[0]} if near else {}
+    return own

@@ -21,6 +21,7 @@ from skinwave.bodies import (
     kind_of,
     solid_of,
 )
+from skinwave.distributions import Distribution
 
 __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
@@ -81,6 +82,8 @@ class Scene:
     probes : (p, 2) positions in metre, where the surface is watched
     depth : of the probes in metre below the surface, along its normal; one, or one a probe
     quantity : name of one of `simple_model.quantities.QUANTITIES`, what the probes read
+    spreads : dotted key of a scene file and the distribution of its number about the central value,
+        which is that of the scene; `skinwave.spreads` has those of presets and of the device, too
 
     Raises
     ------
@@ -95,6 +98,7 @@ class Scene:
     probes: tuple[tuple[float, float], ...] = PROBES
     depth: float | tuple[float, ...] = 0.0
     quantity: str = DISPLACEMENT.name
+    spreads: tuple[tuple[str, Distribution], ...] = ()
 
     def __post_init__(self) -> None:
         self._check_probes()

@@ -15,6 +15,7 @@ from simple_model.choices import choose
 from simple_model.trajectory import BY_POINTS
 from skinwave.bodies import BodyKind
 from skinwave.bodies.parts import check_material
+from skinwave.distributions import Distribution, parent_of, with_spreads, without_spreads
 from skinwave.material_file import with_tables
 from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
 from skinwave.scene_keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
@@ -37,7 +38,7 @@ def read(path: str | Path) -> Scene:
     """
     text = content(path)
     try:
-        scene = _scene(parsed(text, Path(path).parent))
+        scene = from_table(parsed(text, Path(path).parent))
         if scene.body.file:  # is named from where the scene is
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
@@ -67,7 +68,7 @@ def content(path: str | Path) -> str:
 
 def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
-    return _scene(parsed(text))
+    return from_table(parsed(text))
 
 
 def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
@@ -90,7 +91,9 @@ def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
     return renamed(with_tables(table, folder) if folder else table)
 
 
-def _scene(table: dict[str, Any]) -> Scene:
+def from_table(table: dict[str, Any]) -> Scene:
+    """The scene of a table by a scene file's keys; raises a ValueError as `loads` does."""
+    table, spreads = without_spreads(table)
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
     preset, table = _preset(table)
     top = checked("scene", table, sections)
@@ -103,11 +106,25 @@ def _scene(table: dict[str, Any]) -> Scene:
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
     )
-    return Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
+    scene = Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
+    return _with_spreads(scene, spreads) if spreads else scene
+
+
+def _with_spreads(scene: Scene, spreads: dict[str, Distribution]) -> Scene:
+    complete = to_table(scene)
+    for key in spreads:
+        if parent_of(complete, key)[0] is None:
+            raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
+    return replace(scene, spreads=tuple(sorted(spreads.items())))
 
 
 def dumps(scene: Scene) -> str:
     """The complete scene as TOML; `loads` gives it back."""
+    return tomli_w.dumps(to_table(scene))
+
+
+def to_table(scene: Scene) -> dict[str, Any]:
+    """The complete scene by a scene file's keys; `from_table` gives it back."""
     tacton, path, pressure, body = (
         scene.tacton,
         scene.tacton.trajectory,
@@ -135,7 +152,7 @@ def dumps(scene: Scene) -> str:
         del table["placement"]
     for key in _keys_of_kinds() - set(body.of_kind.keys):
         table["body"].pop(key, None)
-    return tomli_w.dumps(table)
+    return with_spreads(table, scene.spreads)
 
 
 def unused(tacton: Tacton) -> set[str]:

@@ -33,8 +33,9 @@ REFUSED = {
     r"\bgives? way\b": "compliance, deflects",
     r"\bfelt\b": "above threshold, sensation level",
     r"\bunknowns\b": "degrees of freedom (dofs)",
-    r"\bprepare[ds]?\b|\bpreparing\b": "reduced body, offline stage",
-    r"\banswer(s|ed|ing)?\b": "response",
+    # After a dot it is a name, as skinwave.prepare.
+    r"(?<!\.)\bprepare[ds]?\b|\bpreparing\b": "reduced body, offline stage",
+    r"(?<!\.)\banswer(s|ed|ing)?\b": "response",
     r"upon every other\b": "dense added-mass operator",
 }
 FIRST = re.compile(r"(What|Which|Of)\b")

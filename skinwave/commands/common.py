@@ -2,9 +2,11 @@
 
 import argparse
 import json
+import re
 import sys
+import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,6 +89,30 @@ def told(response: "Response") -> dict[str, Any]:
         "expected_error": error if isfinite(error) else None,
         "warnings": list(response.effort.warnings),
     }
+
+
+SPREAD = re.compile(r"value\s*=")  # without which a scene file has none
+
+
+def note_central_values(options: argparse.Namespace) -> None:
+    """Say once that a command takes the central values of a scene's uncertain numbers, if it does.
+
+    A file that cannot be read is the command's to refuse.
+    """
+    path, name = getattr(options, "scene", None), options.command_name
+    samples = name == "run" and options.samples is not None
+    if samples or name == "plan" or not isinstance(path, Path) or not path.is_file():
+        return
+    if getattr(options, "quiet", False):
+        return
+    from skinwave.scene_file import content, read
+
+    with warnings.catch_warnings(), suppress(ValueError):
+        warnings.simplefilter("ignore")
+        if SPREAD.search(content(path)) and (spreads := read(path).spreads):
+            keys = ", ".join(key for key, _ in spreads)
+            say(f"skinwave: central values are taken of {keys}; skinwave run --samples takes their "
+                "spread", sys.stderr)  # fmt: skip
 
 
 def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:

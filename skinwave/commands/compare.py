@@ -9,6 +9,7 @@ from skinwave.commands.common import add_mesh, add_output, metre, progress_of, s
 
 if TYPE_CHECKING:
     from skinwave.scene import Body
+    from skinwave.studies.measured_study import Measured
 
 TITLE = "The paper's 15 Tactons: point kernel, {}"
 
@@ -25,6 +26,18 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--unit", default="m", help="of that file: m (default), cm, mm, um or in")
     parser.add_argument("--up", default="+z", help="its axis that points to the device")
+    parser.add_argument(
+        "--measured", type=Path, metavar="FILE", help="a measurement of that scene to compare with"
+    )
+    parser.add_argument(
+        "--delay",
+        type=float,
+        metavar="MS",
+        help="of the record behind the models (default: fitted)",
+    )
+    parser.add_argument(
+        "--gain", type=float, metavar="G", help="of the record over the body (default: fitted)"
+    )
     add_mesh(parser)
     add_output(parser)
 
@@ -38,15 +51,19 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene import with_body
     from skinwave.scene_file import read
     from skinwave.studies import paper15
+    from skinwave.studies.measured_runs import at_measured
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)
     asked = scene
     bodies = _chosen_body(options) if options.body else None
+    measured = _measured(options)
     if scene is None:
         scenes = paper_scenes(bodies)
     else:
+        if measured:
+            scene = at_measured(scene, measured.measurement)
         for body in (bodies or {}).values():
             scene = with_body(scene, body)
         scenes = own_scenes(scene, folder_name(scene.name))
@@ -55,6 +72,7 @@ def run(options: argparse.Namespace) -> int:
     inputs = [] if paper else [options.scene]
     inputs += [body.file for body in (bodies or {}).values()]
     inputs += [scene.body.file] if scene else []
+    inputs += [options.measured] if options.measured else []
     with (
         output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder,
         progress_of(options) as progress,
@@ -63,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
             scenes, folder, progress,
             title=TITLE.format(against) if scene is None else scene.name,
             command=_again(options),
-            h=metre(options.h), solver=options.solver,
+            h=metre(options.h), solver=options.solver, measured=measured,
         )  # fmt: skip
         record.write(folder, record.of_command(options), scene=asked)
     warn(outcome.warnings)
@@ -93,9 +111,34 @@ def _again(options: argparse.Namespace) -> str:
     words = ["--body", options.body] if options.body else []
     if options.body and Path(options.body).is_file():
         words += ["--unit", options.unit, "--up", options.up]
+    for name in ("measured", "delay", "gain"):
+        if (given := getattr(options, name)) is not None:
+            words += [f"--{name}={given}"]
     if options.h:
         words += ["--element-size", f"{options.h:g}"]
     return shlex.join(["skinwave", "compare", options.scene, *words])
+
+
+def _measured(options: argparse.Namespace) -> "Measured | None":
+    """The measurement to compare with, if there is one."""
+    if options.measured is None:
+        if options.delay is not None or options.gain is not None:
+            raise ValueError("--delay and --gain are of a measurement; give --measured FILE, too")
+        return None
+    if options.scene == "paper-15":
+        raise ValueError("--measured is of one scene, and paper-15 has 15; name its scene file")
+    from skinwave.measurements.reading import read
+    from skinwave.studies.measured_study import Measured
+
+    delay = None if options.delay is None else options.delay / 1e3
+    try:
+        found = read(options.measured)
+    except ValueError as error:
+        raise ValueError(
+            f"{error}; `skinwave measured {options.measured} --out DIR` takes such options, and "
+            "writes DIR/measurement.npz, which says all"
+        ) from None
+    return Measured(measurement=found, delay=delay, gain=options.gain)
 
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":

@@ -19,9 +19,13 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from dataclasses import asdict, replace
 
+    from skinwave.planning.budget import mesh_row
     from skinwave.scene_file import read
 
-    required = required_plan(options, read(options.scene))
+    scene = read(options.scene)
+    required = required_plan(options, scene)
+    row = mesh_row(replace(scene, body=required.body), required.h, required.error)
+    required = replace(required, rows=(*required.rows, row))
     if options.json:
         table = asdict(replace(required, prepared=None))
         say(json.dumps({key: value for key, value in table.items() if key != "prepared"}))

@@ -3,7 +3,7 @@
 import argparse
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from skinwave.commands.common import (
     add_mesh,
@@ -18,6 +18,9 @@ from skinwave.commands.common import (
     warn,
 )
 
+if TYPE_CHECKING:
+    from skinwave.run import Run
+
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
@@ -27,6 +30,11 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="of Dask workers that share fem-harmonic's lines"
     )
+    parser.add_argument(
+        "--samples", type=int, metavar="N",
+        help="samples of the scene's uncertain numbers, for bands and percentiles",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="of the samples")
     add_output(parser)
 
 
@@ -38,9 +46,13 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene import body_name
     from skinwave.scene_file import read
     from skinwave.simulation import follow
+    from skinwave.spreads import spreads_of
     from skinwave.studies.study_page import write_single
+    from skinwave.uncertainty.sampling import check
 
     scene = read(options.scene)
+    if options.samples is not None:
+        check(spreads_of(scene), options.samples, options.seed)
     out = options.out or Path(f"{options.scene.stem}-out")
     with output_folder(
         out, overwrite=options.overwrite, inputs=[options.scene, scene.body.file]
@@ -53,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
             )  # fmt: skip
         warn(w for w in response.effort.warnings if w not in required.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
-        write_single(folder, run)
+        more = _uncertainty(options, run, required.h, folder) if options.samples else []
+        write_single(folder, run, more)
         record.write(folder, record.of_command(options), scene=scene, response=response)
     summary = {
         "out": str(out),
@@ -65,6 +78,22 @@ def run(options: argparse.Namespace) -> int:
     }
     summarise(options, summary, f"{response.model}: wrote {out}/index.html")
     return 0
+
+
+def _uncertainty(
+    options: argparse.Namespace, run: "Run", h: float | None, folder: Path
+) -> list[str]:
+    """Bands over samples of the uncertain numbers: their tables in the folder, parts of a page."""
+    from skinwave.effort import usable_cores
+    from skinwave.uncertainty.report import uncertainty_of, write
+
+    with progress_of(options) as progress:
+        known = uncertainty_of(
+            run.scene, options.samples, run.model, progress,
+            h=h or metre(options.h), solver=options.solver, seed=options.seed,
+            workers=usable_cores(),
+        )  # fmt: skip
+    return write(folder, known)
 
 
 def _mapped(scheduler: str | None) -> AbstractContextManager[Any]:

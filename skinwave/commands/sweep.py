@@ -32,10 +32,14 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vary", action="extend", nargs="+", metavar="KEY=VALUES", required=True,
         help="tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, body=skin-slab,palm; "
-        "start:stop of lhs",
+        "start:stop or normal(25e3,0.3), lognormal, factor, uniform, triangular of lhs and sobol",
     )  # fmt: skip
-    parser.add_argument("--design", default="factorial", help="factorial (default), zip or lhs")
-    parser.add_argument("--samples", type=int, metavar="N", help="runs of a Latin hypercube")
+    parser.add_argument(
+        "--design", default="factorial", help="factorial (default), zip, lhs or sobol"
+    )
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="runs of lhs; rows of each matrix of sobol"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of a Latin hypercube")
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     parser.add_argument(
@@ -53,24 +57,30 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
+    from importlib.metadata import version
+
     from skinwave import record
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
     from skinwave.sweeps.sweep import ModelOptions, sweep
-    from skinwave.sweeps.variation import cases, combinations, parse
+    from skinwave.sweeps.variation import SAMPLED, cases, combinations, parse
+    from skinwave.uncertainty import of_sweep
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
     variations = [parse(text) for text in options.vary]
     combined = combinations(variations, options.design, options.samples, options.seed)
     wanted = cases(options.scene, combined)
+    is_sampled = options.design in SAMPLED and not any(each.values for each in variations)
     model_options = ModelOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
     out = options.out or Path(f"{options.scene.stem}-sweep")
     if options.csv:
         dataset.refuse_changed(out, dataset.CSV)  # now, not when all is computed
+    if is_sampled:
+        of_sweep.refuse_changed(out)
     with _progress(options, len(wanted)) as progress:
         found = sweep(
             wanted, out, model_options, progress, scheduler=options.scheduler,
@@ -78,6 +88,14 @@ def run(options: argparse.Namespace) -> int:
         )  # fmt: skip
     if options.csv and found.planned > found.missing:
         dataset.write_csv(out, dataset.read(out))
+    sampled: list[str] = []
+    if is_sampled and found.done + found.found and not found.missing:
+        names = {case.name(version("skinwave"), model_options): case for case in wanted}
+        has_indices = options.design == "sobol"
+        rows = of_sweep.in_order(dataset.read(out), names, combined)
+        sampled = of_sweep.write(
+            out, of_sweep.Sampled(rows=rows, variations=variations, has_indices=has_indices)
+        )
     summary = {
         "out": str(out),
         "planned": found.planned,
@@ -86,11 +104,12 @@ def run(options: argparse.Namespace) -> int:
         "failed": found.failed,
         "missing": found.missing,
         "seconds": round(found.seconds, 1),
+        "files": sampled,
     }
     sentence = (
         f"{found.done} of {found.planned} runs done in {found.seconds:.0f} s, {found.failed} "
         f"failed, {found.found} were there; {out}/{dataset.ROWS} is the table"
-    )
+    ) + (f", {out}/{of_sweep.PAGE} its percentiles" if sampled else "")
     summarise(options, summary, sentence)
     if found.missing:
         why = "interrupted" if found.interrupted else "workers were killed"

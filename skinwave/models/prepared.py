@@ -100,7 +100,7 @@ def prepare(
     build = meshed(body, h, clock, silent, symmetry)
     outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
-    name = _entry_name(body, build, probes, solver, tolerance, outputs=own)
+    name = entry_name(body, build, probes, solver, tolerance, outputs=own)
     with clock("read from cache"):
         entry = cache.load(name)
     size, report = h or default_size(body), progress or silent
@@ -113,7 +113,7 @@ def prepare(
     return replace(found, reading=reading, solids=solids)
 
 
-def _entry_name(
+def entry_name(
     body: Body,
     build: Build,
     probes: Floats,
@@ -122,7 +122,19 @@ def _entry_name(
     *,
     outputs: sparse.csr_array | None,
 ) -> str:
-    """Cache key of everything that a reduced body depends on."""
+    """Cache key of everything that a reduced body depends on.
+
+    Parameters
+    ----------
+    body : Body
+    build : its mesh
+    probes, solver, tolerance : as of `prepare`
+    outputs : (p c, 3 n) sparse, what the probes read; None if that is normal motion at the surface
+
+    Returns
+    -------
+    str
+    """
     mesh = build.mesh
     # A file may call other facets of the same mesh its top, or fix others.
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]

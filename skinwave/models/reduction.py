@@ -103,7 +103,7 @@ def reduce_body(
         branches=model.branches, load=P.T @ model.basis, points=points,
         effort=Effort(
             dofs=len(operators.free), reduced_dofs=len(model.K), solver=model.solver,
-            estimate=model.estimate,
+            factorisations=1, estimate=model.estimate,
         ),
     )  # fmt: skip
     return reduced, model

@@ -24,9 +24,10 @@ COLOURS = {
     **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": "#D55E00",
     "skin-slab": "#0072B2",
+    "measured": "#CC79A7",
 }
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s"}
+MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 REPORT = STYLES["report"]
@@ -135,7 +136,8 @@ def label(column: str) -> str:
 
 def answered(run: Run) -> str:
     """The name of a body and of the model of its response."""
-    return label(run.column) if run.body == "none" else f"{label(run.body)} ({run.model})"
+    alone = run.body in ("none", run.model)
+    return label(run.column) if alone else f"{label(run.body)} ({run.model})"
 
 
 def sized(value: float, unit: str, digits: int = 3) -> str:
@@ -156,7 +158,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     for run in runs:
         style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        scale = measured(_largest(run), run.response.record)
+        scale = measured(_largest(run, runs), run.response.record)
         labels.append(answered(run) + f", 1 = {scale}" * scales)
     kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
     if kinds:
@@ -168,26 +170,31 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
     figure.legend(handles, labels, loc=where, ncols=ncols, frameon=False)
 
 
-def _shown(run: Run) -> slice:
+def _shown(run: Run, runs: list[Run]) -> slice:
+    """The part that is shown: the last that all have, whose records may begin at other times."""
     times = run.response.times
-    return slice(max(0, len(times) - 1 - round(SHOWN / times[1])), None)
+    end = min(float(other.response.times[-1]) for other in runs)
+    if end - SHOWN < times[0]:
+        end = max(float(times[0]) + SHOWN, end)
+    last = int(np.searchsorted(times, end + 0.5 * (times[1] - times[0])))
+    return slice(max(0, last - 1 - round(SHOWN / (times[1] - times[0]))), last)
 
 
-def _largest(run: Run) -> float:
+def _largest(run: Run, runs: list[Run]) -> float:
     """Largest excursion about the mean at any probe in the part that is shown."""
-    return float(np.abs(_centred(run)).max()) or 1.0
+    return float(np.abs(_centred(run, runs)).max()) or 1.0
 
 
-def _centred(run: Run) -> Floats:
+def _centred(run: Run, runs: list[Run]) -> Floats:
     """Motion (t, p) in the part that is shown, about its mean after the start."""
     motion = run.response.values
-    return motion[_shown(run)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
+    return motion[_shown(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
 
 def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
-        centred = _centred(run)[:, p] / _largest(run)
-        times = 1e3 * run.response.times[_shown(run)]
+        centred = _centred(run, runs)[:, p] / _largest(run, runs)
+        times = 1e3 * run.response.times[_shown(run, runs)]
         ax.plot(times, centred, color=inked(run.column), lw=_width(run), zorder=_depth(run))
     ax.margins(x=0)
     ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))

@@ -9,6 +9,7 @@ from meshes import cache
 from simple_model.response import SETTLE
 from skinwave.effort import versions
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+from skinwave.planning.budget import ErrorBudget, error_budget
 from skinwave.propagation import Propagation, propagation, share_outside
 from skinwave.run import Run
 from skinwave.scene import Scene
@@ -37,6 +38,7 @@ class Shown:
     surfaces: Mapping[str, SurfaceMap] = field(default_factory=dict)
     error: float = np.nan
     shares: tuple[float, float] | None = None
+    budget: ErrorBudget | None = None
 
     @property
     def body(self) -> Run:
@@ -75,7 +77,8 @@ def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
     )
     if found[first.body.column].strongest is None:
         return first
-    return replace(first, error=_error(first.body), shares=_shares(first.body.scene))
+    error, scene = _error(first.body), first.body.scene
+    return replace(first, error=error, shares=_shares(scene), budget=error_budget(scene, error))
 
 
 def beside_kernels(run: Run) -> list[Run]:

@@ -4,17 +4,17 @@ S1 to S5 are claims about their simulation, M1 to M5 about their measurement on 
 Nothing here knows which model should fulfil which.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import spectrum
 from skinwave.numbers import decibel
 from skinwave.plain_text import csv_table
 from skinwave.run import Run
+from skinwave.studies.named_lines import NamedLines
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
 ABSENT = -120.0  # dB
@@ -46,13 +46,13 @@ def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
     resolve the lines that it is about.
     """
     groups: dict[tuple[str, str], list[Run]] = {}
-    for run in filter(_is_single, runs):
+    for run in filter(is_single, runs):
         groups.setdefault((run.body, run.model), []).append(run)
     assessed_claims = []
     for (body, model), group in groups.items():
         for claim, (kinds, assess) in CLAIMS.items():
             about = [run for run in group if (run.is_am, run.is_stm) in kinds]
-            if chosen := [run for run in about if _is_told(run, claim)]:
+            if chosen := [run for run in about if is_resolved(run, claim)]:
                 holds, value, bar, sentence = assess(chosen)
                 assessed_claims.append(
                     AssessedClaim(
@@ -72,7 +72,7 @@ def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
 Assessment = tuple[bool, float, float, str]
 
 
-def _is_single(run: Run) -> bool:
+def is_single(run: NamedLines) -> bool:
     """Whether a run is of the kind that was measured: one focus, modulated evenly throughout by
     one tone at most.
     """
@@ -84,20 +84,20 @@ def _is_single(run: Run) -> bool:
     return bool(plain and one and tacton.trajectory.shape != "recorded")
 
 
-def _is_told(run: Run, claim: str) -> bool:
+def is_resolved(run: NamedLines, claim: str) -> bool:
     """Whether the lines that a claim is about are resolved; some are about all lines."""
     if claim in NEEDED:
         return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
     return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.unresolved
 
 
-def _single_line(runs: list[Run]) -> Assessment:
+def _single_line(runs: Sequence[NamedLines]) -> Assessment:
     worst = max(rival_levels(run).max() for run in runs)
     sentence = f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM"
     return worst < ABSENT, worst, ABSENT, sentence
 
 
-def _am_harmonics(runs: list[Run]) -> Assessment:
+def _am_harmonics(runs: Sequence[NamedLines]) -> Assessment:
     second = min(_strongest(run, ["2f_AM"]) for run in runs)
     third = min(_strongest(run, ["3f_AM"]) for run in runs)
     weakest = min(second, third)
@@ -107,7 +107,7 @@ def _am_harmonics(runs: list[Run]) -> Assessment:
     return weakest > PRESENT, weakest, PRESENT, sentence
 
 
-def _drawn_lines(runs: list[Run]) -> Assessment:
+def _drawn_lines(runs: Sequence[NamedLines]) -> Assessment:
     offset = max(
         abs(_peak(run, f"{n}f_d".lstrip("1")) - n * run.scene.tacton.trajectory.drawing_frequency)
         for run in runs
@@ -117,7 +117,7 @@ def _drawn_lines(runs: list[Run]) -> Assessment:
     return offset <= ON_BIN, offset, ON_BIN, sentence
 
 
-def _same_places(runs: list[Run]) -> Assessment:
+def _same_places(runs: Sequence[NamedLines]) -> Assessment:
     names = ("f_d", "2f_d", "3f_d")
     places = np.array([[_peak(run, name) for name in names] for run in runs])
     drift = float(np.ptp(places, axis=0).max())
@@ -129,7 +129,7 @@ def _same_places(runs: list[Run]) -> Assessment:
     return drift <= ON_BIN, drift, ON_BIN, sentence
 
 
-def _pairs_only(runs: list[Run]) -> Assessment:
+def _pairs_only(runs: Sequence[NamedLines]) -> Assessment:
     drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
     weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
     sentence = (
@@ -139,7 +139,7 @@ def _pairs_only(runs: list[Run]) -> Assessment:
     return drawn < ABSENT and weakest > PRESENT, drawn, ABSENT, sentence
 
 
-def _both_multiples(runs: list[Run]) -> Assessment:
+def _both_multiples(runs: Sequence[NamedLines]) -> Assessment:
     drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
     double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
     sentence = (
@@ -149,7 +149,7 @@ def _both_multiples(runs: list[Run]) -> Assessment:
     return drawn > PRESENT, drawn, PRESENT, sentence
 
 
-def _am_highest(runs: list[Run]) -> Assessment:
+def _am_highest(runs: Sequence[NamedLines]) -> Assessment:
     worst = max(runs, key=lambda run: rival_levels(run).max())
     value = rival_levels(worst).max()
     name, probe = strongest_rival(worst)
@@ -160,7 +160,7 @@ def _am_highest(runs: list[Run]) -> Assessment:
     return value < 0, value, 0.0, sentence
 
 
-def _am_highest_measured(runs: list[Run]) -> Assessment:
+def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
     holds, value, bar, sentence = _am_highest(runs)
     beaten = [run.tacton for run in runs if rival_levels(run).max() >= 0]
     if beaten:
@@ -172,7 +172,7 @@ def _am_highest_measured(runs: list[Run]) -> Assessment:
     return holds and value < 0, value, bar, sentence
 
 
-def _much_lower(runs: list[Run]) -> Assessment:
+def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
     value = max(rival_levels(run).max() for run in runs)
     lower = sum(bool(rival_levels(run).max() < MUCH_LOWER) for run in runs)
     sentence = (
@@ -182,7 +182,7 @@ def _much_lower(runs: list[Run]) -> Assessment:
     return value < MUCH_LOWER, value, MUCH_LOWER, sentence
 
 
-def _exact_frequencies(runs: list[Run]) -> Assessment:
+def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
     offsets = [
         abs(_peak(run, name) - run.frequencies[name])
         for run in runs
@@ -195,7 +195,9 @@ def _exact_frequencies(runs: list[Run]) -> Assessment:
 
 # Whether the amplitude is modulated, and whether the focus moves, in runs that a claim is about.
 AM, STM, BOTH = (True, False), (False, True), (True, True)
-CLAIMS: dict[str, tuple[tuple[tuple[bool, bool], ...], Callable[[list[Run]], Assessment]]] = {
+CLAIMS: dict[
+    str, tuple[tuple[tuple[bool, bool], ...], Callable[[Sequence[NamedLines]], Assessment]]
+] = {
     "S1": ((AM,), _single_line),
     "S2": ((STM,), _drawn_lines),
     "S3": ((BOTH,), _pairs_only),
@@ -232,7 +234,9 @@ TEXTS = {
 }
 
 
-def _probe_levels(run: Run, names: Iterable[str], reference: str, velocity: bool = False) -> Floats:
+def _probe_levels(
+    run: NamedLines, names: Iterable[str], reference: str, velocity: bool = False
+) -> Floats:
     """(line, probe) levels in dB re a reference line at the same probe."""
     names = list(names)
     weight = {name: run.frequencies[name] if velocity else 1.0 for name in [*names, reference]}
@@ -241,36 +245,36 @@ def _probe_levels(run: Run, names: Iterable[str], reference: str, velocity: bool
     return 20 * np.log10(np.maximum(ratios, 1e-15))
 
 
-def _rivals(run: Run) -> list[str]:
+def _rivals(run: NamedLines) -> list[str]:
     """Lines that are resolved from f_AM itself."""
     f_am = run.frequencies["f_AM"]
     return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
 
 
-def rival_levels(run: Run, velocity: bool = False) -> Floats:
+def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
     """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
     return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
 
 
-def strongest_rival(run: Run) -> tuple[str, float]:
+def strongest_rival(run: NamedLines) -> tuple[str, float]:
     """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
     names = _rivals(run)
     levels = _probe_levels(run, names, "f_AM")
     line, probe = np.unravel_index(np.argmax(levels), levels.shape)
-    return names[line], 1e3 * float(np.hypot(*run.response.probes[probe]))
+    return names[line], 1e3 * float(np.hypot(*run.places[probe]))
 
 
-def _strongest(run: Run, names: list[str], reference: str = "f_AM") -> float:
+def _strongest(run: NamedLines, names: list[str], reference: str = "f_AM") -> float:
     """Level of the strongest of these lines at any probe, dB re the reference at that probe."""
     return float(_probe_levels(run, names, reference).max())
 
 
-def _peak(run: Run, line: str) -> float:
+def _peak(run: NamedLines, line: str) -> float:
     """Frequency in Hz of the spectral peak next to a line, at the probe where it is strongest.
 
     Interpolated between bins on the logarithm; infinitely far if there is no peak in reach.
     """
-    f, amplitude = spectrum(run.response)
+    f, amplitude = run.spectrum
     x = amplitude[:, int(np.argmax(run.lines[line]))]
     near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= REACH)
     if len(near) < 3:  # too short a Tacton for its spectrum to resolve

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 from skinwave import document
@@ -18,9 +18,15 @@ from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, check_motion, with_body
 from skinwave.simulation import check_options, compute
-from skinwave.studies import paper15, study_page
+from skinwave.studies import measured_page, measured_tables, paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
 from skinwave.studies.claims import evaluate, write_claims
+from skinwave.studies.measured_runs import beside, in_quantity
+from skinwave.studies.measured_study import (
+    Measured,
+    MeasuredComparison,
+    compare_measured,
+)
 from skinwave.studies.study_page import StudyOutcome
 from skinwave.surface import has_wavenumber_integral
 
@@ -57,8 +63,10 @@ def run_study(
     command: str,
     h: float | None = None,
     solver: str = "auto",
+    measured: Measured | None = None,
 ) -> StudyOutcome:
-    """Run every scene, writing each run as it is finished, then the tables and the page.
+    """Run every scene, writing each run as it is finished, then the tables and the page; with a
+    measurement beside the models, if there is one of that Tacton.
 
     An interrupt ends the runs early; those that are finished are still compared and written.
     """
@@ -70,8 +78,22 @@ def run_study(
     with helper() as aside, one_thread():
         bodies = _begun_bodies(scenes, aside, progress, h, solver)
         maps = _begun_maps(scenes, aside, progress, h, solver)
-        groups, prepared, figures = _answered(scenes, folder, aside, bodies, progress, h, solver)
-        figures["overview"] = aside.submit(study_page.overview_png, groups)
+        figures: dict[str, Future[bytes]] = {}
+        drawn: dict[str, list[Run]] = {}
+        found: list[MeasuredComparison] = []
+
+        def finished(name: str, group: list[Run], prepared: Mapping[str, Prepared]) -> None:
+            drawn[name] = group
+            if measured:
+                asked = measured.measurement.quantity
+                runs = [in_quantity(run, asked, prepared) for run in group]
+                found.append(compare_measured(measured, runs))
+                drawn[name] = beside(found[-1], runs)
+            figures[name] = aside.submit(study_page.tacton_png, name, drawn[name])
+
+        groups, prepared = _answered(scenes, folder, bodies, progress, h, solver, finished)
+        drawn = {**groups, **drawn}
+        figures["overview"] = aside.submit(study_page.overview_png, drawn)
         runs = [run for group in groups.values() for run in group]
         outcome = StudyOutcome(
             assessed_claims=evaluate(runs),
@@ -87,7 +109,10 @@ def run_study(
         first = None
         with suppress(KeyboardInterrupt):
             first = shown(groups, maps) if outcome.runs == outcome.planned else None
-        parts = study_page.page_parts(folder, groups, first, outcome, progress, figures)
+        parts = study_page.page_parts(folder, groups, drawn, first, outcome, progress, figures)
+        for comparison in found:
+            measured_tables.write_tables(folder, comparison)
+            parts[:0] = measured_page.page_parts(comparison, partial(study_page.kept, folder))
         spent = replace(
             outcome,
             seconds=time.perf_counter() - started,
@@ -169,18 +194,17 @@ def _begun_maps(
 def _answered(
     scenes: Mapping[str, Mapping[str, Scene]],
     folder: Path,
-    aside: Executor,
     bodies: Bodies,
     progress: Progress,
     h: float | None,
     solver: str,
-) -> tuple[dict[str, list[Run]], dict[str, Prepared], dict[str, Future[bytes]]]:
-    """Every run, both kernels of all Tactons first, the reduced bodies behind them, and each
-    Tacton's figure, drawn aside as soon as its runs are there.
+    finished: Callable[[str, list[Run], Mapping[str, Prepared]], None],
+) -> tuple[dict[str, list[Run]], dict[str, Prepared]]:
+    """Every run, both kernels of all Tactons first, and the reduced bodies behind them; `finished`
+    is called with each Tacton as soon as its runs are there.
     """
     groups: dict[str, list[Run]] = {}
     prepared: dict[str, Prepared] = {}
-    figures: dict[str, Future[bytes]] = {}
     every = [(name, column, scene) for name, g in scenes.items() for column, scene in g.items()]
     with suppress(KeyboardInterrupt):
         for k, (name, column, scene) in enumerate(
@@ -199,8 +223,8 @@ def _answered(
             write_run(folder / name / column, run)
             groups.setdefault(name, []).append(run)
             if len(groups[name]) == len(scenes[name]):
-                figures[name] = aside.submit(study_page.tacton_png, name, groups[name])
+                finished(name, groups[name], prepared)
             progress(f"response of {name} by {column}", (k + 1) / len(every))
     if not groups:
         raise KeyboardInterrupt
-    return groups, prepared, figures
+    return groups, prepared

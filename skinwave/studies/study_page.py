@@ -1,6 +1,6 @@
 """The page of a comparison, and that of a single run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,8 +37,8 @@ class StudyOutcome:
     peak_memory: int = 0
 
 
-def write_single(folder: Path, run: Run) -> None:
-    """The folder of one run, with its page."""
+def write_single(folder: Path, run: Run, more: Sequence[str] = ()) -> None:
+    """The folder of one run, with its page, which may have more parts before the effort."""
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
     group = beside_kernels(run) if run.is_motion else []
@@ -48,6 +48,7 @@ def write_single(folder: Path, run: Run) -> None:
         document.warnings_banner([("", run.response.effort)]),
         document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
         *map(document.paragraph, unresolved([run])),
+        *more,
         document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
         document.section("The scene", document.preformatted(dumps(run.scene))),
     ]
@@ -58,20 +59,32 @@ def write_single(folder: Path, run: Run) -> None:
 def page_parts(
     folder: Path,
     groups: Mapping[str, list[Run]],
+    drawn_runs: Mapping[str, list[Run]],
     first: Shown | None,
     outcome: StudyOutcome,
     progress: Progress,
     figures: Mapping[str, Future[bytes]],
 ) -> list[str]:
-    """Parts of index.html, and a PNG of each figure in it."""
+    """Parts of index.html, and a PNG of each figure in it.
+
+    Parameters
+    ----------
+    folder : Path
+    groups : runs by Tacton
+    drawn_runs : runs that figures show, by Tacton
+    first : the Tacton of the first screen, if there is one
+    outcome : StudyOutcome
+    progress : called with the name of the phase and the fraction done
+    figures : by Tacton and "overview", as far as they are begun
+    """
     runs = [run for group in groups.values() for run in group]
     (folder / "figures").mkdir()
 
     def drawn(figure: Figure, caption: str) -> str:
-        return _kept(folder, "propagation", png(figure), caption)
+        return kept(folder, "propagation", figure, caption)
 
     begun = not figures["overview"].cancel()
-    overview = figures["overview"].result() if begun else overview_png(groups)
+    overview = figures["overview"].result() if begun else overview_png(drawn_runs)
     parts = [
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
@@ -89,7 +102,7 @@ def page_parts(
                          *map(document.paragraph, modelled(runs))),
         document.section("How far the models agree", tables.agreement_table(groups)),
     ]  # fmt: skip
-    images = _images(groups, figures, progress)
+    images = _images(drawn_runs, figures, progress)
     pictures = [_kept(folder, n, images[n], caption(n, group)) for n, group in groups.items()]
     return [*parts, document.section("Every Tacton", *pictures)]
 
@@ -141,6 +154,11 @@ def _images(
             progress("draw", len(here) / len(groups))
             here[name] = tacton_png(name, groups[name])
     return {name: here[name] if name in here else figures[name].result() for name in groups}
+
+
+def kept(folder: Path, name: str, figure: Figure, caption: str) -> str:
+    """A figure as a file, and inside the page."""
+    return _kept(folder, name, png(figure), caption)
 
 
 def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:

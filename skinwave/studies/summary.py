@@ -154,7 +154,9 @@ def _above_threshold(found: Propagation) -> str:
 
 def _sure(shown: Shown) -> str:
     error = "The numerical error is not known"
-    if np.isfinite(shown.error):
+    if shown.budget is not None:
+        error = shown.budget.words
+    elif np.isfinite(shown.error):
         error = f"Numerical error about {_percent(shown.error)}"
     if shown.body.scene.body.of_kind.is_plate:
         text = "grammage, stiffness and support of the sheet that was measured are not published"

@@ -249,7 +249,8 @@ def _decoded(file: Any, columns: list[str], limit: int) -> Any:
     """
     import pyarrow as pa
 
-    schema = pa.schema([file.schema_arrow.field(name) for name in columns])
+    arrow = file.schema_arrow  # which is made anew each time that it is asked for
+    schema = pa.schema([arrow.field(name) for name in columns])
     if wrong := [field.name for field in schema if not _is_cell(field.type)]:
         raise OSError(f"'{wrong[0][:40]}' is of a type that no sweep has")
     said = f"unpacks to more than {UNPACKED / 1e6:,.0f} MB"

@@ -16,23 +16,40 @@ import tomli_w
 from fem.materials import PRESETS
 from meshes import reading
 from simple_model.choices import choose, meant
+from skinwave.distributions import Distribution, called, without_spreads
 from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, loads, parsed, read
 from skinwave.scene_keys import SECTIONS, renamed, write_material
+from skinwave.sweeps.saltelli import EDGE, saltelli_shares
 
-DESIGNS = ("factorial", "zip", "lhs")
+DESIGNS = ("factorial", "zip", "lhs", "sobol")
+SAMPLED = ("lhs", "sobol")  # of which --samples says how many
 MOST_RUNS = 100_000
 BODY = "body"  # the key of a whole body: the name of a preset, or a file
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """A key of a scene file, and its `values` or, for a Latin hypercube, the `bounds` of them."""
+    """A key of a scene file, and its `values` or, for designs of samples, the `bounds` of them or
+    their `distribution` about a `centre`.
+    """
 
     key: str
     values: tuple[Any, ...] = ()
     bounds: tuple[float, float] | None = None
+    distribution: Distribution | None = None
+    centre: float = 0.0
+
+    def placed(self, share: float) -> Any:
+        """Value at a share 0..1 of all: the quantile of a distribution."""
+        if self.distribution:
+            inner = min(max(share, EDGE), 1 - EDGE)
+            return float(self.distribution.quantile(self.centre, inner))
+        if self.bounds:
+            low, high = self.bounds
+            return low + share * (high - low)
+        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,17 +73,20 @@ class DesignPoint:
 
 
 def parse(text: str) -> Variation:
-    """Variation of `key=v1,v2`, `key=start:stop:n` or, within bounds, `key=start:stop`.
+    """Variation of `key=v1,v2`, `key=start:stop:n` or, within bounds, `key=start:stop`; or by a
+    distribution, as `key=normal(25e3,0.3)`.
 
     Raises
     ------
     ValueError
-        If the key is none of a scene, or there is no value.
+        If the key is none of a scene, there is no value, or no such distribution.
     """
     key, equals, right = text.partition("=")
     key = _known(key.strip())
     if not equals or not right.strip():
         raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
+    if found := called(right):
+        return Variation(key=key, centre=found[0], distribution=found[1])
     numbers = [number_in(part) for part in right.split(":")]
     if len(numbers) == 1 or None in numbers:
         return Variation(key=key, values=tuple(map(_value, _split(right))))
@@ -92,8 +112,9 @@ def combinations(
 
     Parameters
     ----------
-    design : "factorial", every value with every other; "zip", first with first; or "lhs", a Latin
-        hypercube of so many `samples` within bounds and over lists, the same for the same `seed`
+    design : "factorial", every value with every other; "zip", first with first; "lhs", a Latin
+        hypercube of so many `samples` within bounds, over lists and by distributions, the same for
+        the same `seed`; or "sobol", for Sobol' indices, with so many samples of each matrix
 
     Raises
     ------
@@ -106,11 +127,19 @@ def combinations(
         raise ValueError("nothing is varied; give --vary key=v1,v2 at least once")
     if twice := [key for key in dict.fromkeys(keys) if keys.count(key) > 1]:
         raise ValueError(f"{twice[0]} is varied twice; give all its values at once")
-    if (samples is None) == (design == "lhs"):
-        raise ValueError("--samples belongs to --design lhs, and lhs needs it; give both or none")
-    if design == "lhs":
-        return _hypercube(variations, samples or 0, seed)
+    if (samples is None) == (design in SAMPLED):
+        raise ValueError(
+            "--samples belongs to --design lhs or sobol, and lhs needs it as sobol does; give both "
+            "or none"
+        )
+    if design in SAMPLED:
+        return _sampled(variations, design, samples or 0, seed)
     for variation in variations:
+        if variation.distribution:
+            raise ValueError(
+                f"{variation.key} has a distribution, of which a {design} design takes no values; "
+                "give --design lhs or sobol, and --samples"
+            )
         if variation.bounds:
             raise ValueError(f"{variation.key}=start:stop lacks the number of values; add :n")
     lengths = [len(variation.values) for variation in variations]
@@ -146,20 +175,21 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint
     return list(found.values())
 
 
-def _hypercube(variations: Sequence[Variation], samples: int, seed: int) -> list[dict[str, Any]]:
+def _sampled(
+    variations: Sequence[Variation], design: str, samples: int, seed: int
+) -> list[dict[str, Any]]:
     from scipy.stats import qmc
 
-    _check_count(samples)
-    points = qmc.LatinHypercube(len(variations), rng=seed).random(samples)
-
-    def placed(variation: Variation, x: float) -> Any:
-        if variation.bounds:
-            low, high = variation.bounds
-            return low + float(x) * (high - low)
-        return variation.values[int(x * len(variation.values))]
-
+    d = len(variations)
+    if design == "lhs":
+        _check_count(samples)
+        points = qmc.LatinHypercube(d, rng=seed).random(samples)
+    else:
+        _check_count(samples * (d + 2))
+        points = saltelli_shares(d, samples, seed)
     return [
-        {v.key: placed(v, x) for v, x in zip(variations, point, strict=True)} for point in points
+        {v.key: v.placed(float(x)) for v, x in zip(variations, point, strict=True)}
+        for point in points
     ]
 
 
@@ -219,7 +249,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
-    keys = _flat(tomllib.loads(text))
+    keys = _flat(without_spreads(tomllib.loads(text))[0])
     for key, value in varied.items():  # a name for a number, as of a depth, is that number
         keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
     return DesignPoint(varied=varied, keys=keys, text=text, scene=scene, error=error)

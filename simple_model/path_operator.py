@@ -1,0 +1,109 @@
+"""Steady lines of one load on many bodies: its path as a linear operator on the response of a body
+to a focus at rest.
+
+`flat_body.steady_lines` interpolates g(r, w) by splines B_j(r) between distances r_j. With the
+values g_j(w) = g(r_j, w) the line at f = f_m + n f_d is, at a probe x_p,
+
+    u(f) = c sum_j g_j(f) h_nj(x_p),   h_nj = int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
+
+where h depends on the path and the probes alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from simple_model.compliance import Compliance
+from simple_model.focus import spot_width
+from simple_model.load_spectrum import Complex, load_lines, path_fourier, path_samples
+from simple_model.pressure import MovingPressure, check_lines
+from simple_model.trajectory import Floats
+from simple_model.wavenumber_integral import point_response
+
+PER_WIDTH = 6  # distances of the spline in a standard deviation of the focal spot
+FEWEST = 8  # of them
+AT_ONCE = 2**20  # values of the splines, some ten megabytes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathOperator:
+    """Load of a path on some probes.
+
+    Parameters
+    ----------
+    width : metre, standard deviation of the focal spot
+    distances : (j,) float, metre
+    frequencies : (f,) float, Hz, distinct
+    lines : (l,) int, the frequency of each line
+    orders : (l,) int, the harmonic of each line, an index of `harmonics`
+    coefficients : (l,) complex, Pa
+    harmonics : (n, p, j) complex, h of the distinct orders
+    """
+
+    width: float
+    distances: Floats
+    frequencies: Floats
+    lines: NDArray[np.int_]
+    orders: NDArray[np.int_]
+    coefficients: Complex
+    harmonics: Complex
+
+    def steady_lines(self, compliance: Compliance) -> tuple[Floats, Complex]:
+        """Frequencies (f,) in Hz and amplitudes (f, p) in metre on a body, as of
+        `flat_body.steady_lines`.
+        """
+        omega = 2 * np.pi * self.frequencies
+        g = point_response(compliance, self.distances, omega, self.width)
+        found = np.zeros((len(g), self.harmonics.shape[1]), np.complex128)
+        for order, harmonic in enumerate(self.harmonics):
+            own = self.orders == order
+            moved = self.coefficients[own, None] * (g[self.lines[own]] @ harmonic.T)
+            np.add.at(found, self.lines[own], moved)
+        return self.frequencies, found
+
+
+def path_operator(
+    pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
+) -> PathOperator:
+    """Operator of a load on probes, which may be a whole map.
+
+    Parameters
+    ----------
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre
+    threshold : of the strongest line of the load; only its lines above this are computed
+
+    Returns
+    -------
+    PathOperator
+
+    Raises
+    ------
+    ValueError
+        If the focus is not Gaussian, or its path recorded, or as `pressure.check_lines` does.
+    """
+    check_lines(pressure)
+    if pressure.profile != "gaussian" or pressure.tacton.trajectory.shape == "recorded":
+        raise ValueError(
+            "the steady lines of a path need a Gaussian focus and a path that is repeated; take "
+            "finite elements, or motion from rest"
+        )
+    load = load_lines(pressure, threshold)
+    frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
+    distinct, orders = np.unique(load.harmonics, return_inverse=True)
+    knots, width = path_samples(pressure), spot_width(pressure.height)
+    places = np.atleast_2d(np.asarray(probes, np.float64))
+    away = np.linalg.norm(places[:, None] - knots, axis=-1)
+    steps = max(FEWEST, int(np.ceil(away.max() / width * PER_WIDTH)))
+    table = np.linspace(0, away.max(), steps)
+    flat = (1, np.zeros(steps))  # at distance 0
+    splines = CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))
+    blocks = np.array_split(away, max(1, away.size * steps // AT_ONCE))
+    parts = [path_fourier(splines(part).swapaxes(1, 2))[..., distinct] for part in blocks]
+    return PathOperator(
+        width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
+        coefficients=load.coefficients,
+        harmonics=np.ascontiguousarray(np.moveaxis(np.concatenate(parts), -1, 0)),
+    )  # fmt: skip

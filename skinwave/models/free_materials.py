@@ -1,0 +1,272 @@
+"""Free keys of a body's materials: their ranges, and the materials that values of them make."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from fem.affine import Solids
+from fem.materials import Material
+from meshes.tetmesh import Floats
+from simple_model.choices import choose
+from skinwave.bodies import Body
+from skinwave.bodies.build import Build
+from skinwave.bodies.parts import solid_of
+from skinwave.scene_keys import MATERIAL, PRONY, SECTIONS, write_material
+
+FIXED = ("poisson", "law", "table")  # keys of a material that are no number, or change the matrices
+MOST_CORNERS = 16
+AGREES = 1e-9  # of a modulus: materials that differ by less are one
+OUTSIDE = 1e-9  # of a range: round-off by which a value may be beyond it
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeKey:
+    """A number of a scene's materials that is free from `low` to `high`: its `key` in a scene file,
+    the `layer` that it is of, None below all layers, and the `path` in the material's table.
+    """
+
+    key: str
+    layer: int | None
+    path: tuple[str, ...]
+    low: float
+    high: float
+
+    def at(self, share: float) -> float:
+        """Value at a share 0 to 1 of the range, of its logarithm if that is finite."""
+        if self.low > 0:
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + share * (self.high - self.low))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reference:
+    """A body as it was meshed, the layer (r,) of each of its materials, None below all layers, and
+    the factors (r, 2) of modulus and density of a mesh that stands for a thinner body; and whether
+    it rests on springs.
+    """
+
+    body: Body
+    layers: tuple[int | None, ...]
+    factors: Floats
+    is_sprung: bool
+
+
+def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
+    """Free keys of a body, checked.
+
+    Raises
+    ------
+    ValueError
+        If a key is none that can be free, or its range is none.
+    """
+    if not free:
+        raise ValueError("free = {} names no key; give one, such as body.material.shear_modulus_pa")
+    found = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
+    for bound in (0.0, 1.0):  # which materials refuse, they refuse here
+        with_values(body, found, values_at(found, [bound] * len(found)))
+    return found
+
+
+def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
+    """Body with values of its free keys.
+
+    Parameters
+    ----------
+    body : Body
+    keys : its free keys
+    values : by key, one for each
+
+    Returns
+    -------
+    Body
+
+    Raises
+    ------
+    ValueError
+        If a value is missing, out of its range, or not of a free key.
+    """
+    if strange := sorted(set(values) - {key.key for key in keys}):
+        raise ValueError(
+            f"'{strange[0]}' is not free; free it as well, or leave it out: free are "
+            f"{', '.join(key.key for key in keys)}"
+        )
+    for of in dict.fromkeys(key.layer for key in keys):
+        solid = solid_of(body.material if of is None else body.layers[of].material)
+        table = write_material(solid)
+        for key in (key for key in keys if key.layer == of):
+            table = _changed(table, key.path, _value(key, values))
+        solid = SECTIONS["body"]["material"].read("material", table)
+        body = _with_material(body, of, solid)
+    return body
+
+
+def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, float]:
+    """Values by key at shares (k,) of the ranges, 0 to 1."""
+    return {key.key: key.at(share) for key, share in zip(keys, shares, strict=True)}
+
+
+def training_shares(count: int, inside: int) -> Floats:
+    """Corners (at most `MOST_CORNERS`), the middle, and so many further points inside of a unit
+    cube of `count` dimensions: shares (t, count), the same each time.
+    """
+    from scipy.stats import qmc
+
+    corners = np.array(list(product((0.0, 1.0), repeat=count)))
+    if len(corners) > MOST_CORNERS:
+        corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
+    sobol = qmc.Sobol(count, rng=0).random(inside) if inside else np.zeros((0, count))
+    return np.vstack([corners, np.full((1, count), 0.5), sobol])
+
+
+def meshing_values(keys: Sequence[FreeKey]) -> dict[str, float]:
+    """Values of the body that is meshed: the fastest shear waves below all layers, for which an
+    absorbing layer is widest; layers of one range differ, so that their elements do.
+    """
+    fastest = {"shear_modulus_pa": 1.0, "density_kg_m3": 0.0}
+    inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
+    shares = [
+        fastest.get(key.path[0], x) if key.layer is None else x
+        for key, x in zip(keys, inside, strict=True)
+    ]
+    return values_at(keys, shares)
+
+
+def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference:
+    """Layers and factors of the materials of a meshed body.
+
+    Parameters
+    ----------
+    body : Body, as it was meshed
+    build : its mesh
+    keys : its free keys
+
+    Returns
+    -------
+    Reference
+
+    Raises
+    ------
+    ValueError
+        If a free layer is of one material with the next, or the kind of body has other materials.
+    """
+    tops = np.cumsum([0.0, *(layer.thickness for layer in body.layers)])
+    starts, solids = zip(*body.strata, strict=True)
+    first = [int(np.argmin(np.abs(tops - start))) for start in starts]
+    layers = tuple(k if k < len(body.layers) else None for k in first)
+    parts = set(layers) | ({None} if first[-1] == len(body.layers) else set())
+    if merged := [key.key for key in keys if key.layer not in parts]:
+        raise ValueError(
+            f"{merged[0]} is of a layer that is one with its neighbour; change its range slightly"
+        )
+    factors = [_factors(m, s) for m, s in zip(meshed_materials(build), solids, strict=True)]
+    sprung = build.support is not None and bool(build.support.stiffness.any())
+    return Reference(body=body, layers=layers, factors=np.array(factors), is_sprung=sprung)
+
+
+def meshed_materials(build: Build) -> tuple[Material, ...]:
+    """Materials of a mesh, those of its coat first."""
+    coat = build.coat.materials if build.coat else ()
+    return (*coat, *(build.material[region] for region in sorted(build.material)))
+
+
+def solids_of(reference: Reference, body: Body) -> Solids:
+    """Materials of a body that differs from the one that was meshed by its materials alone."""
+    own = [solid_of(body.material if k is None else body.layers[k].material)
+           for k in reference.layers]  # fmt: skip
+    before, now = reference.body.solid, body.solid
+    # A modulus law has its own in a Prony series, which takes time to fit.
+    held = [m.shear_modulus + m.fast_modulus for m in (before, now) if reference.is_sprung]
+    return Solids(
+        materials=tuple(_times(m, *f) for m, f in zip(own, reference.factors, strict=True)),
+        springs=held[1] / held[0] if held else 1.0,
+        drag=now.shear_speed / before.shear_speed,
+    )
+
+
+def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
+    parts = key.split(".")
+    of, path = None, parts[2:]
+    if parts[:2] == ["body", "layers"] and len(parts) > 4 and parts[3] == "material":
+        if not (parts[2].isdecimal() and int(parts[2]) < len(body.layers)):
+            raise ValueError(
+                f"'{key}' is of a layer that the body has not; it has {len(body.layers)}, counted "
+                "from 0"
+            )
+        of, path = int(parts[2]), parts[4:]
+    elif parts[:2] != ["body", "material"] or not path:
+        raise ValueError(
+            f"'{key}' cannot be free: one reduced body serves materials alone; free keys of "
+            "body.material or body.layers.0.material, and reduce a body for each value of others"
+        )
+    known = [name for name in MATERIAL if name not in FIXED]
+    if path[0] in FIXED:
+        raise ValueError(
+            f"'{key}' cannot be free: only moduli, losses, times and densities change none of a "
+            "body's matrices; reduce a body for each value of it"
+        )
+    choose(f"free key '{key}'", path[0], known)
+    if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
+        raise ValueError(f"'{key}' is no number of a Prony term; name one as prony.0.modulus_pa")
+    low, high = (float(bound) for bound in bounds)
+    if not (isfinite(low) and isfinite(high) and low < high):
+        raise ValueError(
+            f"{key} is free from {low:g} to {high:g}; give a finite range, low to high"
+        )
+    return FreeKey(key=key, layer=of, path=tuple(path), low=low, high=high)
+
+
+def _value(key: FreeKey, values: Mapping[str, float]) -> float:
+    if key.key not in values:
+        raise ValueError(f"the values lack {key.key}, which is free; give it")
+    value, slack = float(values[key.key]), OUTSIDE * (key.high - key.low)
+    if not key.low - slack <= value <= key.high + slack:
+        raise ValueError(
+            f"{key.key} = {value:g} is outside its range, {key.low:g} to {key.high:g}; free it "
+            "over a wider one"
+        )
+    return value
+
+
+def _changed(table: Any, path: Sequence[str], value: float) -> Any:
+    """A copy of a table, or list, with another number where a path leads to."""
+    if not path:
+        return value
+    head, rest = path[0], path[1:]
+    if isinstance(table, list):
+        if not int(head) < len(table):
+            raise ValueError(f"there is no Prony term {head} in {len(table)}; count from 0")
+        k = int(head)
+        return [*table[:k], _changed(table[k], rest, value), *table[k + 1 :]]
+    return table | {head: _changed(table.get(head, []), rest, value)}
+
+
+def _with_material(body: Body, layer: int | None, solid: Material) -> Body:
+    if layer is None:
+        return replace(body, material=solid)
+    layers = list(body.layers)
+    layers[layer] = replace(layers[layer], material=solid)
+    return replace(body, layers=tuple(layers))
+
+
+def _factors(meshed: Material, solid: Material) -> tuple[float, float]:
+    """Modulus and density of a mesh's material over those of the body's."""
+    modulus = meshed.shear_modulus / solid.shear_modulus
+    density = meshed.density / solid.density
+    expected, one = _times(solid, modulus, density), complex(meshed.complex_modulus(1e3))
+    if abs(one - complex(expected.complex_modulus(1e3))) > AGREES * abs(one):
+        raise ValueError(
+            "the mesh of this kind of body has other materials than its scene; reduce it for each "
+            "material"
+        )
+    return modulus, density
+
+
+def _times(solid: Material, modulus: float, density: float) -> Material:
+    """A material with all moduli, and the density, times a factor."""
+    if modulus == density == 1:
+        return solid
+    return replace(solid.scaled(modulus=modulus), density=density * solid.density)

@@ -1,0 +1,1 @@
+"""Uncertain numbers of a scene: samples, bands, and which of them matters."""
