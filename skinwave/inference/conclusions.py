@@ -112,7 +112,11 @@ def _all_five(fair: Sequence[Row], more: Sequence[Row]) -> str:
     said += f", {in_percent(found)}." if found.held else f" (below {_percent(high)} %)."
     if also.of:
         said += f" A search of {also.of:,} more near the best of them found {also.held or 'none'}."
-    return said
+    best = nearest([*fair, *more])[0]
+    shown = [claim for claim in CLAIMED if best[f"{claim}_holds"]]
+    return (
+        f"{said} The best shows {', '.join(shown)}, its other lines at {_level(best)} dB or below."
+    )
 
 
 def _each(fair: Sequence[Row]) -> str:
