@@ -33,6 +33,7 @@ INNER = {
     "sweeps": {"bodies", "models", "planning", "pictures"},
     "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
     "web": {"bodies", "models", "planning", "pictures", "reports", "studies"},
+    "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }
 
 # Rooms within meshes, likewise.

@@ -175,6 +175,21 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint
     return list(found.values())
 
 
+def varied(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """A scene with other values of keys of its file.
+
+    Raises
+    ------
+    ValueError
+        If that is no scene.
+    """
+    complete = tomllib.loads(dumps(scene))
+    found = _case(complete, complete, values)
+    if found.scene is None:
+        raise ValueError(found.error)
+    return found.scene
+
+
 def _sampled(
     variations: Sequence[Variation], design: str, samples: int, seed: int
 ) -> list[dict[str, Any]]:

@@ -1,0 +1,1 @@
+"""Fits of a scene to a measurement: estimates, intervals, and what the data do not resolve."""

@@ -1,0 +1,176 @@
+"""Identifiability: intervals, correlations, and directions that the data do not resolve.
+
+At the solution the residual r changes by its slopes J over the unit cube. With s^2 the scale of the
+variances and J / s = U diag(S) V^T, a move by d along a column of V changes the residual by S d of
+its standard errors. Where the 95 % interval of such a direction is wider than the limits, the data
+do not resolve it, and of a parameter no interval is given whose own is as wide (Transtrum, Machta
+and Sethna, Phys Rev E 83:036701 (2011), of such sloppy directions).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, t
+
+from meshes.tetmesh import Floats
+from skinwave.fits.parameters import Parameter
+from skinwave.fits.solve import AT_LIMIT, Solution
+
+LEVEL = 0.95
+ROUND_OFF = 1e-7  # of the largest singular value: what differences leave of one that is 0
+MEMBER = 0.1  # of the largest part in a direction: keys that it is of
+LAGS = 20  # of a test of whiteness
+SIGNIFICANT = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """Estimate of a parameter: its `value`, the limits `low` and `high` of its 95 % interval, nan
+    if the data do not resolve it, and whether it is at a limit of its range.
+    """
+
+    key: str
+    value: float
+    low: float
+    high: float
+    at_limit: bool
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether it has an interval."""
+        return bool(np.isfinite(self.low))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Direction:
+    """Direction that the data do not resolve: its keys, the part (k,) of each parameter in it, and
+    of two keys by their logarithms the `exponent` b for which a times the other to b is determined;
+    nan of others.
+    """
+
+    keys: tuple[str, ...]
+    parts: Floats
+    exponent: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Whiteness:
+    """Test of residuals by Ljung and Box: lags, autocorrelations (lags,), and the probability `p`
+    of as large ones in white noise.
+    """
+
+    correlations: Floats
+    p: float
+
+    @property
+    def is_white(self) -> bool:
+        """Whether nothing speaks against it."""
+        return self.p >= SIGNIFICANT
+
+
+def covariance(solution: Solution) -> Floats:
+    """Covariance (k, k) over the unit cube; huge along directions that are not resolved."""
+    singular, v = _singular(solution)
+    return (v / singular**2) @ v.T
+
+
+def width(solution: Solution) -> float:
+    """Half of a 95 % interval, in standard errors: Student's t of the residual's dof."""
+    return float(t.ppf((1 + LEVEL) / 2, solution.dof))
+
+
+def estimates(solution: Solution) -> tuple[Estimate, ...]:
+    """Estimates with intervals by the covariance, those by logarithms symmetric in these."""
+    parameters = solution.problem.parameters.free
+    half = width(solution) * np.sqrt(np.diag(covariance(solution)))
+    return tuple(
+        _estimate(each, float(u), float(h))
+        for each, u, h in zip(parameters, solution.u, half, strict=True)
+    )
+
+
+def _estimate(parameter: Parameter, u: float, half: float) -> Estimate:
+    resolved = half < 0.5  # of the range
+    low, high = (max(u - half, 0.0), min(u + half, 1.0)) if resolved else (np.nan, np.nan)
+    return Estimate(
+        key=parameter.key, value=parameter.value(u), low=parameter.value(low),
+        high=parameter.value(high), at_limit=not AT_LIMIT <= u <= 1 - AT_LIMIT,
+    )  # fmt: skip
+
+
+def correlations(solution: Solution) -> Floats:
+    """Correlations (k, k) of the estimates; nan with those that are not resolved."""
+    found = covariance(solution)
+    error = np.sqrt(np.diag(found))
+    unresolved = width(solution) * error >= 0.5
+    table = found / np.outer(error, error)
+    table[unresolved] = np.nan
+    table[:, unresolved] = np.nan
+    return np.asarray(table)
+
+
+def unresolved(solution: Solution) -> tuple[Direction, ...]:
+    """Directions that the data do not resolve, the least resolved first."""
+    singular, v = _singular(solution)
+    weak = singular < 2 * width(solution)
+    return tuple(_direction(solution, part) for part in v.T[weak][::-1])
+
+
+def _direction(solution: Solution, parts: Floats) -> Direction:
+    free = solution.problem.parameters.free
+    members = np.flatnonzero(np.abs(parts) > MEMBER * np.abs(parts).max())
+    exponent = np.nan
+    if len(members) == 2 and all(free[k].is_log for k in members):
+        first, second = (parts[k] * free[k].span for k in members)
+        exponent = float(-first / second)
+    return Direction(keys=tuple(free[k].key for k in members), parts=parts, exponent=exponent)
+
+
+def combined(solution: Solution, direction: Direction) -> tuple[float, float, float]:
+    """Value and 95 % interval of the combination of two keys that is determined, by its exponent.
+
+    Parameters
+    ----------
+    solution : Solution
+    direction : Direction, of two keys with an exponent
+
+    Returns
+    -------
+    value, low and high, in the unit of the first key times that of the second to the exponent
+    """
+    parameters = solution.problem.parameters
+    at = [parameters.keys.index(key) for key in direction.keys]
+    powers = np.zeros(len(solution.u))
+    powers[at] = [1.0, direction.exponent]
+    spans = np.array([each.span for each in parameters.free])
+    singular, v = _singular(solution)
+    resolved = singular >= 2 * width(solution)
+    parts = ((powers * spans) @ v[:, resolved]) / singular[resolved]
+    half = width(solution) * float(np.linalg.norm(parts))
+    values = parameters.values(solution.u)
+    first, second = (values[key] for key in direction.keys)
+    middle = first * second**direction.exponent
+    return middle, middle * np.exp(-half), middle * np.exp(half)
+
+
+def _singular(solution: Solution) -> tuple[Floats, Floats]:
+    """Singular values (k,) of slopes over standard errors, none below round-off, and V (k, k)."""
+    scale = max(solution.scale, 1e-300)
+    _, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
+    least = ROUND_OFF * max(float(singular.max()), 1e-300)
+    return np.maximum(singular, least), vt.T
+
+
+def whiteness(residual: Floats) -> Whiteness:
+    """Test of residuals (n, s) along their axis, all series together (Ljung and Box, Biometrika
+    65:297 (1978)); p is nan for fewer than ten.
+    """
+    n, series = residual.shape
+    lags = min(LAGS, n // 5)
+    if lags < 2:
+        return Whiteness(correlations=np.empty(0), p=np.nan)
+    x = residual - residual.mean(axis=0)
+    power = np.maximum((x**2).sum(axis=0), 1e-300)
+    each = np.array([(x[lag:] * x[:-lag]).sum(axis=0) / power for lag in range(1, lags + 1)])
+    terms = n * (n + 2) * each**2 / (n - np.arange(1, lags + 1))[:, None]
+    return Whiteness(correlations=each.mean(axis=1), p=float(chi2.sf(terms.sum(), lags * series)))
