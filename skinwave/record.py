@@ -92,7 +92,8 @@ def read(folder: Path) -> dict[str, Any]:
     path = folder / FILE
     if not path.exists():
         raise ValueError(
-            f"{path} cannot be read; name a folder that run, compare, report or dispersion wrote"
+            f"{path} cannot be read; name a folder that run, compare, report, dispersion, map or "
+            "fit wrote"
         )
     try:
         record = fitting(reading.parsed(path), FITTING, "record")

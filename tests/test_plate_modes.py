@@ -152,6 +152,19 @@ def test_clips_hold_the_plate_where_they_are():
     assert parameters(isotropic(clips=at_corners, **free))[0] == pytest.approx(7.111, rel=2e-3)
 
 
+def test_a_clip_bends_as_a_disc_that_is_clamped():
+    # 10-node tetrahedra, 48 by 48 cells, an equivalent sheet of a hundredth of the side.
+    elements = [23.244, 37.922, 47.453, 49.900, 71.232, 82.117, 90.712, 105.793]
+    at = 0.0894768154 / 2 - 0.005
+    plate = Plate(
+        size_x=0.0894768154, size_y=0.0894768154, d11=3.333825e-04, d22=1.405014e-04,
+        d12=4.215043e-05, d66=8.713837e-05, mass_per_area=0.06414087, air_density=0.0,
+        clip_radius=0.005,
+        clips=tuple((x, y) for y in (at, -at) for x in (-at, at)), **edges(*["free"] * 4),
+    )  # fmt: skip
+    np.testing.assert_allclose(plate_modes(plate).frequencies[:8], elements, rtol=0.016)
+
+
 def test_the_moving_load_is_that_of_a_fine_grid():
     path = Trajectory(shape="circle", size=0.02, speed=12.0)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140.0, trajectory=path))

@@ -32,6 +32,7 @@ INNER = {
     "studies": {"bodies", "models", "planning", "pictures", "measurements"},
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"bodies", "models", "planning", "pictures"},
+    "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
     "web": {"bodies", "models", "planning", "pictures", "reports", "studies"},
     "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }

@@ -11,6 +11,7 @@ from skinwave.commands import (
     doctor,
     film,
     fit,
+    infer,
     measured,
     mesh,
     plan,
@@ -31,8 +32,7 @@ from skinwave.commands import map as map_command
 MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
     verify, report, film, web, rerun, same, doctor, cache,
-    measured,
-    fit,
+    measured, fit, infer,
     validate,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

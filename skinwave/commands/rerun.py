@@ -14,22 +14,23 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from skinwave.commands import compare, dispersion, report
+from skinwave.commands import compare, dispersion, fit, report
 from skinwave.commands import map as map_command
 from skinwave.commands import run as run_command
 from skinwave.commands.common import add_output, progress_of, summarise
 
 REPEATED = {
     "run": run_command, "compare": compare, "report": report, "dispersion": dispersion,
-    "map": map_command,
+    "map": map_command, "fit": fit,
 }  # fmt: skip
+ONCE_EACH = ("format", "vary", "tie")  # options that are given once for each of their values
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "folder", type=Path, metavar="DIR", help="folder that run, compare, report, dispersion or "
-        "map wrote, or a folder of one run in it; the new one is DIR-rerun",
+        "folder", type=Path, metavar="DIR", help="folder that run, compare, report, dispersion, "
+        "map or fit wrote, or a folder of one run in it; the new one is DIR-rerun",
     )  # fmt: skip
     add_output(parser)
 
@@ -106,8 +107,8 @@ def _words(key: str, value: Any) -> Iterator[str]:
     flag = f"--{key.replace('_', '-')}"
     if value is True:
         yield flag
-    elif key == "format" and isinstance(value, list):  # is given once each, and has one already
-        yield from (f"{flag}={item}" for item in value if item != "png")
+    elif key in ONCE_EACH and isinstance(value, list):
+        yield from (f"{flag}={item}" for item in value if item != "png")  # which is there already
     else:
         yield f"{flag}={','.join(map(str, value)) if isinstance(value, list) else value}"
 

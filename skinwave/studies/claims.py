@@ -92,7 +92,7 @@ def is_resolved(run: NamedLines, claim: str) -> bool:
 
 
 def _single_line(runs: Sequence[NamedLines]) -> Assessment:
-    worst = max(_others(run).max() for run in runs)
+    worst = max(rival_levels(run).max() for run in runs)
     sentence = f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM"
     return worst < ABSENT, worst, ABSENT, sentence
 
@@ -150,9 +150,9 @@ def _both_multiples(runs: Sequence[NamedLines]) -> Assessment:
 
 
 def _am_highest(runs: Sequence[NamedLines]) -> Assessment:
-    worst = max(runs, key=lambda run: _others(run).max())
-    value = _others(worst).max()
-    name, probe = _rival(worst)
+    worst = max(runs, key=lambda run: rival_levels(run).max())
+    value = rival_levels(worst).max()
+    name, probe = strongest_rival(worst)
     sentence = (
         f"the strongest rival of f_AM is {name} at {decibel(value, signed=True)} dB "
         f"({worst.tacton}, probe at {probe:g} mm)"
@@ -162,19 +162,19 @@ def _am_highest(runs: Sequence[NamedLines]) -> Assessment:
 
 def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
     holds, value, bar, sentence = _am_highest(runs)
-    beaten = [run.tacton for run in runs if _others(run).max() >= 0]
+    beaten = [run.tacton for run in runs if rival_levels(run).max() >= 0]
     if beaten:
         sentence += f"; f_AM is exceeded in {', '.join(beaten)}"
     if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has none
-        velocity = max(_others(run, velocity=True).max() for run in runs)
+        velocity = max(rival_levels(run, velocity=True).max() for run in runs)
         sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
         value = max(value, velocity)
     return holds and value < 0, value, bar, sentence
 
 
 def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
-    value = max(_others(run).max() for run in runs)
-    lower = sum(bool(_others(run).max() < MUCH_LOWER) for run in runs)
+    value = max(rival_levels(run).max() for run in runs)
+    lower = sum(bool(rival_levels(run).max() < MUCH_LOWER) for run in runs)
     sentence = (
         f"the strongest other line is at {decibel(value, signed=True)} dB re f_AM; in {lower} of "
         f"{len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
@@ -251,12 +251,12 @@ def _rivals(run: NamedLines) -> list[str]:
     return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
 
 
-def _others(run: NamedLines, velocity: bool = False) -> Floats:
+def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
     """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
     return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
 
 
-def _rival(run: NamedLines) -> tuple[str, float]:
+def strongest_rival(run: NamedLines) -> tuple[str, float]:
     """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
     names = _rivals(run)
     levels = _probe_levels(run, names, "f_AM")

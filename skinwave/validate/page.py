@@ -52,9 +52,9 @@ ZIGZAG = (
 )
 FINGER = (
     "Blue: the palmar side of the finger that reaches furthest, of the material palm on an "
-    "elastic support in place of bone, without joints; on the example hand elements of 8 mm "
-    "rather than 6.5 mm change the 1/e lengths by 3 to 9 %. Black: SkinSource, dorsal, from files "
-    "that were given. The 1/e length of the text is fitted to all points."
+    "elastic support in place of bone, without joints; on the example hand elements of 5 and of "
+    "8 mm, not 6.5 mm, change the 1/e lengths by up to 8 %. Black: SkinSource, dorsal, from "
+    "files that were given. The 1/e length of the text is fitted to all points."
 )
 
 

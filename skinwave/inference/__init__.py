@@ -1,0 +1,1 @@
+"""Inference: which bodies and measurements would show what was measured."""

@@ -1,0 +1,166 @@
+"""Assessment of a candidate: its lines under all 15 Tactons, and which claims hold.
+
+Steady state of a linear sheet. Claims are those of `studies.claims`, in the
+quantity that the candidate reads.
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import Response
+from simple_model.load_spectrum import load_lines, synthesise
+from simple_model.material import Complex
+from simple_model.plate_modes import PlateModes, plate_modes, steady_response
+from simple_model.plate_response import modal_path_forces
+from simple_model.quantities import quantity
+from simple_model.trajectory import Trajectory
+from skinwave.inference.design import (
+    Candidate,
+    middle,
+    name,
+    plate,
+    pressure,
+    probes,
+    thickness,
+)
+from skinwave.run import Run
+from skinwave.scene import BODIES, Scene
+from skinwave.studies.claims import (
+    BOTH,
+    CLAIMS,
+    MUCH_LOWER,
+    NEEDED,
+    rival_levels,
+    strongest_rival,
+)
+from skinwave.studies.paper15 import tactons
+
+MODEL, BODY = "plate-modes", "sheet"
+FINEST = 1.35  # of the bending wavenumber at the frequency below: strong lines within 2 %
+RESOLVED = 430.0  # Hz: 2 f_AM, 2 f_d and their neighbours are below it
+COARSEST = 170.0  # rad/m: of the focal spot
+TIMES = np.arange(2500) / 2500.0  # s: lines up to 1250 Hz, for 1 s
+CLAIMED = ("M1", "M2", "M3", "M4", "M5")
+# M4's sentence for a paper sheet adds velocity to displacement; S4 is the same of what is read.
+ASSESSED_AS = {"M4": "S4"}
+LINEAR = 0.5  # thicknesses: a plate that deflects further stretches
+
+
+def row(candidate: Candidate, release: str) -> dict[str, Any]:
+    """Row of the table of a candidate: its values, which claims hold, by how much, or an error."""
+    started = time.perf_counter()
+    found = {"key": name(candidate, release), "version": release, "status": "done", **candidate}
+    try:
+        found |= assessed(candidate)
+    except (ValueError, ArithmeticError, MemoryError) as error:
+        found |= {"status": "failed", "error": " ".join(str(error).split())}
+    return found | {"seconds": time.perf_counter() - started}
+
+
+def assessed(candidate: Candidate) -> dict[str, Any]:
+    """Claims and levels of a candidate, by column."""
+    modes = plate_modes(plate(candidate), finest(candidate))
+    lines = dict(responses(candidate, modes))
+    runs = [as_run(candidate, name, *each) for name, each in lines.items()]
+    mean, vibration = _deflections(lines)
+    return {
+        "first_mode_hz": float(modes.frequencies[0]),
+        "mean_over_thickness": mean / thickness(candidate),
+        "vibration_over_thickness": vibration / thickness(candidate),
+        **_claims(runs), **_rivals(runs),
+    }  # fmt: skip
+
+
+def finest(candidate: Candidate) -> tuple[float, float]:
+    """Wavenumbers in rad/m that are resolved along x and y, by bending in vacuum without
+    tension, D k^4 = m w^2, both of which air makes up for.
+    """
+    own = plate(candidate)
+    inertia = own.mass_per_area * (2 * np.pi * RESOLVED) ** 2
+    k, across = ((inertia / d) ** 0.25 for d in (own.d11, own.d22))
+    return max(FINEST * k, COARSEST), max(FINEST * across, COARSEST)
+
+
+def responses(
+    candidate: Candidate, modes: PlateModes
+) -> Iterator[tuple[str, tuple[Floats, Complex]]]:
+    """Name of each Tacton, and frequencies (f,) in Hz and displacement (f, p) in metre."""
+    paths: dict[Trajectory, Complex] = {}
+    outputs = modes.at(probes(candidate) - middle(candidate))
+    for each, tacton in tactons():
+        load = pressure(candidate, tacton)
+        if tacton.trajectory not in paths:
+            paths[tacton.trajectory] = modal_path_forces(modes, load, middle(candidate))
+        f, forces = load_lines(load).gather(paths[tacton.trajectory])
+        heard = f < 0.5 / TIMES[1]
+        u = steady_response(modes, f[heard], forces[heard], outputs, candidate["loss_factor"])
+        yield each, (f[heard], u)
+
+
+def as_run(candidate: Candidate, tacton: str, f: Floats, u: Complex) -> Run:
+    """A steady response, in the quantity that the candidate reads."""
+    read = quantity(candidate["quantity"])
+    values = synthesise(f, read.factor(2j * np.pi * f)[:, None] * u, TIMES)
+    places = probes(candidate)
+    scene = Scene(
+        pressure=pressure(candidate, dict(tactons())[tacton]), body=BODIES["paper-sheet"],
+        probes=tuple(map(tuple, places.tolist())), quantity=read.name,
+    )  # fmt: skip
+    response = Response(model=MODEL, times=TIMES, probes=places, values=values, quantity=read.name)
+    return Run(tacton=tacton, body=BODY, scene=scene, response=response)
+
+
+def _deflections(lines: Mapping[str, tuple[Floats, Complex]]) -> tuple[float, float]:
+    """Largest mean, and strongest line, at any point under any Tacton, metre."""
+    means = [np.abs(u[f == 0]).max(initial=0.0) for f, u in lines.values()]
+    return float(max(means)), float(max(np.abs(u[f > 0]).max() for f, u in lines.values()))
+
+
+def _claims(runs: list[Run]) -> dict[str, Any]:
+    """Whether each claim holds of all Tactons that it is about, and its value. A line that it needs
+    and that is below -60 dB in load and response is in no list of lines: it does not hold, and has
+    no value.
+    """
+    columns: dict[str, Any] = {}
+    for claim in CLAIMED:
+        kinds, assess = CLAIMS[ASSESSED_AS.get(claim, claim)]
+        about = [run for run in runs if (run.is_am, run.is_stm) in kinds]
+        needed = set(NEEDED[claim][0] if claim in NEEDED else ["f_AM"])
+        if not all(run.frequencies.keys() >= needed for run in about):
+            columns[f"{claim}_holds"] = 0
+            continue
+        holds, value, _, _ = assess(about)
+        columns[f"{claim}_holds"] = int(holds)
+        columns[f"{claim}_value"] = float(value) if isfinite(value) else None
+    modulated = [run for run in runs if (run.is_am, run.is_stm) in CLAIMS["M1"][0]]
+    return columns | {"second_harmonic_db": min(map(_second_harmonic, modulated))}
+
+
+def _second_harmonic(run: Run) -> float:
+    """Level of 2 f_AM at the point where it is strongest, dB re f_AM there."""
+    ratio = run.lines.get("2f_AM", np.zeros(1)) / run.lines["f_AM"]
+    return float(20 * np.log10(np.maximum(ratio, 1e-15)).max())
+
+
+def _rivals(runs: list[Run]) -> dict[str, Any]:
+    """Level of the strongest line other than f_AM under AM+STM, dB re f_AM: the largest at each
+    point and on each path, which line under which Tacton, and in how many Tactons it is below M4's
+    and M5's bar at all points.
+    """
+    both = [run for run in runs if (run.is_am, run.is_stm) == BOTH]
+    levels = np.array([rival_levels(run) for run in both])
+    worst = levels.max(axis=1)
+    strongest = both[int(np.argmax(worst))]
+    sizes = np.array([run.scene.tacton.trajectory.size for run in both])
+    return {
+        "rival_db": levels.max(axis=0).tolist(),
+        "rival_by_path_db": [float(worst[sizes == size].max()) for size in np.unique(sizes)],
+        "rival_line": strongest_rival(strongest)[0], "rival_tacton": strongest.tacton,
+        "tactons_highest": int((worst < 0).sum()),
+        "tactons_much_lower": int((worst < MUCH_LOWER).sum()),
+    }  # fmt: skip

@@ -1,0 +1,315 @@
+"""Which sheet was measured: candidates, their claims, the table, and what it tells."""
+
+import json
+import tomllib
+from html import unescape
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from simple_model.drive import DRIVES
+from simple_model.plate_modes import plate_modes
+from skinwave.cli import main
+from skinwave.inference import assess, design, drive_laws, knowledge, table
+from skinwave.inference.conclusions import conclusions, readings, sheets, together
+from skinwave.inference.knowledge import Share, holds, pattern, region, told, variance_share
+from skinwave.inference.page import drawings, page
+from skinwave.inference.scenes import scene_text
+from skinwave.models.plate_modes import plate_of
+from skinwave.scene_file import loads
+from skinwave.studies.paper15 import tactons
+from skinwave.sweeps import dataset
+
+SMALL = {
+    "size": "square", "side_mm": 70.0, "support": "clamped", "tension_x_n_per_m": 10.0,
+    "tension_y_n_per_m": 30.0, "grammage_g_m2": 80.0, "young_x_gpa": 6.0, "young_ratio": 0.5,
+    "loss_factor": 0.04, "off_middle": 0.2, "start_mm": 1.0, "beside_mm": 2.0,
+    "quantity": "displacement", "drive": "compressed", "depth_of_modulation": 0.9,
+    "height_mm": 200.0,
+}  # fmt: skip
+
+
+def harmonics(law, depth, count=4):
+    """Amplitudes of the harmonics 0.. of the pressure under M = sin."""
+    M = np.sin(2 * np.pi * np.arange(4096) / 4096)
+    found = np.abs(np.fft.rfft(DRIVES[law](1.0, M, depth))) / 4096
+    return found[:count] * np.where(np.arange(count), 2, 1)
+
+
+def planted(count=400, seed=0):
+    """Rows in which the drive law decides M1, and the level of the rival rises with the loss."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for k, candidate in enumerate(design.hypercube(count, seed)):
+        rival = 200 * candidate["loss_factor"] + rng.normal()
+        by_path = [rival - 9, rival - 5, rival]
+        rows.append({
+            "key": f"{k:024x}", "index": k, "version": "0", "stage": table.HYPERCUBE,
+            "status": "done", "error": None, "seconds": 1.0, **candidate,
+            "first_mode_hz": 30.0, "mean_over_thickness": 2 * rng.random(),
+            "vibration_over_thickness": rng.random(), "second_harmonic_db": -20.0,
+            "M1_holds": int(candidate["drive"] in ("clipped", "compressed")), "M1_value": -40.0,
+            "M2_holds": 1, "M2_value": 0.0, "M3_holds": int(rng.random() < 0.5), "M3_value": -30.0,
+            "M4_holds": int(rival < 0), "M4_value": rival, "M5_holds": int(rival < -20),
+            "M5_value": rival, "rival_db": [rival, rival - 1, rival - 2, rival - 3, rival - 8],
+            "rival_by_path_db": by_path, "rival_line": "f_d", "rival_tacton": "am80-stm30",
+            "tactons_highest": 3, "tactons_much_lower": 0,
+        })  # fmt: skip
+    return rows
+
+
+def test_a_hypercube_meets_all_values_evenly_and_again():
+    first = design.hypercube(50, 3)
+    assert first == design.hypercube(50, 3) != design.hypercube(50, 4)
+    for parameter in design.PARAMETERS:
+        values = [candidate[parameter.key] for candidate in first]
+        if parameter.bounds is None:
+            counts = [values.count(value) for value in parameter.values]
+            assert min(counts) >= 50 // len(counts)
+        else:
+            low, high = parameter.bounds
+            inside = np.sort((np.array(values) - low) / (high - low) * 50).astype(int)
+            np.testing.assert_array_equal(inside, np.arange(50))  # one in each of 50 parts
+
+
+def test_the_sheet_of_a_candidate_is_its_own():
+    plate = design.plate(SMALL)
+    d = 0.080 / 780
+    assert design.thickness(SMALL) == pytest.approx(d)
+    assert plate.d11 == pytest.approx(6e9 * d**3 / 12 / (1 - 0.3 * 0.15))
+    assert plate.d22 == pytest.approx(plate.d11 / 2)
+    assert plate.d12 == pytest.approx(0.15 * plate.d11)
+    assert plate.d66 == pytest.approx(np.sqrt(18) * 1e9 / (2 + 2 * np.sqrt(0.045)) * d**3 / 12)
+    assert (plate.tension_x, plate.tension_y) == (10.0, 30.0)
+    assert design.middle(SMALL) == pytest.approx((-0.2 * 0.005, 0.0))
+    hung = design.plate(SMALL | {"size": "A5", "support": "two_clips"})
+    assert (hung.size_x, hung.size_y, hung.tension_x, hung.left) == (0.21, 0.148, 0.0, "free")
+    np.testing.assert_allclose(hung.clips, [(-0.1, 0.069), (0.1, 0.069)])
+    assert len(design.plate(SMALL | {"support": "corners"}).clips) == 4
+    strip = design.plate(SMALL | {"support": "two_edges"})
+    assert (strip.left, strip.right, strip.back, strip.tension_y) == ("clamped",) * 2 + ("free", 0)
+
+
+def test_only_devices_that_clip_or_compress_have_a_third_harmonic():
+    plain, clipped = harmonics("pressure_squared", 0.8), harmonics("clipped", 0.8)
+    assert plain[2] / plain[1] == pytest.approx(0.2)
+    assert plain[3] < 1e-12 < 0.01 * clipped[3]
+    # Not clipped at half the depth: modulated once.
+    np.testing.assert_allclose(harmonics("clipped", 0.5), harmonics("pressure_squared", 1.0))
+    assert harmonics("compressed", 0.8)[3] > 1e-3 * harmonics("compressed", 0.8)[1]
+    x = DRIVES["pressure_squared"](1.0, np.linspace(-1, 1, 9), 0.7)
+    squeezed = DRIVES["compressed"](1.0, np.linspace(-1, 1, 9), 0.7)
+    np.testing.assert_allclose(squeezed, 1.25 * x / (1 + 0.25 * x))
+
+
+def test_claims_of_a_candidate_follow_from_its_lines():
+    modes = plate_modes(design.plate(SMALL), 200.0)
+    lines = dict(assess.responses(SMALL, modes))
+    assert [*lines] == [name for name, _ in tactons()]
+
+    def at(tacton, frequency):
+        f, u = lines[tacton]
+        return np.abs(u[np.abs(f - frequency) < 1e-3]).sum(axis=0)
+
+    f_d = 6 / (np.pi * 0.010)
+    runs = {name: assess.as_run(SMALL, name, *each) for name, each in lines.items()}
+    run = runs["am140-stm10"]
+    for name, frequency in (("f_AM", 140), ("f_d", f_d), ("2f_AM", 280), ("f_d-f_AM", f_d - 140)):
+        np.testing.assert_allclose(run.lines[name], at("am140-stm10", frequency), rtol=1e-6)
+    found = assess._claims([*runs.values()])
+    third = [20 * np.log10(at(f"am{f}", 3 * f) / at(f"am{f}", f)).max() for f in (80, 140, 210)]
+    second = [20 * np.log10(at(f"am{f}", 2 * f) / at(f"am{f}", f)).max() for f in (80, 140, 210)]
+    assert found["M1_value"] == pytest.approx(min(third + second), abs=1e-4)
+    assert found["second_harmonic_db"] == pytest.approx(min(second), abs=1e-4)
+    assert found["M2_holds"] == 1
+    rivals = assess._rivals([*runs.values()])
+    level = found["M4_value"]
+    assert level == found["M5_value"] == pytest.approx(max(rivals["rival_db"]))
+    assert level == pytest.approx(max(rivals["rival_by_path_db"]))
+    assert (found["M4_holds"], found["M5_holds"]) == (int(level < 0), int(level < -20))
+    worst = runs[rivals["rival_tacton"]]
+    ratio = worst.lines[rivals["rival_line"]] / worst.lines["f_AM"]
+    assert 20 * np.log10(ratio.max()) == pytest.approx(level)
+    # As velocity, each line goes with its frequency.
+    moving = SMALL | {"quantity": "velocity"}
+    fast = assess.as_run(moving, "am140-stm10", *lines["am140-stm10"])
+    gained = fast.lines["2f_AM"] / fast.lines["f_AM"] / (run.lines["2f_AM"] / run.lines["f_AM"])
+    np.testing.assert_allclose(gained, 2.0, rtol=1e-6)
+    # A device that takes the root first has no 2 f_AM, and M1 does not hold.
+    corrected = SMALL | {"drive": "force_corrected"}
+    modulated = {n: assess.as_run(corrected, n, *each)
+                 for n, each in assess.responses(corrected, modes)}  # fmt: skip
+    assert assess._claims([*modulated.values()])["M1_holds"] == 0
+
+
+def without_physics(candidate, release):
+    """A row as of a candidate that was computed."""
+    row = planted(1)[0] | {"key": design.name(candidate, release), **candidate}
+    return row | {"M5_value": 100 * candidate["loss_factor"], "error": None}
+
+
+def test_tables_go_on_and_the_page_follows_from_the_table(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(table, "row", without_physics)
+    monkeypatch.setattr(table, "BATCH", 1)
+    monkeypatch.setattr("skinwave.inference.page.png", lambda figure: b"drawn")
+    out = tmp_path / "which"
+    typed = ["infer", "--scheduler", "threads", "--quiet", "--seed", "2", "-o", str(out)]
+    assert main([*typed, "--samples", "3"]) == 0
+    rows = dataset.read(out)
+    assert [row["stage"] for row in rows] == [table.HYPERCUBE] * 3
+    html = (out / "index.html").read_text()
+    for paragraph in conclusions(rows):
+        assert paragraph in unescape(html)
+    assert page(rows, drawings(rows)) == html
+    parts = sorted((out / "rows").iterdir())
+    times = [part.stat().st_mtime_ns for part in parts[1:]]
+    parts[0].unlink()  # as if it had been killed before
+    assert main([*typed, "--samples", "3", "--search", "1", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["done"], summary["there_before"], summary["missing"]) == (1, 2, 0)
+    again = dataset.read(out)
+    strip = [{k: v for k, v in row.items() if k != "seconds"} for row in (*rows, *again[:3])]
+    assert strip[:3] == strip[3:]
+    assert [row["stage"] for row in again[3:]] == [table.SEARCH]
+    assert [part.stat().st_mtime_ns for part in parts[1:]] == times
+    assert (out / "sheet-1.toml").read_text() == scene_text(sheets(again)[0])
+    (out / "index.html").write_text("mine")
+    assert main([*typed, "--samples", "3"]) == 2
+    assert "was added or changed" in capsys.readouterr().err
+    assert main([*typed[:-1], str(tmp_path), "--samples", "3"]) == 2
+    assert "is none of skinwave infer" in capsys.readouterr().err
+    assert main([*typed, "--samples", "1"]) == 2
+    assert "--samples = 1 is below 2" in capsys.readouterr().err
+
+
+def test_figures_are_drawn():
+    drawn = drawings(planted(60))
+    assert [each.name for each in drawn] == ["shares", "rivals", "decides", "regions"]
+    for each in drawn:
+        pixels = np.asarray(Image.open(BytesIO(each.image)).convert("L"))
+        assert 0.005 < (pixels < 128).mean() < 0.5
+
+
+def test_a_candidate_that_fails_is_a_row(monkeypatch):
+    monkeypatch.setattr("skinwave.inference.page.png", lambda figure: b"drawn")
+
+    def refuse(*_):
+        raise ValueError("no\nmodes")
+
+    monkeypatch.setattr(assess, "plate_modes", refuse)
+    row = assess.row(SMALL, "0")
+    assert (row["status"], row["error"], row["key"]) == ("failed", "no modes",
+                                                         design.name(SMALL, "0"))  # fmt: skip
+    rows = [*planted(40), {key: row.get(key) for key in table.COLUMNS} | {"stage": "hypercube"}]
+    assert "1 of 41 candidates have no response: no modes" in page(rows, drawings(rows))
+    with pytest.raises(ValueError, match="compute some first"):
+        conclusions(rows[-1:])
+
+
+def test_intervals_are_those_of_clopper_and_pearson():
+    # None of n: (0, 1 - (alpha/2)^(1/n)).
+    low, high = Share(held=0, of=2000).interval
+    assert (low, high) == (0.0, pytest.approx(1 - 0.025 ** (1 / 2000), rel=1e-6))
+    low, high = Share(held=7, of=20).interval
+    assert (low, high) == pytest.approx((0.1539, 0.5922), abs=5e-5)
+
+
+def test_the_parameter_that_decides_is_found():
+    rows = planted()
+    best = told(rows, holds(rows, "M1").astype(int))[0]
+    assert best.parameter.key == "drive"
+    assert best.fraction == pytest.approx(1.0, abs=0.03)
+    chance = told(rows, holds(rows, "M3").astype(int))
+    assert chance[0].bits < 0.02
+    found = region(rows, holds(rows, "M1"))
+    assert found.conditions[0].startswith("drive law")
+    assert found.share.value == 1.0
+    both = {t.parameter.key: t.bits for t in told(rows, pattern(rows))}
+    assert max(both, key=both.__getitem__) == "drive"
+
+
+def test_variance_shares_are_sobol_indices():
+    rows = planted(2000)
+    by_key = {p.key: p for p in design.PARAMETERS}
+    a, b = (
+        np.array([(row[key] - p.bounds[0]) / np.ptp(p.bounds) for row in rows])
+        for key, p in ((key, by_key[key]) for key in ("loss_factor", "height_mm"))
+    )
+    levels = 3 * a + b  # indices 0.9 and 0.1, of which five bins see 24/25
+    assert variance_share(rows, levels, by_key["loss_factor"]) == pytest.approx(0.864, abs=0.01)
+    # The two are correlated by chance, by 1/sqrt(2000).
+    assert variance_share(rows, levels, by_key["height_mm"]) == pytest.approx(0.096, abs=0.02)
+    assert variance_share(rows, levels, by_key["grammage_g_m2"]) < 0.005
+
+
+def test_the_paragraph_says_what_the_table_holds():
+    rows = planted()
+    said = " ".join(conclusions(rows))
+    held = holds(rows, "M1").sum()
+    assert f"Of 400 candidates none show all five claims (below {100 * 0.0092:.2g} %)" in said
+    assert f"M1 in {100 * held / 400:.0f} %" in said
+    assert "M1 is decided by the drive law" in said
+    assert "M2 always holds. " in said
+    assert "M5 never holds." in said
+    assert "f_d most often (100 %), on the path of 30 mm in 100 %" in said
+    assert "goes most with the loss factor" in said
+    assert "To know one thing more, the drive law" in said
+    shown = [dict(row) for row in rows]
+    for row in shown[:4]:
+        row |= {f"M{k}_holds": 1 for k in range(1, 6)} | {"M5_value": -25.0}
+    assert "Of 400 candidates 4 show all five claims, 1 % (0.27 to 2.5 %)." in conclusions(shown)[0]
+    assert together(shown)[-1][1].held == 4
+    best = sheets(shown)
+    assert len({(row["size"], row["support"]) for row in best}) == 3
+    assert best[0]["M5_value"] == -25.0
+    found = {words: (m4.held, m5.held) for words, m4, m5 in readings(rows)}
+    level = np.array([row["M5_value"] for row in rows])
+    assert found["at all five points, on all paths"] == ((level < 0).sum(), (level < -20).sum())
+    assert found["at all five points, on the path of 10 mm"][0] == (level - 9 < 0).sum()
+    assert found["at any one of the points, on all paths"][0] == (level - 8 < 0).sum()
+
+
+def test_a_search_stays_within_bounds_and_near_the_best():
+    rows = planted(60)
+    best = table.nearest(rows)
+    order = [(-sum(r[f"M{k}_holds"] for k in (1, 2, 3)), r["M5_value"]) for r in best]
+    assert order == sorted(order)
+    made = table.offspring(rows, 100, 1)
+    assert made == table.offspring(rows, 100, 1)
+    near = best[: table.PARENTS]
+    for parameter in design.PARAMETERS:
+        values = [candidate[parameter.key] for candidate in made]
+        kept = np.mean([value in [row[parameter.key] for row in near] for value in values])
+        assert kept > 1 - 2 * table.CHANGED
+        if parameter.bounds is None:
+            assert set(values) <= set(parameter.values)
+        else:
+            assert parameter.bounds[0] <= min(values) <= max(values) <= parameter.bounds[1]
+
+
+@pytest.mark.parametrize("support", design.SUPPORTS)
+def test_scenes_of_candidates_say_how_the_sheet_is_held(support):
+    text = scene_text(SMALL | {"support": support})
+    written = tomllib.loads(text)
+    body, plate = written["body"], design.plate(SMALL | {"support": support})
+    mounting = body["mounting"]
+    held = {edge for edge in ("left", "right", "front", "back") if getattr(plate, edge) != "free"}
+    assert set(mounting["edges"]) == held
+    assert (mounting["tension_x_n_per_m"], mounting["tension_y_n_per_m"]) == (
+        plate.tension_x, plate.tension_y
+    )  # fmt: skip
+    clips = np.array(mounting.get("clips_mm", [])).reshape(-1, 2) / 1e3
+    np.testing.assert_allclose(clips, np.array(plate.clips).reshape(-1, 2))
+    assert body["thickness_mm"] * 780e-3 == pytest.approx(0.080)
+    assert body["material"]["young_y_pa"] == 3e9
+    assert written["focus"]["drive"] == drive_laws.COMPRESSED.name
+    # The model of that name has the same plate of it.
+    found = plate_of(loads(text).body)
+    for name, value in vars(plate).items():
+        if name == "clip_radius" and not plate.clips:
+            continue
+        own = getattr(found, name)
+        assert own == (value if isinstance(value, str) else pytest.approx(np.array(value)))
+    assert knowledge.value_words("two_clips") == "hung from two clips"
