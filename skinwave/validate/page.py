@@ -23,8 +23,9 @@ from skinwave.validate.waves import BODIES, WORDS
 TITLE = "Models beside published measurements"
 SCOPE = (
     "Verification asks whether the equations are solved right; this page asks whether they are the "
-    "right ones, as far as published numbers tell. Two presets were made from one of the sources, "
-    "and two were chosen by another: the tables say where, and there agreement is no evidence. "
+    "right ones, as far as published numbers tell. The preset forearm was made from Zhang's "
+    "constants, palm and palm-stiff were chosen for optimum speeds of 5 and 7 m/s: the tables say "
+    "where, and there agreement is no evidence; skin-slab and the hand have the material palm. "
     "Otherwise nothing was fitted to a number on this page. A factor is ours over the published "
     "value, or over the nearer end of its spread."
 )
