@@ -27,7 +27,7 @@ from tests.page_client import Client, Refused, browser, opened
 WARM = 0.3  # of the time, after which the server may not grow
 MOST = 50.0  # MB that it grows by at most
 ENDS = 3.0  # s after Ctrl-C
-LATE = 60.0  # s more that a busy machine has until a page has an answer and a process is killed
+LATE = 60.0  # s more that a busy machine has until a page has responded and a process is killed
 KILLED = (4.0, 9.0)  # s between processes that are killed
 BODIES = ("none", "none", "none", "skin-slab")
 Made = Counter[str]

@@ -133,6 +133,8 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "mesh": ["body.stl", "--h", "20", "--out", "body.vtu"],
         "doctor": [],
         "measured": ["wave.csv", "--out", "measured"],
+        "fit": ["small.toml", "--measured", "wave.csv", "--vary", "gain=0.1:10"],
+        "infer": ["--samples", "2", "--workers", "1", "--quiet"],
         "cache": [],
         "report": ["out", "--quiet"],
         "film": ["out", "--out", "film.gif"],
@@ -146,7 +148,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     assert set(COMMANDS) == {*asked, "web"}  # which has a test of its own
     for name, arguments in asked.items():
         threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
-        code = 2 if name == "film" else 0  # no report is there
+        code = 2 if name in ("film", "fit") else 0  # no report is there, and no motion measured
         until = {"relax": below, "tradeoff": below, "verify": itself}.get(name)
         said = run_there(hostile, name, *arguments, threads=threads, code=code, until=until)
         assert "no_such_key" not in said, name
