@@ -22,6 +22,7 @@ from fem.transient import State
 from meshes.tetmesh import Floats, Ints
 
 ROUND_OFF = 1e-6  # of the reactive power
+TINY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps  # numbers below it lose digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,10 +126,11 @@ def stored(operators: Operators, state: State) -> float:
 def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
     """Relative error of the energy balance; `stored` in J since its start.
 
-    Where nothing is lost, round-off of the reactive power is no imbalance.
+    Where nothing is lost, round-off of the reactive power is no imbalance, nor is that of numbers
+    too small for their digits.
     """
     size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
-    return abs(spent.work - stored - spent.lost) / size if size > 0 else 0.0
+    return abs(spent.work - stored - spent.lost) / size if size > TINY else 0.0
 
 
 def mean_power(

@@ -20,7 +20,7 @@ from skinwave.bodies.analytic import exact_waves, stack
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
 from skinwave.models.loads import line_factor, probe_rows
-from skinwave.models.reduction import oscillating, read_at
+from skinwave.models.reduction import read_at
 from skinwave.pictures.motion import DrivenBody, driven
 from skinwave.scene import Reading, Scene
 from skinwave.surface import FAINT, Lines, grid, has_wavenumber_integral
@@ -31,6 +31,7 @@ COARSER, ORDER = 1.5, 2  # element size of a second map, and its order: Richards
 # mean over all phases of a load of several frequencies is that of a smooth window over them: Das,
 # Saiki, Sander and Yorke, Nonlinearity 30:4111 (2017).
 MANY, BETWEEN = 1024, 0.01 * (1 + 5**0.5) / 2
+STILL = 1e-9  # Hz: a line below it is the mean
 AT_ONCE = 2_000_000  # values in time of places that are looked at together
 MOST_PLACES = 40_000
 
@@ -124,7 +125,7 @@ def _element_rms(scene: Scene, moved: DrivenBody, depth: float, places: Floats) 
     seen[seen] = _is_above(moved, flat[seen], depth)
     reading = Reading(quantity=asked.name, depths=(depth,) * int(seen.sum()) if depth else ())
     rows, solids = probe_rows(scene.body, moved.build, flat[seen], reading)
-    motion = read_at(oscillating(moved.motion), rows @ moved.basis)
+    motion = read_at(moved.motion, rows @ moved.basis)
     s = 2j * np.pi * motion.frequencies
     lines = motion.lines * line_factor(asked, s, solids, rows.shape[0])
     rms = np.full(len(flat), np.nan)
@@ -142,13 +143,10 @@ def _is_above(moved: DrivenBody, places: Floats, depth: float) -> NDArray[np.boo
 
 def _rms(asked: Quantity, lines: Lines, places: int) -> Floats:
     """RMS (p,) about the mean of lines (f,), (f, p c) of the components of a quantity."""
-    moving = lines[0] > 1e-9
-    f, a = lines[0][moving], lines[1][moving].reshape(int(moving.sum()), places, -1)
+    f, a = lines[0], lines[1].reshape(len(lines[0]), places, -1)
     if asked.invariant is None:
-        return np.asarray(np.sqrt((np.abs(a[..., 0]) ** 2).sum(axis=0) / 2))
-    if not len(f):
-        return np.zeros(places)
-    return np.concatenate([*_parts(asked, f, a)])
+        return np.asarray(np.sqrt((np.abs(a[f > STILL, :, 0]) ** 2).sum(axis=0) / 2))
+    return np.concatenate([*_parts(asked, f, a)])  # of the whole tensor, its mean included
 
 
 def _parts(asked: Quantity, f: Floats, a: fem.Complex) -> Iterator[Floats]:

@@ -131,6 +131,21 @@ def test_delay_and_gain_are_those_given(models):
     assert main_column(late).differs.any()
 
 
+def test_a_measurement_with_its_sign_turned_is_told(models):
+    rng = np.random.default_rng(8)
+    run = models[True][-1]
+    measured = record(run, rng)
+    true, turned = (
+        compare_measured(
+            Measured(measurement=replace(measured, values=sign * measured.values)), models[True]
+        )
+        for sign in (1, -1)
+    )
+    said = "check which direction"
+    assert not any(said in each for each in measured_page.remarks(true))
+    assert any(said in each for each in measured_page.remarks(turned))
+
+
 def test_a_record_that_begins_before_the_motion_is_told(models):
     rng = np.random.default_rng(8)
     steady = record(models[True][-1], rng)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,12 @@ def lines(*frequencies):
 )  # fmt: skip
 def test_mains_hum_is_resolved_from_lines_of_the_load(frequencies, expected):
     assert hum_of(lines(*frequencies), 1.0) == expected
+
+
+def test_what_may_be_of_the_load_is_not_called_mains():
+    loud = [*lines(50.0), replace(lines(150.0)[0], amplitudes=np.full(1, 20.0))]
+    assert hum_of(loud, 1.0) == {0: "mains 50 Hz", 1: "3 x 50 Hz, mains or load"}
+    assert hum_of(lines(60.0, 120.0), 1.0, {0}) == {}  # multiples of the drive's
 
 
 def test_clipping_is_not_rounding():

@@ -54,6 +54,15 @@ def test_the_invariant_of_one_frequency_has_the_mean_square_of_its_period():
     assert rms[middle] == pytest.approx(expected, rel=2e-3)
 
 
+def test_an_invariant_is_of_the_whole_tensor_its_mean_included():
+    scene = replace(LAYER, quantity="largest_shear_strain", depth=0.001)
+    rms = quantity_map(scene, **PLACES).rms
+    long = replace(scene.pressure, tacton=replace(AM, duration=1.0))
+    probes = replace(scene, probes=((0.0, 0.0), (0.006, 0.003)), pressure=long)
+    seen = compute(probes, "flat-body-harmonic").values.std(axis=0)
+    np.testing.assert_allclose(rms[[4, 5], [4, 6]], seen, rtol=0.01)
+
+
 def test_elements_read_what_probes_read():
     still = replace(AM, trajectory=Trajectory(shape="point"), duration=0.5)
     scene = replace(

@@ -26,6 +26,8 @@ POOLED = 10  # degrees of freedom that a probe's mean noise counts as, beside a 
 STEADY = 1.5  # times the remainder of the rest: that of the start of a steady record, at most
 FAINT = 1e-3  # of the largest motion: a transient below it is none
 MOST = 20_000_000  # values of waveforms
+WEAK = 0.05  # of the load's strongest line: unresolved ones below it are left out
+NAMED = 3  # of unresolved lines in a sentence
 FOURTH = 70.0  # sum of squares of the coefficients of a fourth difference
 
 
@@ -62,7 +64,8 @@ class Data:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lines:
     """Measured lines: names (f,), frequencies (f,) in Hz, mean complex amplitudes (f, p), and the
-    standard error (f, p) of each real or imaginary part; whether these are known, and how.
+    standard error (f, p) of each real or imaginary part; whether these are known, and how. `lost`
+    are strong lines of the load that the record is too short to resolve, which leak into others.
     """
 
     names: tuple[str, ...]
@@ -71,6 +74,7 @@ class Lines:
     error: Floats
     is_known: bool
     noise: str
+    lost: tuple[str, ...] = ()
 
 
 def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
@@ -104,6 +108,12 @@ def measured_lines(measured: Measurement, aim: Target) -> Lines:
     """
     read = _of_spectra if measured.is_spectrum else _of_waveforms
     found = _selected(read(measured, aim.scene.pressure), aim)
+    if found.lost:
+        duration = float(np.ptp(measured.times))
+        raise ValueError(
+            f"the record of {1e3 * duration:.4g} ms is too short to resolve {_some(found.lost)} "
+            "from other lines of the load; fit waveforms from rest, or a longer record"
+        )
     if not len(found.frequencies):
         raise ValueError(
             "the measurement resolves no line of the scene's load; give the scene's Tacton the "
@@ -139,18 +149,26 @@ def _of_spectra(measured: Measurement, pressure: MovingPressure) -> Lines:
 
 def _of_waveforms(measured: Measurement, pressure: MovingPressure) -> Lines:
     each = [_response(measured, values) for values in measured.values]
-    named, _ = resolved_lines(pressure, each[0])
+    named, lost = resolved_lines(pressure, each[0])
     f = np.array(list(named.values()))
     fitted = [fit_lines(response, f) for response in each]
     a = np.array([amplitudes for amplitudes, _ in fitted])
     if len(a) > 1:
         error, noise = _of_repetitions(a)
         return Lines(names=tuple(named), frequencies=f, amplitudes=a.mean(axis=0), error=error,
-                     is_known=True, noise=noise)  # fmt: skip
+                     is_known=True, noise=noise, lost=_strong(pressure, lost))  # fmt: skip
     remainder = _response(measured, fitted[0][1])
     return Lines(names=tuple(named), frequencies=f, amplitudes=a[0], error=_beside(remainder, f),
                  is_known=False, noise="errors in proportion to what is beside each line",
-                 )  # fmt: skip
+                 lost=_strong(pressure, lost))  # fmt: skip
+
+
+def _strong(pressure: MovingPressure, lost: Mapping[str, float]) -> tuple[str, ...]:
+    """Those of unresolved lines that are not weak beside the load's strongest."""
+    load = line_names(pressure)
+    strengths = dict(zip(load.names, load.strengths.tolist(), strict=True))
+    least = WEAK * float(load.strengths.max(initial=0.0))
+    return tuple(name for name in lost if strengths.get(name, 0.0) > least)
 
 
 def _response(measured: Measurement, values: Floats) -> Response:
@@ -174,6 +192,8 @@ def _of_repetitions(a: Complex) -> tuple[Floats, str]:
 
 def _beside(remainder: Response, f: Floats) -> Floats:
     """Standard error (f, p) of each part of lines, from the same estimator beside them."""
+    if not len(f):
+        return np.empty((0, remainder.values.shape[1]))
     beside = resolution(remainder) * np.array(BESIDE)
     nyquist = 0.5 * (len(remainder.times) - 1) / float(np.ptp(remainder.times))
     power = []
@@ -228,7 +248,7 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
             f"is {MOST:,}; select places or times, or fit lines"
         )
     lines = _selected(_of_waveforms(measured, aim.scene.pressure), aim)
-    if len(lines.frequencies) and is_steady(measured, lines.frequencies):
+    if len(lines.frequencies) and not lines.lost and is_steady(measured, lines.frequencies):
         return _steady(measured, aim, lines)
     return _from_rest(measured, aim, lines)
 
@@ -262,9 +282,11 @@ def _steady(measured: Measurement, aim: Target, lines: Lines) -> Data:
 
 def _from_rest(measured: Measurement, aim: Target, lines: Lines) -> Data:
     if aim.record.is_steady:
+        why = f"are too short to resolve {_some(lines.lost)}" if lines.lost else "have a transient"
         raise ValueError(
-            f"the waveforms have a transient, which {aim.model} leaves out; take another model, or "
-            "fit lines"
+            f"the waveforms {why}, and {aim.model} has the steady state alone; take another model"
+            + " or a longer record" * bool(lines.lost)
+            + ", or fit lines" * (not lines.lost)
         )
     predict = predicted_waveforms(aim, measured.times)
     differences = np.diff(measured.mean, 4, axis=0)  # which leave little of smooth motion
@@ -272,8 +294,13 @@ def _from_rest(measured: Measurement, aim: Target, lines: Lines) -> Data:
     return replace(
         _of_time(measured, predict, error),
         words=f"waveforms from rest at t = 0, {noise}",
-        rough=_lines(measured, aim) if len(lines.frequencies) else None,
+        rough=_lines(measured, aim) if len(lines.frequencies) and not lines.lost else None,
     )
+
+
+def _some(names: tuple[str, ...]) -> str:
+    """The first of some names."""
+    return ", ".join(names[:NAMED]) + f" and {len(names) - NAMED} more" * (len(names) > NAMED)
 
 
 def _noise(measured: Measurement, alone: Floats) -> tuple[Floats, str]:

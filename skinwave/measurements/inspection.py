@@ -154,11 +154,9 @@ def _origins(measured: Measurement, spectrum: LineSpectrum | None, samples: int)
         driven = spectral_lines(
             measured.drive[None, :samples, None], measured.rate, alarm=ALARM
         ).lines
-    hum = hum_of(spectrum.lines, duration)
-    return tuple(
-        "drive" if _is_among(line, driven, duration) else hum.get(k, "")
-        for k, line in enumerate(spectrum.lines)
-    )
+    of_drive = {k for k, line in enumerate(spectrum.lines) if _is_among(line, driven, duration)}
+    hum = hum_of(spectrum.lines, duration, of_drive)
+    return tuple("drive" if k in of_drive else hum.get(k, "") for k in range(len(spectrum.lines)))
 
 
 def _is_among(line: SpectralLine, others: tuple[SpectralLine, ...], duration: float) -> bool:

@@ -1,6 +1,6 @@
 """Mains hum: lines at multiples of one frequency near 50 or 60 Hz."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -12,18 +12,34 @@ SURE = 4.0  # standard errors
 HIGHEST = 20  # multiple
 
 
-def hum_of(lines: Sequence[SpectralLine], duration: float) -> dict[int, str]:
-    """Names of lines that are mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
+def hum_of(
+    lines: Sequence[SpectralLine], duration: float, driven: Container[int] = ()
+) -> dict[int, str]:
+    """Names of lines that may be mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
 
-    It takes a line at the mains frequency, or at twice and three times it: 200, 400 and 600 Hz are
-    multiples of 50 Hz as well, and a load's own. A multiple goes with it if it is one of the found
-    mains frequency, not of 50 Hz, within its standard error and a twentieth of 1/duration.
+    A multiple that is stronger than the mains frequency itself may be a load's own as well, and
+    is "3 x 50 Hz, mains or load". It takes a line at the mains frequency, or at twice and three
+    times it: 200, 400 and 600 Hz are multiples of 50 Hz as well, and a load's own. A multiple goes
+    with it if it is one of the found mains frequency, not of 50 Hz, within its standard error and a
+    twentieth of 1/duration.
+
+    Parameters
+    ----------
+    lines : of a record
+    duration : of it, s
+    driven : numbers of lines that are in the recorded drive, whose multiples are none of the mains
+
+    Returns
+    -------
+    names by number
     """
     found: dict[int, str] = {}
     for mains in MAINS:
         at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
         first = next((n for n in (1, 2) if at[n] is not None), 0)
         if at[1] is None and (at[2] is None or at[3] is None):
+            continue
+        if at[first] in driven:
             continue
         line = lines[at[first]]  # type: ignore[index]
         base, spread = line.frequency / first, line.error / first
@@ -32,7 +48,11 @@ def hum_of(lines: Sequence[SpectralLine], duration: float) -> dict[int, str]:
             apart = abs(other.frequency - n * base)
             limit = SURE * float(np.hypot(other.error, n * spread)) + 0.05 / duration
             if 1 <= n <= HIGHEST and apart <= limit:
-                found.setdefault(k, f"mains {n} x {mains:g} Hz" if n > 1 else f"mains {mains:g} Hz")
+                loud = (other.amplitudes > line.amplitudes).any()
+                multiple = (
+                    f"{n} x {mains:g} Hz, mains or load" if loud else f"mains {n} x {mains:g} Hz"
+                )
+                found.setdefault(k, multiple if n > 1 else f"mains {mains:g} Hz")
     return found
 
 

@@ -131,6 +131,13 @@ def _numbers(lines: list[str], delimiter: str, columns: tuple[Column, ...], abov
     if not lines:
         raise ValueError("the file has a header and no numbers; export it anew")
     if delimiter != "," and any("," in line for line in lines[:10]):
+        for k, line in enumerate(lines):
+            if "." in line:
+                cell = next(cell for cell in split(line, delimiter) if "." in cell)
+                raise ValueError(
+                    f"line {above + k + 1} has '{cell.strip()[:40]}' with a dot, and the file has "
+                    "decimal commas; leave out separators of thousands"
+                )
         lines = [line.replace(",", ".") for line in lines]
     if '"' in lines[0]:
         lines = [line.replace('"', "") for line in lines]

@@ -100,6 +100,12 @@ def conclusion(found: MeasuredComparison, column: Column) -> str:
             f"lines at places none is beyond it; {left}. Differences below {least} % of the "
             "strongest line would not be seen."
         )
+    if found.is_numerical(column)[differs].all():
+        return (
+            f"The {name} agrees with the data within the noise and its own numerical error: of "
+            f"{known.sum()} differences of lines at places {differs.sum()} are beyond the "
+            f"noise{_numerical(found, column)}; {left}."
+        )
     return (
         f"The {name} does not agree with the data everywhere: {differs.sum()} of {known.sum()} "
         f"differences of lines at places are beyond the noise{_numerical(found, column)}: "
@@ -164,13 +170,22 @@ def remarks(found: MeasuredComparison) -> list[str]:
         step = f"; they are out of step by up to {1e3 * np.ptp(shifts):.3g} ms, and were shifted"
         said += (step if shifts.any() else ", in step within it") + "."
         said += " More of them would tell smaller differences." if r < FEW else ""
-    lost = ", ".join(found.unresolved)
+    lost, main = ", ".join(found.unresolved), main_column(found)
     return [
         said,
+        *_opposite(main),
         *([f"Not compared, since record or model cannot resolve them: {lost}."] if lost else []),
         *_changes(found),
         *measurement.remarks,
     ]
+
+
+def _opposite(column: Column) -> list[str]:
+    """A sentence where the other sign of the measurement fits as well."""
+    return [
+        f"With its sign turned the measurement fits the {label(column.run.column)} as well or "
+        "better, at another delay: check which direction was taken as positive."
+    ] * column.may_be_turned
 
 
 def _changes(found: MeasuredComparison) -> list[str]:

@@ -1,13 +1,13 @@
 """Models beside a measurement: lines, delay, gain, and differences that exceed the noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from skinwave.comparison import heard_phasors
-from skinwave.measurements.alignment import Alignment, align
+from skinwave.measurements.alignment import AS_GOOD, Alignment, align
 from skinwave.measurements.coherence import Coherence, coherence
 from skinwave.measurements.lines import MeasuredLines, lines_of
 from skinwave.measurements.measurement import Measurement
@@ -46,6 +46,7 @@ class Column:
     model : (f, p) complex, its lines with gain and delay, in the unit of the measurement
     significance : (f, p) float, of differences, adjusted for their number (Holm); nan if unknown
     misfit : float, RMS difference of the lines over all places over that of the measured lines
+    may_be_turned : bool, whether the measurement with its sign turned fits as well
     """
 
     run: Run
@@ -53,6 +54,7 @@ class Column:
     model: np.ndarray
     significance: Floats
     misfit: float
+    may_be_turned: bool = False
 
     @property
     def differs(self) -> np.ndarray:
@@ -155,9 +157,13 @@ def _column(asked: Measured, run: Run, lines: MeasuredLines) -> Column:
     found = align(lines, z, window=window, delay=asked.delay, gain=gain)
     model = found.applied(lines.frequencies, z)
     away = lines.mean - model
+    turned = align(replace(lines, each=-lines.each), z, window=window, delay=asked.delay, gain=gain)
+    fits = 2 * lines.variance.size * (turned.chi_square - found.chi_square) < AS_GOOD
+    nearer = abs(turned.delay) < abs(found.delay) or turned.chi_square < found.chi_square
     return Column(
         run=run, alignment=found, model=model, significance=holm(significances(away, lines)),
         misfit=float(np.linalg.norm(away) / np.linalg.norm(lines.mean)),
+        may_be_turned=bool(fits and nearer),
     )  # fmt: skip
 
 

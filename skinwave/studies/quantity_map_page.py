@@ -21,8 +21,8 @@ from skinwave.scene_file import dumps
 
 WIDTH, HEIGHT = 5.6, 5.0  # inch of the figure
 CAPTION = (
-    "RMS of the steady vibration about its mean; the mean itself is left out. Dotted: the path of "
-    f"the focus; white: {NEAR:g} dB re the largest."
+    "RMS of the quantity about its mean in the steady state. Dotted: the path of the focus; white: "
+    f"{NEAR:g} dB re the largest."
 )
 
 
