@@ -258,9 +258,7 @@ def test_waveforms_from_rest_are_fitted_with_their_transient(scene, lines):
     assert "from rest" in found.solution.problem.data.words
     assert found.values[MODULUS] == pytest.approx(30e3, rel=0.01)
     assert found.values["gain"] == pytest.approx(1.5, rel=0.02)
-    with pytest.raises(
-        ValueError, match="transient, and flat-body-harmonic has"
-    ):
+    with pytest.raises(ValueError, match="transient, and flat-body-harmonic has"):
         fit(scene, measured, vary(MODULUS), model="flat-body-harmonic")
 
 
