@@ -13,6 +13,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
+from simple_model.drive import DRIVES
 from simple_model.plate_modes import Plate
 from skinwave.inference import drive_laws
 from skinwave.sweeps.variation import Variation, combinations
@@ -178,7 +179,7 @@ def probes(candidate: Candidate) -> Floats:
 def pressure(candidate: Candidate, tacton: Tacton) -> MovingPressure:
     """The load of a Tacton."""
     return MovingPressure(
-        tacton=tacton, drive=candidate["drive"],
+        tacton=tacton, drive=(DRIVES | drive_laws.LAWS)[candidate["drive"]],
         depth_of_modulation=candidate["depth_of_modulation"], height=candidate["height_mm"] / 1e3,
     )  # fmt: skip
 

@@ -1,12 +1,11 @@
 """Drive laws of a device that does not do what it is told: more than two lines of AM.
 
-Importing this module registers them; scene files that name them are read where
-`SKINWAVE_EXTENSIONS` has the name of this module.
+Scene files that name them are read where `SKINWAVE_EXTENSIONS` has the name of `registered_laws`.
 """
 
 import numpy as np
 
-from simple_model.drive import DRIVES, DriveLaw
+from simple_model.drive import DriveLaw
 from simple_model.trajectory import Floats
 
 COMPRESSION = 0.25  # of the pressure at small drive over that at full drive, less 1
@@ -29,4 +28,4 @@ def _compressed(amplitude: Floats | float, modulation: Floats, depth: float) -> 
 
 CLIPPED = DriveLaw(name="clipped", pressure=_clipped, words="modulated beyond full depth")
 COMPRESSED = DriveLaw(name="compressed", pressure=_compressed, words="usual AM, saturating")
-DRIVES.update({law.name: law for law in (CLIPPED, COMPRESSED) if law.name not in DRIVES})
+LAWS = {law.name: law for law in (CLIPPED, COMPRESSED)}

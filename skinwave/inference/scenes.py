@@ -19,7 +19,7 @@ from skinwave.inference.design import (
     thickness,
 )
 
-OWN_LAWS = (drive_laws.CLIPPED.name, drive_laws.COMPRESSED.name)
+EXTENSION = "skinwave.inference.registered_laws"
 TACTON = {"am_frequency_hz": 140.0, "shape": "circle", "size_mm": 20.0, "speed_m_per_s": 12.0}
 
 
@@ -39,8 +39,8 @@ def scene_text(candidate: Candidate) -> str:
         },
     }  # fmt: skip
     note = ""
-    if candidate["drive"] in OWN_LAWS:
-        note = f"# Read with SKINWAVE_EXTENSIONS={drive_laws.__name__} in the environment.\n"
+    if candidate["drive"] in drive_laws.LAWS:
+        note = f"# Read with SKINWAVE_EXTENSIONS={EXTENSION} in the environment.\n"
     return note + tomli_w.dumps(table)
 
 
