@@ -67,7 +67,7 @@ def _with_threads(options: argparse.Namespace, threads: dict[str, str]) -> int:
             return again.wait()
         except KeyboardInterrupt:
             again.send_signal(signal.SIGINT)
-            return again.wait()
+            return int(again.wait() != 0)  # which is negative before it listens to signals
         except SystemExit:
             again.terminate()
             raise
