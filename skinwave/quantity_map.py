@@ -13,12 +13,11 @@ import fem
 from fem.load_and_probe import surface_frame
 from meshes.tetmesh import Floats
 from simple_model.flat_body import field_lines
-from simple_model.flat_quantities import quantity_field, surface_field
 from simple_model.load_spectrum import synthesise
 from simple_model.quantities import Quantity
-from skinwave.bodies.analytic import exact_waves, stack
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
+from skinwave.models.flat_body import field_read
 from skinwave.models.loads import line_factor, probe_rows
 from skinwave.models.reduction import read_at
 from skinwave.pictures.motion import DrivenBody, driven
@@ -107,12 +106,7 @@ def quantity_map(
 
 def _flat_rms(scene: Scene, depth: float, places: Floats) -> Floats:
     """RMS (ny, nx) at places (ny, nx, 2) of a laterally infinite body."""
-    body, asked = scene.body, scene.reading.asked
-    field = (
-        quantity_field(asked, stack(body), depth)
-        if body.of_kind.is_layer
-        else surface_field(asked, exact_waves(body, "flat-body-harmonic"))
-    )
+    asked, field = scene.reading.asked, field_read(scene, depth)
     f, found = field_lines(field, scene.pressure, places.reshape(-1, 2), threshold=FAINT)
     rms = _rms(asked, (f, found.reshape(len(f), -1)), found.shape[1])
     return rms.reshape(places.shape[:2])

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from skinwave.commands.common import add_output, add_scene, progress_of, summarise, warn
-from skinwave.commands.measured import SIGNS, add_reading
+from skinwave.commands.measured import add_reading, measured_in
 from skinwave.models import names
 
 KINDS = ("waveforms", "lines", "amplitudes")
@@ -42,20 +42,13 @@ def run(options: argparse.Namespace) -> int:
     from skinwave import record
     from skinwave.fits.fit import cautions, fit, sampled, sentences
     from skinwave.fits.page import summary, write
-    from skinwave.measurements.reading import places_of
-    from skinwave.measurements.reading import read as read_measurement
     from skinwave.outputs import output_folder
     from skinwave.scene_file import read
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
     scene = read(options.scene)
-    measured = read_measurement(
-        options.measured, quantity=options.quantity, unit=options.unit,
-        places=places_of(options.places) if options.places else None,
-        sign=SIGNS[options.positive] if options.positive else None,
-        rate=options.rate, variable=options.variable,
-    )  # fmt: skip
+    measured = measured_in(options.measured, options)
     out = options.out or Path(f"{options.scene.stem}-fit")
     inputs = [options.scene, options.measured, scene.body.file]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from skinwave.commands.common import add_output, summarise
 
 if TYPE_CHECKING:
+    from skinwave.measurements import Measurement
     from skinwave.measurements.inspection import Inspection
 
 SIGNS = {"in": 1, "out": -1}
@@ -36,18 +37,24 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--variable", default="", metavar="NAME", help="array of a file of several")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
-    from skinwave.measurements.inspection import inspect
+def measured_in(file: Path, options: argparse.Namespace) -> "Measurement":
+    """The measurement in a file, by the options of `add_reading`."""
     from skinwave.measurements.reading import places_of, read
-    from skinwave.measurements.summary import summary, text
 
-    measured = read(
-        options.file, quantity=options.quantity, unit=options.unit,
+    return read(
+        file, quantity=options.quantity, unit=options.unit,
         places=places_of(options.places) if options.places else None,
         sign=SIGNS[options.positive] if options.positive else None,
         rate=options.rate, variable=options.variable,
     )  # fmt: skip
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; the exit code."""
+    from skinwave.measurements.inspection import inspect
+    from skinwave.measurements.summary import summary, text
+
+    measured = measured_in(options.file, options)
     found = inspect(measured, alarm=options.false_alarm)
     told = summary(found)
     said = text(found)

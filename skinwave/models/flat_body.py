@@ -38,7 +38,7 @@ def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, request: R
     for depth in np.unique(depths).tolist():
         here = depths == depth
         values[:, here] = waveforms(
-            _field(scene, depth), asked, scene.pressure, scene.probe_points[here], times
+            field_read(scene, depth), asked, scene.pressure, scene.probe_points[here], times
         )
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
@@ -47,7 +47,14 @@ def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, request: R
     )  # fmt: skip
 
 
-def _field(scene: Scene, depth: float) -> Field:
+def field_read(scene: Scene, depth: float) -> Field:
+    """Field of the quantity that a scene reads, at a depth in metre of its laterally infinite body.
+
+    Raises
+    ------
+    ValueError
+        If the body has no wavenumber integral, or no such depth.
+    """
     body, asked = scene.body, scene.reading.asked
     if body.of_kind.is_layer:
         return quantity_field(asked, stack(body), depth)
