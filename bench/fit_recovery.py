@@ -1,15 +1,20 @@
 """Recovery of a known material by `skinwave fit`: share of draws inside the 95 % intervals.
 
     python -m bench.fit_recovery [waveforms | lines | amplitudes] [--draws 50] [--starts 20]
+        [--out FILE]
 
 A slab of skin of another modulus (by up to 30 %), viscosity, gain and delay in each draw moves by
 the wavenumber integral; noise of 5 % is added, of the RMS motion at each place to waveforms of 1 s,
-or of the strongest line at each place to complex lines, in three repetitions. The first draw is
-fitted from all starts, the others from two. Prints a row a draw, and the shares at the end.
+or of the strongest line at each place to complex lines, in three repetitions. Prints a row a draw,
+and at the end the shares, and how far the worst start of all draws is off the true modulus and off
+that of the draw's own solution, which differs from the true one by the noise. With `--out FILE` a
+row of JSON is added for each draw, and draws that are there are not made again.
 """
 
 import argparse
+import json
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -54,42 +59,82 @@ def measured(scene: Scene, kind: str, true: dict[str, float], rng: np.random.Gen
     return Measurement(**given, frequencies=f[f > 0], values=values)
 
 
+def drawn(scene: Scene, kind: str, draw: int, starts: int) -> dict:
+    """Row of a draw: moduli, whether the true values are inside the intervals, CPU seconds."""
+    rng = np.random.default_rng([0, draw])
+    true = truth(rng)
+    data = measured(scene, kind, true, rng)
+    keys = [key for key in LIMITS if key != "delay_ms" or kind != "amplitudes"]
+    vary = [f"{key}={LIMITS[key][0]}:{LIMITS[key][1]}" for key in keys]
+    began = time.process_time()
+    found = fit(scene, data, vary, kind=kind, starts=starts, seed=draw)
+    seconds = time.process_time() - began
+    by_profile = {each.key: (each.low, each.high) for each in found.profiles}
+    values = found.solution.problem.parameters.values
+    ended = [values(start.ended)[MODULUS] for start in found.solution.starts]
+    return {
+        "kind": kind, "draw": draw, "starts": starts, "keys": keys, "seconds": seconds,
+        "true": true[MODULUS], "found": found.values[MODULUS], "ended": ended,
+        "reached": found.solution.reached, "runs": found.solution.runs,
+        "half": float(np.log(found.estimates[0].high / found.estimates[0].low) / 2),
+        "chi": found.solution.cost / found.solution.dof,
+        "white": bool(found.whiteness.is_white), "turned": found.solution.may_be_turned,
+        "inside": [
+            [bool(each.low <= true[each.key] <= each.high) for each in found.estimates],
+            [bool(by_profile[key][0] <= true[key] <= by_profile[key][1]) for key in keys],
+        ],
+    }  # fmt: skip
+
+
+def away(row: dict, of: str) -> float:
+    """How far the worst start is off a modulus of the row, relative."""
+    return max(abs(modulus / row[of] - 1) for modulus in row["ended"])
+
+
+def tell(row: dict) -> None:
+    print(
+        f"{row['kind']} {row['draw']}: worst of {row['starts']} starts "
+        f"{100 * away(row, 'true'):.3f} % off the true modulus, {100 * away(row, 'found'):.4f} % off the solution; half interval "
+        f"{100 * row['half']:.3f} %, chi2/dof {row['chi']:.3f}, {row['runs']} runs, "
+        f"{row['seconds']:.1f} s CPU, inside {row['inside']}", flush=True,
+    )  # fmt: skip
+
+
+def conclude(rows: list[dict]) -> None:
+    shares = 100 * np.mean([row["inside"] for row in rows], axis=0)
+    print(
+        f"{rows[0]['kind']}, {len(rows)} draws from {rows[0]['starts']} starts: worst start "
+        f"{100 * max(away(row, 'true') for row in rows):.3f} % off the true modulus, "
+        f"{100 * max(away(row, 'found') for row in rows):.4f} % off the solution; the solutions "
+        f"{100 * max(abs(row['found'] / row['true'] - 1) for row in rows):.3f} % off the true one"
+    )
+    for key, covariance, profile in zip(rows[0]["keys"], *shares, strict=True):
+        print(f"{key}: inside by covariance {covariance:.0f} %, by profile {profile:.0f} %")
+    print(f"all: {shares.mean():.1f} %; CPU s {np.median([row['seconds'] for row in rows]):.1f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kind", nargs="?", default="waveforms")
     parser.add_argument("--draws", type=int, default=50)
     parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    scene, rng = read(SCENE), np.random.default_rng(0)
-    keys = [key for key in LIMITS if key != "delay_ms" or options.kind != "amplitudes"]
-    vary = [f"{key}={LIMITS[key][0]}:{LIMITS[key][1]}" for key in keys]
-    inside, worst, seconds = [], 0.0, []
+    known, rows = {}, []
+    if options.out and options.out.exists():
+        for row in map(json.loads, options.out.read_text().splitlines()):
+            known[row["kind"], row["draw"], row["starts"]] = row
+    scene = read(SCENE)
     for draw in range(options.draws):
-        true = truth(rng)
-        data = measured(scene, options.kind, true, rng)
-        began = time.process_time()
-        starts = 2 if draw else options.starts
-        found = fit(scene, data, vary, kind=options.kind, starts=starts, seed=draw)
-        seconds.append(time.process_time() - began)
-        by_profile = {each.key: (each.low, each.high) for each in found.profiles}
-        inside.append([
-            [each.low <= true[each.key] <= each.high for each in found.estimates],
-            [by_profile[key][0] <= true[key] <= by_profile[key][1] for key in keys],
-        ])  # fmt: skip
-        ended = [found.solution.problem.parameters.values(x.ended) for x in found.solution.starts]
-        off = max(abs(values[MODULUS] / true[MODULUS] - 1) for values in ended)
-        worst = max(worst, off)
-        print(
-            draw, f"starts {starts}, worst modulus {100 * off:.3f} % off,",
-            f"half interval {50 * (found.estimates[0].high / found.estimates[0].low - 1):.3f} %,",
-            f"chi2/dof {found.solution.cost / found.solution.dof:.3f},",
-            f"{seconds[-1]:.1f} s CPU, inside {inside[-1]}", flush=True,
-        )  # fmt: skip
-    shares = 100 * np.mean(inside, axis=0)
-    print(f"{options.kind}: modulus of the worst start of all draws {100 * worst:.3f} % off")
-    for key, covariance, profile in zip(keys, *shares, strict=True):
-        print(f"{key}: inside by covariance {covariance:.0f} %, by profile {profile:.0f} %")
-    print(f"seconds of CPU: first {seconds[0]:.1f}, median of the others {np.median(seconds):.1f}")
+        row = known.get((options.kind, draw, options.starts))
+        if row is None:
+            row = drawn(scene, options.kind, draw, options.starts)
+            if options.out:
+                with options.out.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+        tell(row)
+        rows.append(row)
+    conclude(rows)
 
 
 if __name__ == "__main__":

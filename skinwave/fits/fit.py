@@ -18,19 +18,24 @@ from skinwave.fits.identify import (
     estimates,
     unresolved,
     whiteness,
+    widenings,
 )
+from skinwave.fits.measured_lines import some
 from skinwave.fits.observed import KINDS, data_of
-from skinwave.fits.parameters import check, of_scene, parse
+from skinwave.fits.parameters import DELAY, check, of_scene, parse
 from skinwave.fits.posterior import Posterior, posterior
 from skinwave.fits.predicted import Target, target, with_reduction
+from skinwave.fits.problem import Problem
 from skinwave.fits.profile import Profile, profiles
-from skinwave.fits.solve import Problem, Solution, solve
+from skinwave.fits.solve import Solution, solve
 from skinwave.measurements import Measurement
+from skinwave.measurements.alignment import opposite_sign
 from skinwave.numbers import significant
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import varied
 
 STARTS = 8
+LEFT_OUT = 1e-3  # of the measured power in lines that are not fitted, from which that is said
 MISFIT = 1.5  # chi squared over its degrees of freedom, of known errors, from which a model misfits
 
 
@@ -48,6 +53,7 @@ class Fit:
     unresolved : directions that the data do not resolve
     profiles : of the parameters that are resolved
     whiteness : Whiteness of the residuals
+    widenings : (k,) float, factors of the intervals for residuals that are not white
     posterior : Posterior, if it was sampled
     """
 
@@ -59,6 +65,7 @@ class Fit:
     unresolved: tuple[Direction, ...]
     profiles: tuple[Profile, ...]
     whiteness: Whiteness
+    widenings: Floats
     posterior: Posterior | None = None
 
     @property
@@ -150,6 +157,7 @@ def assessed(
         measured=measured, target=aim, solution=solution, estimates=estimates(solution),
         correlations=correlations(solution), unresolved=unresolved(solution),
         profiles=profiles(solution, progress), whiteness=whiteness(solution.residual),
+        widenings=widenings(solution),
     )  # fmt: skip
 
 
@@ -215,7 +223,8 @@ def cautions(found: Fit) -> list[str]:
     ] * (not solution.converged)
     said += [_at_limit(found, each) for each in found.estimates if each.at_limit]
     said += [_unresolved(found, each) for each in found.unresolved]
-    said += _beyond_errors(found) + _coloured(found) + _elsewhere(found)
+    said += _beyond_errors(found) + _coloured(found) + _elsewhere(found) + _turned(found)
+    said += _left_out(found)
     named = {key for each in found.unresolved for key in each.keys}
     said += [
         f"the data do not determine {each.key} between its limits; measure more, or leave it out"
@@ -273,7 +282,33 @@ def _coloured(found: Fit) -> list[str]:
         return []
     return [
         f"the residuals are not white (Ljung-Box, p = {found.whiteness.p:.1g}): what is left has "
-        "structure, and the intervals, which are for independent errors, are likely too narrow"
+        f"structure, for which the intervals are widened by {_factors(found)}; if it is no noise, "
+        "look for what the scene leaves out"
+    ]
+
+
+def _factors(found: Fit) -> str:
+    """The factors of the intervals of what is resolved."""
+    each = [x for x, e in zip(found.widenings, found.estimates, strict=True) if e.is_resolved]
+    low, high = (significant(x, 3) for x in (min(each, default=1.0), max(each, default=1.0)))
+    return low if low == high else f"{low} to {high}"
+
+
+def _turned(found: Fit) -> list[str]:
+    has_delay = DELAY in found.solution.problem.parameters.keys
+    return [opposite_sign(found.target.model, has_delay)] * found.solution.may_be_turned
+
+
+def _left_out(found: Fit) -> list[str]:
+    """Sentence on lines that are strong in the measurement, and not fitted."""
+    strong = [line for line in found.solution.problem.data.left_out if line.share > 0]
+    share = sum(line.share for line in strong)
+    if share <= LEFT_OUT:
+        return []
+    return [
+        f"lines that are not fitted, {some(tuple(line.name for line in strong))}, have "
+        f"{significant(100 * share, 2)} % of the measured power, and in the model next to none; "
+        "check the drive and the path of the scene"
     ]
 
 
