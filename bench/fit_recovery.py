@@ -94,7 +94,8 @@ def away(row: dict, of: str) -> float:
 def tell(row: dict) -> None:
     print(
         f"{row['kind']} {row['draw']}: worst of {row['starts']} starts "
-        f"{100 * away(row, 'true'):.3f} % off the true modulus, {100 * away(row, 'found'):.4f} % off the solution; half interval "
+        f"{100 * away(row, 'true'):.3f} % off the true modulus, "
+        f"{100 * away(row, 'found'):.4f} % off the solution; half interval "
         f"{100 * row['half']:.3f} %, chi2/dof {row['chi']:.3f}, {row['runs']} runs, "
         f"{row['seconds']:.1f} s CPU, inside {row['inside']}", flush=True,
     )  # fmt: skip
