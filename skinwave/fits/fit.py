@@ -35,6 +35,7 @@ from skinwave.scene import Scene
 from skinwave.sweeps.variation import varied
 
 STARTS = 8
+LEAST = 1e-9  # probability that is shown
 LEFT_OUT = 1e-3  # of the measured power in lines that are not fitted, from which that is said
 MISFIT = 1.5  # chi squared over its degrees of freedom, of known errors, from which a model misfits
 
@@ -281,17 +282,22 @@ def _coloured(found: Fit) -> list[str]:
     if found.whiteness.is_white or np.isnan(found.whiteness.p):
         return []
     return [
-        f"the residuals are not white (Ljung-Box, p = {found.whiteness.p:.1g}): what is left has "
-        f"structure, for which the intervals are widened by {_factors(found)}; if it is no noise, "
-        "look for what the scene leaves out"
+        f"the residuals are not white (Ljung-Box, p {probability(found.whiteness.p)}): what is left "
+        f"has structure, for which the intervals are widened by {_factors(found)}; if it is no "
+        "noise, look for what the scene leaves out"
     ]
 
 
 def _factors(found: Fit) -> str:
-    """The factors of the intervals of what is resolved."""
+    """Words on the factors of the intervals of what is resolved."""
     each = [x for x, e in zip(found.widenings, found.estimates, strict=True) if e.is_resolved]
     low, high = (significant(x, 3) for x in (min(each, default=1.0), max(each, default=1.0)))
-    return low if low == high else f"{low} to {high}"
+    return f"a factor of {low}" if low == high else f"factors of {low} to {high}"
+
+
+def probability(p: float) -> str:
+    """A probability with its sign of relation."""
+    return f"= {significant(p, 2)}" if p >= LEAST else f"< {LEAST:g}"
 
 
 def _turned(found: Fit) -> list[str]:

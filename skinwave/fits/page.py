@@ -16,9 +16,10 @@ from skinwave.fits.figures import (
     profile_figure,
     residual_figure,
 )
-from skinwave.fits.fit import Fit, cautions, sentences, shown
+from skinwave.fits.fit import Fit, cautions, probability, sentences, shown
 from skinwave.fits.identify import Estimate
-from skinwave.fits.solve import Start
+from skinwave.fits.measured_lines import LeftOut
+from skinwave.fits.starts import Start
 from skinwave.numbers import significant
 from skinwave.pictures.figures import png
 from skinwave.plain_text import csv_table
@@ -32,7 +33,7 @@ WORST = 20  # starts in the table
 MOST_LEFT_OUT = 20  # lines in the table
 EXPLAINED = (
     "An interval holds the true value in 95 of 100 measurements, if the model is the true one and "
-    "errors are noise: by the covariance at the solution, and by the profile of the "
+    "what it leaves is noise: by the covariance at the solution, and by the profile of the "
     "likelihood, which need not be symmetric. Where the two differ take the latter."
 )
 FITTED = {
@@ -130,8 +131,8 @@ def whiteness_sentence(found: Fit) -> str:
         ) + "."
     )  # fmt: skip
     return (
-        f"By the test of Ljung and Box over {len(test.correlations)} lags, p = "
-        f"{significant(test.p, 2)}: {said}"
+        f"By the test of Ljung and Box over {len(test.correlations)} lags, p "
+        f"{probability(test.p)}: {said}"
     )
 
 
@@ -139,13 +140,18 @@ def left_out_table(found: Fit) -> tuple[list[str], list[list[str]]]:
     """Header and rows of the lines of the load that are not fitted, the strongest first."""
     left_out = found.solution.problem.data.left_out
     rows = [
-        [line.name, f"{line.frequency:.1f}",
-         significant(100 * line.share, 2) if isfinite(line.share) else "not resolved", line.why]
+        [line.name, f"{line.frequency:.1f}", _share(line), line.why]
         for line in left_out[:MOST_LEFT_OUT]
     ]  # fmt: skip
     if len(left_out) > MOST_LEFT_OUT:
         rows.append([f"{len(left_out) - MOST_LEFT_OUT} more", "", "", ""])
     return ["line", "frequency, Hz", "of the measured power, %", "why"], rows
+
+
+def _share(line: LeftOut) -> str:
+    if not isfinite(line.share):
+        return "not resolved"
+    return significant(100 * line.share, 2) if line.share else "no more than noise"
 
 
 def estimate_table(found: Fit) -> tuple[list[str], list[list[str]]]:
@@ -235,6 +241,7 @@ def summary(found: Fit) -> dict[str, Any]:
         "starts": len(solution.starts),
         "starts_that_reached_it": solution.reached,
         "predictions": solution.runs,
+        "factorisations": found.target.reduced and found.target.reduced.effort.factorisations,
         "sentences": sentences(found),
         "warnings": cautions(found),
     }
