@@ -10,7 +10,8 @@ from simple_model.flat_body import flat_body, steady_lines
 from simple_model.load_spectrum import synthesise
 from skinwave import cli
 from skinwave.bodies.analytic import compliance
-from skinwave.fits.fit import cautions, fit, shown
+from skinwave.fits.findings import cautions, shown
+from skinwave.fits.fit import fit
 from skinwave.fits.identify import correlations, estimates, whiteness, width
 from skinwave.fits.observed import Data, is_steady
 from skinwave.fits.parameters import Parameter, check, parse

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from skinwave.effort import silent
-from skinwave.fits.fit import cautions, fit
+from skinwave.fits.findings import cautions
+from skinwave.fits.fit import fit
 from skinwave.fits.measured_lines import FAINT, predicted_part
 from skinwave.fits.observed import Data
 from skinwave.fits.page import left_out_table

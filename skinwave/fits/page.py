@@ -16,7 +16,8 @@ from skinwave.fits.figures import (
     profile_figure,
     residual_figure,
 )
-from skinwave.fits.fit import Fit, cautions, probability, sentences, shown
+from skinwave.fits.findings import cautions, probability, sentences, shown
+from skinwave.fits.fit import Fit
 from skinwave.fits.identify import Estimate
 from skinwave.fits.measured_lines import LeftOut
 from skinwave.fits.starts import Start
