@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skinwave.models import names
-from skinwave.plain_text import printable, say
+from skinwave.plain_text import say
 
 if TYPE_CHECKING:
     from simple_model import Response
@@ -136,32 +136,7 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
     if options.quiet or options.json:
         yield lambda phase, fraction: None
         return
-    from skinwave.steps import follower
+    from skinwave.progress_bar import bar
 
-    follow = follower()
-    if not sys.stderr.isatty():
-        phases: list[str] = []
-
-        def log(phase: str, fraction: float) -> None:
-            name = follow(phase, fraction).name
-            if name not in phases[-1:]:
-                phases.append(name)
-                say(name, sys.stderr)
-
-        yield log
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description:<36}", markup=False), BarColumn(), TimeElapsedColumn())
-    left = TextColumn("{task.fields[left]}", markup=False)
-    with Progress(*columns, left, console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=1.0, left="")
-
-        def show(phase: str, fraction: float) -> None:
-            step = follow(phase, fraction)
-            bar.update(
-                task, description=printable(step.name, ""), completed=step.done, left=step.time_left
-            )
-
-        yield show
+    with bar() as shown:
+        yield shown

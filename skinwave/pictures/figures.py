@@ -16,7 +16,7 @@ from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.numbers import significant
-from skinwave.pictures.styles import LABELS, STYLES, Style
+from skinwave.pictures.styles import LABELS, STYLES, TEXT, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
@@ -28,8 +28,6 @@ COLOURS = {
 }
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
-# Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
-TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 REPORT = STYLES["report"]
 IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
