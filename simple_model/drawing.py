@@ -70,7 +70,7 @@ def columns_of(ax: "Axes", entries: int) -> int:
     """Columns of a legend above axes, as many as they have room for."""
     import matplotlib as mpl
 
-    inch = ax.get_position().width * ax.get_figure(root=True).get_figwidth()
+    inch = ax.get_window_extent().width / ax.figure.get_dpi()
     return max(1, min(entries, int(inch / (ENTRY * mpl.rcParams["font.size"]))))
 
 

@@ -23,7 +23,9 @@ def html(response: "Response") -> str:
         left, right = figure.subplots(1, 2)
         end = 1e3 * response.times[-1]
         response.plot(ax=left).set_xlim(max(1e3 * response.times[0], end - 1e3 * SHOWN), end)
-        response.spectrum().plot(ax=right).get_legend().remove()
+        response.spectrum().plot(ax=right)
+        if legend := right.get_legend():  # the same as that on the left
+            legend.remove()
 
     image = drawing.picture(draw, 8, 2.6) if len(response.times) > 1 else b""
     title = f"{response.model}: {response.record.words}"

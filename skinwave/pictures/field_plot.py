@@ -1,7 +1,7 @@
 """The motion of a whole body as a map from above, as a film of it, and as files of ParaView."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
     from matplotlib.collections import TriMesh
+    from matplotlib.figure import Figure
 
     from skinwave.fields import Field
 
@@ -70,8 +71,8 @@ def animation(field: "Field", frames: int, ax: "Axes | None") -> "FuncAnimation"
         image.set_array(pushed[k])
         return image, ax.set_title(_stamp(field, k), fontsize="medium")
 
-    shown = _spread(len(field.times), frames)
-    return FuncAnimation(ax.get_figure(root=True), show, shown.tolist(), interval=INTERVAL)
+    shown, figure = _spread(len(field.times), frames), cast("Figure", ax.figure)
+    return FuncAnimation(figure, show, shown.tolist(), interval=INTERVAL)
 
 
 def save(field: "Field", path: Path, frames: int | None, *, overwrite: bool) -> Path:
@@ -95,10 +96,17 @@ def _map(field: "Field", ax: "Axes") -> "tuple[TriMesh, Floats]":
     from matplotlib.tri import Triangulation
 
     surface, triangles = upper(field)
-    places = Triangulation(*(1e3 * field.mesh.points[surface, :2].T), triangles)
+    x, y = 1e3 * field.mesh.points[surface, :2].T
     pushed = -DISPLACEMENT.per_unit * field.displacement[:, surface, 2]
     limit = float(np.abs(pushed).max()) or 1.0
-    image = ax.tripcolor(places, pushed[0], shading="gouraud", cmap=SIGNED, vmin=-limit, vmax=limit)
+    image = ax.tripcolor(
+        Triangulation(x, y, triangles),
+        pushed[0],
+        shading="gouraud",
+        cmap=SIGNED,
+        vmin=-limit,
+        vmax=limit,
+    )
     ax.set_aspect("equal")
     ax.set_xlabel("x, mm")
     ax.set_ylabel("y, mm")

@@ -83,8 +83,7 @@ def style(name: str, width: float | None = None) -> Style:
             f"width = {width:g} inch is outside {NARROWEST:g}..{WIDEST:g}; one column of a journal "
             "is 3.5 inch, two are 7"
         )
-    own = {"ink": chosen.ink, "paper": chosen.paper} if name != "report" else {}
-    return replace(STYLES["print"], columns=(width, width), **own)
+    return replace(STYLES["print"], columns=(width, width), ink=chosen.ink, paper=chosen.paper)
 
 
 @contextmanager

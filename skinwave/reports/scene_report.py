@@ -17,6 +17,7 @@ from skinwave.pictures.maps import Raster, sampler
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
 from skinwave.reports.album import Album, open_album
+from skinwave.reports.chosen import only
 from skinwave.reports.gallery import Gallery, pictures, run_figures, tactons
 from skinwave.run import Run
 from skinwave.scene import Scene
@@ -34,18 +35,25 @@ ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be ass
 
 
 def write_report(
-    results: Path, out: Path, style: Style, progress: Progress, *, formats: Sequence[str] = ("png",)
+    results: Path,
+    out: Path,
+    style: Style,
+    progress: Progress,
+    *,
+    formats: Sequence[str] = ("png",),
+    columns: Sequence[str] = (),
 ) -> None:
-    """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder.
+    """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder,
+    or from some columns of them.
 
     No model of a body is run.
 
     Raises
     ------
     ValueError
-        If the folder holds no result.
+        If the folder holds no result, or no such column.
     """
-    album = open_album(results)
+    album = only(open_album(results), columns)
     (out / "pictures").mkdir()
     gallery = Gallery(folder=out / "pictures", style=style, formats=formats)
     views = pictures(album, gallery, progress)
