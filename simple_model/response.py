@@ -143,7 +143,7 @@ class Response:
     def velocity(self) -> Floats:
         """Velocity (t, p) in m/s into the body, of a displacement or velocity; a ValueError of
         anything else. A displacement is differentiated as its spline of degree 9, with an error of
-        1e-8 of lines below a tenth of the sampling rate and 1e-4 below a quarter; within ten
+        1e-8 of lines below a tenth of the sampling rate and 1e-4 below a quarter; within 20
         samples of its ends of 1e-3 and more.
         """
         return motion_rates.derivative(self, VELOCITY)

@@ -19,6 +19,7 @@ def open_windows(figures: Mapping[str, "Figure"]) -> None:
     for title, figure in figures.items():
         size = figure.get_size_inches()
         canvas = plt.figure(title, figsize=size).canvas
+        figure.set_label(title)
         canvas.figure = figure  # drawn before, without a window, and now in this one
         figure.set_canvas(canvas)
     plt.show()

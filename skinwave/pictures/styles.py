@@ -16,6 +16,7 @@ LABELS = {
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 NARROWEST, WIDEST = 2.0, 15.0  # inch of a figure
+NARROW = 5.0  # inch: narrower figures have one column of panels
 ONE_COLUMN = 6.5  # inch of letters of 10 points: wider figures take two columns in print
 
 
@@ -39,6 +40,11 @@ class Style:
     def zoom(self) -> float:
         """How large letters are, over those of 10 points."""
         return self.font / 10
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether no column has room for two panels beside each other: they stand in one."""
+        return self.columns is not None and max(self.columns) < NARROW
 
     def size(self, width: float, height: float) -> tuple[float, float]:
         """Width and height in inch of a figure that would be so large with letters of 10 points."""

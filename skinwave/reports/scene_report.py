@@ -1,6 +1,7 @@
 """The report of a scene: one page that needs no network, built from a folder of results alone."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,8 @@ def _first_screen(album: Album, gallery: Gallery) -> list[str]:
     if first is None:
         return []
     name = first.kernel.tacton * (len(groups) > 1)
-    return summary.top(first, lambda f, text: gallery.figure("propagation", f, text), name)
+    draw = partial(gallery.figure, "propagation")
+    return summary.top(first, draw, name, gallery.style)
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
