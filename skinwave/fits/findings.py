@@ -46,13 +46,13 @@ def shown(value: float, low: float, high: float) -> tuple[str, str, str]:
 def cautions(found: Fit) -> list[str]:
     """Sentences, without a full stop, on what is not to be trusted."""
     solution = found.solution
-    said = [
+    said = _turned(found) + [
         "the fit did not converge: its steps ended before chi squared was least; give more starts "
         "or closer limits"
     ] * (not solution.converged)
     said += [_at_limit(found, each) for each in found.estimates if each.at_limit]
     said += [_unresolved(found, each) for each in found.unresolved]
-    said += _beyond_errors(found) + _coloured(found) + _elsewhere(found) + _turned(found)
+    said += _beyond_errors(found) + _coloured(found) + _elsewhere(found)
     said += _left_out(found)
     named = {key for each in found.unresolved for key in each.keys}
     said += [
