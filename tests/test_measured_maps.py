@@ -45,7 +45,7 @@ def test_places_have_the_colour_of_the_map_and_none_on_a_pressure(factor, end):
     rms = factor * 1e-6 * np.array([1.0, np.exp(-np.hypot(4, 2) / 5), 0.3])
     measured = MeasuredPlaces(places=SCENE.probe_points, rms=rms)
     surfaces = {"point-kernel": kernel, "skin-slab": body}
-    figure = surfaces_figure(SCENE, surfaces, measured)
+    figure = surfaces_figure(SCENE, surfaces, measured=measured)
     bare, marked = (
         next(c for c in ax.collections if hasattr(c, "get_sizes") and len(c.get_offsets()) > 1)
         for ax in figure.axes[:2]

@@ -6,6 +6,7 @@ import numpy as np
 
 import fem
 from simple_model.sampling import resolving_step
+from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
 from skinwave.models import Model, named, takes
@@ -54,6 +55,9 @@ class Plan:
     rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
+
+    def _repr_html_(self) -> str:
+        return notebook.plan_page(self)
 
 
 def plan(
