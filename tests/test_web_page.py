@@ -723,20 +723,18 @@ def test_bands_come_when_nothing_is_changed_and_go_with_the_next_change(bare):
 
 
 def test_on_a_narrow_screen_all_of_the_bar_is_there_and_the_panel_is_not(page):
+    right = "() => document.getElementById('controls').getBoundingClientRect().right"
     page.set_viewport_size({"width": 700, "height": 900})
-    page.wait_for_timeout(600)
-    room = page.evaluate(
+    page.wait_for_function(f"{right} <= 0")
+    beyond, wide = page.evaluate(
         """() => { const bar = document.querySelector('.v-toolbar__content');
-        return [bar.scrollWidth - bar.clientWidth, document.documentElement.scrollWidth,
-                document.getElementById('controls').getBoundingClientRect().right] }"""
+        return [bar.scrollWidth - bar.clientWidth, document.documentElement.scrollWidth] }"""
     )
     photographed(page, "narrow")
     page.set_viewport_size({"width": 1280, "height": 720})
-    page.wait_for_timeout(300)
-    assert room[0] <= 0
-    assert room[1] <= 700
-    assert room[2] <= 0
-    assert page.locator("#controls").bounding_box()["x"] >= 0
+    page.wait_for_function(f"{right} > 300")
+    assert beyond <= 0
+    assert wide <= 700
 
 
 @pytest.mark.parametrize("query", ["", "pulses=10/20&foci=2&paths=point/0/9/9,+line/9/0/0"])
