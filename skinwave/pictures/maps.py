@@ -219,13 +219,13 @@ def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Se
         for ax in axes:
             ax.set_ylabel("y, mm")
         axes[-1].set_xlabel("x, mm")
-        return figure, axes
+        return figure, list(axes)
     figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for ax in axes:
         ax.set_xlabel("x, mm")
     axes[0].set_ylabel("y, mm")
-    return figure, axes
+    return figure, list(axes)
 
 
 def _title(ax: Axes, view: View, below: str) -> None:
