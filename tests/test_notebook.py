@@ -21,7 +21,9 @@ def test_the_notebook_runs():
     client.NotebookClient(notebook, timeout=300, resources=place).execute()
     shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     kinds = [set(output.get("data", {})) for output in shown]
-    assert sum("text/html" in kind for kind in kinds) == 5  # scene, plan, response, comparison, table
+    assert (
+        sum("text/html" in kind for kind in kinds) == 5
+    )  # scene, plan, response, comparison, table
     assert sum("image/png" in kind for kind in kinds) == 3  # waveforms, lines, the figure
     said = "".join(output.get("text", "") for output in shown)
     assert "f_d-f_AM: " in said
