@@ -220,11 +220,11 @@ def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Se
     if style.is_narrow:
         width = style.size(1, 1)[0]
         figure = Figure(figsize=(width, 0.75 * width * count + 0.4 + below), layout="compressed")
-        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False).ravel()
         for ax in axes:
             ax.set_ylabel("y, mm")
         axes[-1].set_xlabel("x, mm")
-        return figure, axes
+        return figure, list(axes)
     figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for ax in axes:
