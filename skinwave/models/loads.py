@@ -76,7 +76,7 @@ def probe_rows(
         If a probe is not in the body, or its strain in a coat.
     """
     asked = reading.asked
-    _check_coat(build, reading)
+    check_coat(build, reading)
     if asked.is_normal and reading.is_on_surface:
         return surface_motion(body, build, probes), ()
     mesh = build.mesh
@@ -92,7 +92,7 @@ def probe_rows(
     return (rows @ displacement_operator(mesh, points)).tocsr(), solids
 
 
-def _check_coat(build: Build, reading: Reading) -> None:
+def check_coat(build: Build, reading: Reading) -> None:
     """Refuse strain and stress in a coat, where elements are of the material below it.
 
     Raises

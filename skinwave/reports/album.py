@@ -16,7 +16,7 @@ import numpy as np
 from meshes import reading
 from simple_model import Response, published
 from simple_model.choices import choose
-from simple_model.quantities import QUANTITIES
+from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
@@ -28,7 +28,15 @@ from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.pictures.motion import Waves, waves
-from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
+from skinwave.pictures.views import (
+    View,
+    body_view,
+    fastest_line,
+    kernel_view,
+    load,
+    save,
+    shaded,
+)
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
 from skinwave.scene import BODIES, Scene, body_name, check_motion, with_body
@@ -160,6 +168,24 @@ def answers(
         else:
             run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
             yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
+
+
+def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
+    """Views by the quantity that their scenes' probes read, and what is left out: of another one
+    than the displacement of the surface the point kernel, which has none.
+    """
+    if all(scene.reading.asked is DISPLACEMENT for _, scene in found):
+        return [view for view, _ in found], []
+    bodies = [(view, scene) for view, scene in found if len(view.tets)]
+    if not bodies:
+        raise ValueError(f"{without_kernel(found[0][1])}; give the scene a body")
+    said = [without_kernel(scene) for view, scene in found if not len(view.tets)]
+    return [shaded(view, scene) for view, scene in bodies], said
+
+
+def without_kernel(scene: Scene) -> str:
+    """A sentence that the point kernel has no such quantity."""
+    return f"the point kernel has no {scene.reading.words}, and predicts a pressure alone"
 
 
 def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
