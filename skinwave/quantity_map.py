@@ -20,11 +20,10 @@ from skinwave.effort import Progress
 from skinwave.models.flat_body import field_read
 from skinwave.models.loads import line_factor, probe_rows
 from skinwave.models.reduction import read_at
-from skinwave.pictures.motion import DrivenBody, driven
+from skinwave.pictures.motion import TOLERANCE, DrivenBody, driven
 from skinwave.scene import Reading, Scene
 from skinwave.surface import FAINT, Lines, grid, has_wavenumber_integral
 
-TOLERANCE = 0.02  # relative error of the reduced-order model
 COARSER, ORDER = 1.5, 2  # element size of a second map, and its order: Richardson extrapolation
 # Times at which an invariant is looked at, in steps of s that are no multiple of any period. Its
 # mean over all phases of a load of several frequencies is that of a smooth window over them: Das,
