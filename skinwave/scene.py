@@ -194,7 +194,7 @@ def check_motion(scene: Scene, command: str) -> None:
     if not scene.reading.is_plain:
         raise ValueError(
             f"{command} is about the displacement of the surface, not {scene.reading.words}; leave "
-            "out depth_mm and quantity, or use skinwave run or sweep"
+            "out depth_mm and quantity, or use skinwave run, compare, report, film or sweep"
         )
 
 

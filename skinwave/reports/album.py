@@ -39,10 +39,10 @@ from skinwave.pictures.views import (
 )
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Scene, body_name, check_motion, with_body
+from skinwave.scene import BODIES, Scene, body_name, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
-from skinwave.studies import paper15
+from skinwave.studies import description, paper15
 from skinwave.verify.suite import suite
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
@@ -121,7 +121,6 @@ def make(
     ValueError
         If a model refuses the scene.
     """
-    check_motion(scene, "a report")
     shown = shown_scenes(scene, beside)
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs = []
@@ -178,14 +177,9 @@ def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]
         return [view for view, _ in found], []
     bodies = [(view, scene) for view, scene in found if len(view.tets)]
     if not bodies:
-        raise ValueError(f"{without_kernel(found[0][1])}; give the scene a body")
-    said = [without_kernel(scene) for view, scene in found if not len(view.tets)]
+        raise ValueError(f"{description.without_kernel(found[0][1])}; give the scene a body")
+    said = [description.without_kernel(scene) for view, scene in found if not len(view.tets)]
     return [shaded(view, scene) for view, scene in bodies], said
-
-
-def without_kernel(scene: Scene) -> str:
-    """A sentence that the point kernel has no such quantity."""
-    return f"the point kernel has no {scene.reading.words}, and predicts a pressure alone"
 
 
 def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
@@ -206,7 +200,7 @@ def _plan(
     trust: dict[str, Any] = {"command": command, "model": required.model}
     drawn = [run.response.values for run in runs if run.scene == scene]
     if drawn and scene.body.of_kind.discretise:
-        planned = _planned_answer(scene, required, solver).displacement
+        planned = _planned_answer(scene, required, solver).values
         size = float(np.linalg.norm(planned)) or 1.0
         trust["misfit"] = float(np.linalg.norm(drawn[0] - planned)) / size
     trust["cases"] = _verified(progress)
