@@ -208,7 +208,7 @@ def fitted_polynomial(x: Floats, root: Floats) -> tuple[Floats, int]:
 
     Parameters
     ----------
-    x : (s, 3) float, places of the samples about the point, in elements
+    x : (s, 2 or 3) float, places of the samples about the point, in elements
     root : (s,) float, roots of their weights in the fit
 
     Returns
@@ -226,8 +226,9 @@ def fitted_polynomial(x: Floats, root: Floats) -> tuple[Floats, int]:
 
 
 def polynomials(x: Floats, degree: int) -> Floats:
-    """Monomials (s, n) up to a degree at places (s, 3)."""
-    powers = (c for d in range(degree + 1) for c in combinations_with_replacement(range(3), d))
+    """Monomials (s, n) up to a degree at places (s, 2 or 3)."""
+    axes = range(x.shape[1])
+    powers = (c for d in range(degree + 1) for c in combinations_with_replacement(axes, d))
     return np.column_stack([np.prod(x[:, list(power)], axis=1) for power in powers])
 
 

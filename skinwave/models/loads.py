@@ -20,6 +20,7 @@ from simple_model.material import Material
 from simple_model.quantities import STRAIN, Quantity
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
+from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene import Reading
 
 
@@ -77,8 +78,10 @@ def probe_rows(
     """
     asked = reading.asked
     check_coat(build, reading)
-    if asked.is_normal and reading.is_on_surface:
+    if asked.is_normal and (reading.is_on_surface or body.of_kind.is_plate):
         return surface_motion(body, build, probes), ()
+    if body.of_kind.is_plate:
+        return sheet_rows(body, build, probes, reading)
     mesh = build.mesh
     places, normals = surface_frame(mesh, probes, patch=body.of_kind.normal_patch)
     points = places - np.broadcast_to(reading.depths or 0.0, len(probes))[:, None] * normals

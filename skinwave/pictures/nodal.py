@@ -103,9 +103,15 @@ def shade(scene: Scene, moved: Waves, times: Floats, nodes: Ints) -> Shade:
     Raises
     ------
     ValueError
-        If it is strain or stress in a coat, or has too many values.
+        If it is of a sheet and not of its normal motion, is strain or stress in a coat, or has
+        too many values.
     """
     asked = scene.reading.asked
+    if scene.body.of_kind.is_plate and not asked.is_normal:
+        raise ValueError(
+            f"{asked.words} of a sheet is not drawn, because its mesh is thicker than it; ask for "
+            "displacement, velocity or acceleration, or for its probes by skinwave run"
+        )
     check_values(len(times), len(nodes))
     if asked.field == STRAIN:
         check_coat(moved.driven.build, Reading(quantity=asked.name))
