@@ -6,7 +6,8 @@ the sheet's motion. By Kirchhoff's kinematics, at a height z above that plane,
     u_a(z) = u_a - z w,a,   E_ab(z) = (u_a,b + u_b,a + u_i,a u_i,b) / 2 - z w,ab,
 
 and E_zz = -nu / (1 - nu) (E_xx + E_yy) in plane stress, without transverse shear. E is the strain
-of Green and Lagrange; linear models leave out its quadratic part. Slopes and curvatures are those
+of Green and Lagrange. Linear bending has no in-plane motion of the middle plane: what the thicker
+mesh has of it is far too much, as its membrane is too soft. Slopes and curvatures are those
 of polynomials that fit the derivatives at the quadrature points about a point, as in `stress`.
 """
 
@@ -77,16 +78,17 @@ def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> Sheet
 
 
 def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_array:
-    """Displacement operator (3 p, 3 n) at heights (p,) in metre above the middle plane."""
-    z = sparse.diags_array(heights)
-    nothing = sparse.csr_array(reading.value.shape)
+    """Displacement operator (3 p, 3 n) of bending, at heights (p,) in metre above the middle
+    plane, which has no in-plane motion in it.
+    """
+    z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
     x, y = (-(z @ slope) for slope in reading.slopes)
-    N = reading.value
-    return _by_point([[N, nothing, x], [nothing, N, y], [nothing, nothing, N]])
+    bent = [[nothing, nothing, part] for part in (x, y, reading.value)]
+    return _by_point(bent)
 
 
 def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> sparse.csr_array:
-    """Strain operator (6 p, 3 n) in 1/m, the linear part of the strain.
+    """Strain operator (6 p, 3 n) in 1/m of bending.
 
     Parameters
     ----------
@@ -99,11 +101,9 @@ def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> spars
     (6 p, 3 n) sparse; components xx, yy, zz, xy, xz, yz fastest
     """
     z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
-    x, y = reading.slopes
-    bent = [-(z @ curvature) for curvature in reading.curvatures]
-    plane = _by_point([[x, nothing, bent[0]], [nothing, y, bent[1]], [y / 2, x / 2, bent[2]]])
+    bent = _by_point([[nothing, nothing, -(z @ part)] for part in reading.curvatures])
     each = sparse.eye_array(len(heights))
-    return (sparse.kron(each, from_plane(poisson), format="csr") @ plane).tocsr()
+    return (sparse.kron(each, from_plane(poisson), format="csr") @ bent).tocsr()
 
 
 def from_plane(poisson: float) -> Floats:

@@ -35,7 +35,7 @@ Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components
 def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Linear part of what probes read of a sheet, but for normal motion, as `probe_rows`.
+    """What probes read of a sheet that bends, but for its normal motion, as `probe_rows`.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def sheet_rows(
 
 
 def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
-    """Function of the displacement (3 n,) of all nodes, with the quadratic part of strain.
+    """Function of the displacement (3 n,) of all nodes of a sheet that bends and stretches.
 
     Parameters
     ----------
@@ -72,12 +72,18 @@ def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> R
     if reading.asked.is_normal:
         normal = fem.probe_operator(build.mesh, probes)
         return lambda u: normal @ u
-    rows, _ = sheet_rows(body, build, probes, reading)
+    (rows, _), seen = sheet_rows(body, build, probes, reading), _seen(body, build, probes)
+    moved, strained = in_plane_rows(seen)
+    own = reading.asked.rows(body.solid)
     if reading.asked.field != STRAIN:
-        return lambda u: rows @ u
-    seen = _seen(body, build, probes)
-    own = reading.asked.rows(body.solid) @ from_plane(body.solid.poisson)
-    return lambda u: rows @ u + (quadratic_strain_at(seen, u) @ own.T).ravel()
+        return lambda u: rows @ u + ((moved @ u).reshape(-1, 2) @ own[:, :2].T).ravel()
+    plane = own @ from_plane(body.solid.poisson)
+
+    def read(u: Floats) -> Floats:
+        stretched = (strained @ u).reshape(-1, 3) + quadratic_strain_at(seen, u)
+        return np.asarray(rows @ u + (stretched @ plane.T).ravel())
+
+    return read
 
 
 def modal_reader(
