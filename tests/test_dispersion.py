@@ -385,7 +385,7 @@ def test_wavenumbers_in_the_motion_are_those_of_the_modes(driven):
 
 
 def test_only_wavenumbers_that_the_line_resolves_are_reported():
-    """Two waves in noise of a thousandth, one of which fades ever sooner: errors are standard."""
+    """Two waves in noise, one of which fades ever sooner: errors are standard."""
     from scipy.special import hankel2
 
     from skinwave.wavenumbers import UNSURE, LineOfProbes, fitted_waves
@@ -395,7 +395,7 @@ def test_only_wavenumbers_that_the_line_resolves_are_reported():
     waves = hankel2(0, first[:, None] * r) + 1.5 * hankel2(0, second[:, None] * r)
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((2, *waves.shape))
-    size = 1e-3 * np.abs(waves[:, 12:13])  # where the fit begins
+    size = 0.015 * np.abs(waves[:, 12:13])  # where the fit begins
     line = LineOfProbes(
         frequencies=f, distances=r, transfer=waves + size * (noise[0] + 1j * noise[1])
     )
@@ -407,7 +407,7 @@ def test_only_wavenumbers_that_the_line_resolves_are_reported():
     assert 8 <= resolved.sum() < len(f)
     assert (apart < 3 * errors)[resolved].all()
     assert apart[resolved].max() < 2 * UNSURE
-    assert apart[~resolved].max() > 2 * UNSURE
+    assert apart[~resolved].max() > UNSURE
     faded = np.abs(second.imag) * found.aperture > 3.5
     assert faded.any()
     assert not resolved[faded].any()
