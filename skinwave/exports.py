@@ -77,7 +77,7 @@ def write_field(folder: Path, view: View) -> Path:
         names.append(f"{stem}_{k:03d}.{ending}")
         _grid(view, frame, k).save(folder / names[-1])
     path = folder / f"{stem}.pvd"
-    path.write_text(_collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
+    path.write_text(collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
     return path
 
 
@@ -105,7 +105,7 @@ def _grid(view: View, frame: int, number: int) -> Any:
     return grid
 
 
-def _collection(names: Sequence[str], times: Sequence[float]) -> str:
+def collection(names: Sequence[str], times: Sequence[float]) -> str:
     """ParaView collection: the file that belongs to each time in s."""
     rows = "".join(
         f'<DataSet timestep="{t:.9g}" group="" part="0" file="{name}"/>\n'
