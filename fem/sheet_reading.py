@@ -11,7 +11,6 @@ mesh has of it is far too much, as its membrane is too soft. Slopes and curvatur
 of polynomials that fit the derivatives at the quadrature points about a point, as in `stress`.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,8 +158,8 @@ def in_plane_rows(reading: SheetReading) -> tuple[sparse.csr_array, sparse.csr_a
 
 
 def _by_point(blocks: list[list[sparse.csr_array]]) -> sparse.csr_array:
-    """Operator (c p, 3 n), components of a point next to each other, from blocks (p, n) by component
-    and by component of the displacement.
+    """Operator (c p, 3 n), components of a point next to each other, from blocks (p, n) by its
+    components and by those of the displacement.
     """
     rows, (p, n) = len(blocks), blocks[0][0].shape
     whole = sparse.block_array(blocks, format="csr")
@@ -210,5 +209,3 @@ def _fits(
     values = np.concatenate(found, axis=1)
     fit, along_x, along_y = (sparse.csr_array((each, at), shape=shape) for each in values)
     return fit, along_x, along_y
-
-

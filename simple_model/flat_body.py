@@ -155,9 +155,7 @@ def steady_state(
     times = np.array(times)
     f, a = sampled_lines(normal_field(compliance), pressure, probes, times)
     found = synthesise(f, a[..., 0], times)
-    return _timed(
-        "flat-body-harmonic", started, times, probes, found, steps=len(f), dofs=len(f)
-    )
+    return _timed("flat-body-harmonic", started, times, probes, found, steps=len(f), dofs=len(f))
 
 
 def flat_body(

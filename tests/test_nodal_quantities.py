@@ -1,5 +1,6 @@
 """Quantities of whole bodies: tensors of files for other programs, and what colours films."""
 
+import csv
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,9 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load_spectrum import pressure_lines, synthesise
 from simple_model.tensors import hooke
 from skinwave import exports
+from skinwave.bodies.build import build, operators
 from skinwave.cli import main
+from skinwave.effort import silent
 from skinwave.models.reduction import oscillating
 from skinwave.pictures import films, motion, render, views
 from skinwave.pictures.nodal import shade
@@ -19,6 +22,8 @@ from skinwave.pictures.styles import style
 from skinwave.reports.album import coloured
 from skinwave.scene import Body, Layer, Scene
 from skinwave.scene_file import dumps
+from skinwave.simulation import compute
+from skinwave.web.waves import reduced_answer, reduced_to_path
 
 draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
@@ -41,7 +46,7 @@ def view(moved):
 
 
 def test_stress_at_the_surface_meets_the_load(view, moved):
-    """sigma_zz = -p and no shear on a flat surface, at every time, where viscous stress is half."""
+    """sigma_zz = -p and no shear on a flat surface, at every time, to which viscous stress adds."""
     kept, mesh = views.with_tensors(view).tensors, moved.mesh
     np.testing.assert_array_equal(kept.nodes, np.arange(len(mesh.points)))
     top = np.unique(mesh.facets["top"])
@@ -53,7 +58,7 @@ def test_stress_at_the_surface_meets_the_load(view, moved):
     assert np.abs(stress[..., 2] + p / np.abs(p).max()).max() < 0.05
     assert np.abs(stress[..., 4:]).max() < 0.06
     elastic = kept.strain[:, top] @ hooke(SCENE.body.solid)[:, 2] / np.abs(p).max()
-    assert np.abs(elastic + p / np.abs(p).max()).max() > 0.2  # without the viscous part
+    assert np.abs(elastic + p / np.abs(p).max()).max() > 0.12  # without the viscous part
 
 
 def test_files_for_other_programs_have_the_tensors_of_a_view_from_a_file(view, tmp_path):
@@ -144,3 +149,49 @@ def test_a_film_of_a_folder_has_no_other_quantity(tmp_path, monkeypatch, capsys)
     asked = ["film", str(tmp_path), "--quantity", "strain_zz", "-o", str(tmp_path / "a.gif")]
     assert main(asked) == 2
     assert "keeps the motion alone" in capsys.readouterr().err
+
+
+def test_the_interactive_tool_reads_any_quantity_of_reduced_bodies():
+    """At the point, from the reduction to the path that its maps are made of."""
+    made = build(SCENE.body, COARSE)
+    body = reduced_to_path(made, operators(made), SCENE.body, SCENE.pressure, silent)
+    for quantity, depth, most in (("largest_shear_strain", 0.7e-3, 0.01), ("stress_zz", 0.0, 0.03)):
+        scene = replace(SCENE, quantity=quantity, depth=depth, probes=((0.006, 0.003),))
+        found = reduced_answer(body, scene).response
+        assert found.quantity == quantity
+        exact = compute(scene, "fem", h=COARSE).values
+        assert np.linalg.norm(found.values - exact) < most * np.linalg.norm(exact)
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    out = tmp_path_factory.mktemp("compared")
+    tacton = replace(SCENE.tacton, duration=0.1)
+    scene = replace(SCENE, pressure=replace(SCENE.pressure, tacton=tacton), depth=0.7e-3)
+    (out / "below.toml").write_text(dumps(replace(scene, quantity="strain_zz")))
+    asked = [str(out / "below.toml"), "--element-size", "4.5", "--quiet"]
+    assert main(["compare", *asked, "-o", str(out / "compared")]) == 0
+    return out
+
+
+def test_a_comparison_has_the_columns_of_the_quantity(compared):
+    page = (compared / "compared" / "index.html").read_text()
+    assert "the point kernel has no strain zz at a depth of 0.7 mm, and predicts a pressure" in page
+    assert "slab (fem), µm/m peak" in page
+    with open(compared / "compared" / "lines.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    kernels = [row for row in rows if row["body"] == "none"]
+    bodies = [row for row in rows if row["body"] == "slab"]
+    assert kernels
+    assert all(row["pressure_pa"] and not row["strain_zz_um_m"] for row in kernels)
+    assert all(row["strain_zz_um_m"] and not row["displacement_um"] for row in bodies)
+    with open(compared / "compared" / "claims.csv", newline="") as file:
+        assert {row["body"] for row in csv.DictReader(file)} <= {"none"}
+
+
+def test_a_report_of_a_folder_has_the_quantity(compared, tmp_path):
+    """Of a folder that a comparison wrote, which runs no model."""
+    assert main(["report", str(compared / "compared"), "--quiet", "-o", str(tmp_path / "r")]) == 0
+    page = (tmp_path / "r" / "index.html").read_text()
+    assert "they read" in page
+    assert "Probes read strain zz at a depth of 0.7 mm, in µm/m" in page

@@ -1,4 +1,4 @@
-"""Quantities at the probes of a thin sheet, from the middle plane of its mesh (`fem.sheet_reading`).
+"""Quantities at the probes of a thin sheet, from the middle plane of its mesh.
 
 Stress is that of Piola and Kirchhoff, the second, of the strain of Green and Lagrange: along the
 axes of the sheet, which turn with it, and at strains as small as those of paper Cauchy's there.
@@ -35,7 +35,7 @@ Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components
 def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """What probes read of a sheet that bends, but for its normal motion, as `probe_rows`.
+    """Rows of `probe_rows` for a sheet that bends, but for its normal motion.
 
     Parameters
     ----------

@@ -184,7 +184,8 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
         read=read,
         dt=dt,
         effort=Effort(
-            dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
+            dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
+            estimate=sheet.modes.left_out,
         ),
     )  # fmt: skip
 

@@ -41,8 +41,8 @@ class Tensors:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shade:
-    """What colours a view: values (t, q) of a quantity, by its name, at `nodes` (q,) of its mesh,
-    at each of its times.
+    """Colour of a view: values (t, q) of a quantity, by its name, at `nodes` (q,) of its mesh, at
+    each of its times.
     """
 
     quantity: str
@@ -124,9 +124,7 @@ def shade(scene: Scene, moved: Waves, times: Floats, nodes: Ints) -> Shade:
     return Shade(quantity=asked.name, nodes=nodes, values=values.astype(np.float32))
 
 
-def _of_strain(
-    asked: Quantity, scene: Scene, moved: Waves, times: Floats, nodes: Ints
-) -> Floats:
+def _of_strain(asked: Quantity, scene: Scene, moved: Waves, times: Floats, nodes: Ints) -> Floats:
     """Values (t, q) of a quantity of strain; between materials the mean of those on both sides."""
     lines, total = _lines(asked, scene, moved), np.zeros((len(times), len(nodes)))
     count = np.zeros(len(nodes))
@@ -175,4 +173,3 @@ def _coordinates(
     factor = np.asarray(modulus if asked is None else asked.factor(s, modulus))
     lines = waves.lines * np.broadcast_to(factor, f.shape)[:, None]
     return synthesise(f, lines, times)
-

@@ -192,7 +192,7 @@ def with_tensors(view: View) -> View:
 
 
 def field_frames(count: int) -> Ints:
-    """Which (k,) of so many frames are written for other programs."""
+    """Numbers (k,) of the frames, of so many, that are written for other programs."""
     return np.unique(np.arange(FIELD_FRAMES) * count // FIELD_FRAMES)
 
 

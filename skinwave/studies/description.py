@@ -197,8 +197,8 @@ def without_kernel(scene: Scene) -> str:
 
 
 def other_quantity(scene: Scene) -> list[str]:
-    """What a page says of a scene whose probes read something else than the displacement of the
-    surface.
+    """Sentences for a page of a scene whose probes read something else than the displacement of
+    the surface.
     """
     if scene.reading.is_plain:
         return []

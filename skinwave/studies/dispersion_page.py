@@ -234,10 +234,10 @@ def line_table(found: DrivenModes) -> tuple[list[str], list[list[str]]]:
 
 
 OBSERVED_CAPTION = (
-    "Grey: motion along x, transformed over time and place with a Hann window, as broad as the body "
-    "is few wavelengths wide. Circles: of the Hankel functions fitted beyond the focal spot the one "
-    "nearest to the leading mode, where the line resolves it: with a standard error of at most 3 %, "
-    "and before it fades to a twentieth. Lines: the modes that propagate."
+    "Grey: motion along x, transformed over time and place with a Hann window, as broad as the "
+    "body is few wavelengths wide. Circles: of the Hankel functions fitted beyond the focal spot "
+    "the one nearest to the leading mode, where the line resolves it: with a standard error of at "
+    "most 3 %, and before it fades to a twentieth. Lines: the modes that propagate."
 )
 
 

@@ -116,7 +116,7 @@ def page_parts(
 
 
 def _changes(groups: Mapping[str, list[Run]]) -> list[str]:
-    """What propagation changes; of another quantity than the displacement, which the point kernel
+    """Effect of propagation; of another quantity than the displacement, for which the point kernel
     has nothing to compare with, its lines.
     """
     if found := changes(groups):

@@ -294,7 +294,7 @@ def _at_probe(body: Reduced, scene: Scene, motion: ReducedResponse) -> Response:
 
 
 def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
-    """What a scene's probe reads from rest, and RMS motion of the area."""
+    """Quantity of a scene's probe from rest, and RMS motion of the area."""
     motion = respond(body.body, scene.pressure)
     response = _at_probe(body, scene, motion)
     if scene.tacton.rhythm:
