@@ -7,20 +7,21 @@ take those inside along by transfinite interpolation (Gordon and Hall, Int J Num
 7:461, 1973).
 """
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshes.shapes.kuhn import kuhn_tets
-from meshes.shapes.palm import Palm, level_set, level_set_and_gradient, rise
-from meshes.surface.level_set import project_to_level_set
+from meshes.shapes.palm import Palm, gradient, level_set, rise
 from meshes.tetmesh import Floats, MeshError, TetMesh, corner_volumes
 from meshes.volume.palm_mesh import curved_palm
 from meshes.volume.quality import angles_between_faces
 
 INWARDS = 2.0  # power of the distance from the middle with which corners get sharper inwards
 RIM = 2.0  # thicknesses of half a palm from its outline inwards, in which boxes follow the rim
+LEAST = 0.3  # cosine between the normals of a palm with and without mounds
 STEPS = 8  # of Newton's method, onto mounds that lie as high as the palm is thick
 SHARPEST = 8.0  # degrees: least dihedral angle that is accepted
 OFF = 1e-3  # of the thickness: how far a node of the boundary may miss the level set
@@ -109,9 +110,20 @@ def _onto_level_set(palm: Palm, grid: Floats) -> Floats:
     """
     outer = _on_boundary(tuple(n - 1 for n in grid.shape[:3]))
     moved = np.zeros_like(grid)
-    target = project_to_level_set(grid[outer], *level_set_and_gradient(palm), steps=STEPS)
-    moved[outer] = target - grid[outer]
+    moved[outer] = _raised(palm, grid[outer]) - grid[outer]
     return grid + _transfinite(moved)
+
+
+def _raised(palm: Palm, points: Floats) -> Floats:
+    """Points (n, 3) of a palm without mounds, moved onto its surface along the normals that they
+    have there: along those of the mounds they would gather in the dips between them.
+    """
+    bare = replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
+    normals = gradient(bare, points)
+    for _ in range(STEPS):
+        steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
+        points = points - (level_set(palm, points) / np.maximum(steepness, LEAST))[:, None] * normals
+    return points
 
 
 def _on_boundary(cells: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ import numpy as np
 
 import fem
 from fem.load_and_probe import facet_points
-from meshes import TetMesh, boundary_facets, palm_mesh
+from meshes import Grading, MeshError, TetMesh, boundary_facets, graded_axis, mapped_palm, palm_mesh
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats
@@ -21,6 +21,7 @@ RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
 # spot; up to which radius they have that size; and how much slower than sideways they grow
 # downwards.
 SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
+CELL = 0.9  # sides of the boxes that are split into elements, over the mean edges of these
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -34,9 +35,22 @@ def discretise(body: Body, h: float) -> Discretised:
     """
     # Larger elements do not follow the rim, where waves reflect and the base's support ends.
     coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
-    mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
+    lines = _grid_lines(body, CELL * SURFACE * h, CELL * coarsest)
+    try:
+        mesh = mapped_palm(body.palm, *lines)
+    except MeshError:  # a relief that a structured mesh cannot follow
+        mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
     return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
+
+
+def _grid_lines(body: Body, finest: float, coarsest: float) -> tuple[Floats, Floats, Floats]:
+    """Grid lines in metre along x, y and z of cells as `_sizes` asks for."""
+    along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
+    halves = [graded_axis(side / 2, finest, along) for side in (body.width, body.height)]
+    down = Grading(radius=0.0, growth=GROWTH**DOWNWARDS, coarsest=coarsest)
+    x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
+    return x, y, -graded_axis(body.depth, finest, down)[::-1]
 
 
 def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
