@@ -72,10 +72,9 @@ def test_volume_and_area_converge_to_those_of_the_geometry():
     exact = np.array(rounded_slab(FLAT))
     found = [measures(meshes.mapped_palm(FLAT, *grid(FLAT, cell))) for cell in (5e-3, 2.5e-3)]
     errors = np.abs(np.array(found) / exact - 1)
-    assert errors[0].max() < 1e-2
-    assert errors[1].max() < 1e-3
-    order = np.log2(errors[0] / errors[1])
-    assert (order > 2).all(), (errors, order)
+    assert errors[0].max() < 5e-4
+    assert errors[1].max() < 5e-5
+    assert 3.5 < np.log2(errors[0] / errors[1])[1] < 4.5  # of curved facets
 
 
 def test_a_palm_with_relief_has_the_volume_and_the_area_of_its_level_set():
