@@ -52,6 +52,10 @@ UNPROJECTED = (
 )
 
 
+# K of shares (r,) of each material's moduli, and M of their densities (r,), on all dofs.
+Volume = tuple[Callable[[Floats], sparse.csr_array], Callable[[Floats], sparse.csr_array]]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Operators:
     """M u'' + C u' + K u = f on the free degrees of freedom.
@@ -59,7 +63,8 @@ class Operators:
     `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C in absorbing boundaries
     and layers; `free` (n_free,) numbers their rows among the 3 n displacement components of the
     mesh, component fastest. `branches` are generalised Maxwell branches in parallel with K, the
-    equilibrium (fully relaxed) stiffness. `laws`, if any, are C and these as combinations of K and M.
+    equilibrium (fully relaxed) stiffness. `laws`, if any, are C and these as combinations of K and
+    M.
     """
 
     K: sparse.csr_array
@@ -128,39 +133,54 @@ def assemble(
 
     share = tension.share if tension else None
     volume = _volume(mesh, pattern, materials, region, axes, stiffener)
-    one_kind = len(materials) == 1 and coat is None and materials[0].law is None
-    if one_kind:  # C and the branches need not be assembled
-        (m,) = materials
-        K, M, (C, branches) = volume[0](np.ones(1)), volume[1](np.array([m.density])), (0, ())
-    else:
-        K, C, M, branches = viscoelastic(materials, *volume, share)
+    beside = sparse.csr_array((mesh.n_dofs, mesh.n_dofs))  # of K
+    if support is not None and support.stiffness.any():
+        beside = beside + springs(mesh, support)
+    if tension is not None:
+        beside = beside + tension_stiffness(mesh, pattern, tension, axes)
+    R = sparse.csr_array(beside.shape)
+    if absorbing is not None:
+        R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+    if support is not None and support.absorbed.any():
+        R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
+    if drag is not None:
+        R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
+    beside, R = restricted(beside, free), restricted(R, free)
+    if coat is None and len(materials) == 1 and materials[0].law is None:
+        return _of_one_material(materials[0], volume, share, (beside, R), free, mesh.n_dofs)
+    K, C, M, branches = viscoelastic(materials, *volume, share)
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
         K, C, M, branches = together((K, C, M, branches), added)
-    R, rest = sparse.csr_array(K.shape), sparse.csr_array(K.shape)
-    if absorbing is not None:
-        R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
-    if support is not None and support.stiffness.any():
-        rest = rest + springs(mesh, support)
-    if support is not None and support.absorbed.any():
-        R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
-    if tension is not None:
-        rest = rest + tension_stiffness(mesh, pattern, tension, axes)
-    if drag is not None:
-        R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
-    K, M, R, rest = (restricted(A, free) for A in (K + rest if rest.nnz else K, M, R, rest))
-    if one_kind:
-        laws, times = proportional(materials[0], rayleigh_rates(materials[0], share), (rest, R))
-        C = laws.damping.of(K, M)
-        each = zip(laws.branches, times, strict=True)
-        branches = tuple(MaxwellBranch(K=part.of(K, M), time=time) for part, time in each)
-    else:
-        laws = None
-        C = restricted(C, free) + R if R.nnz else restricted(C, free)
-        branches = on_free(branches, free)
-    return Operators(
-        K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches, laws=laws
+    K, C, M = (restricted(A, free) for A in (K, C, M))
+    K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
+    branches = on_free(branches, free)
+    return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
+
+
+def _of_one_material(
+    m: Material,
+    volume: Volume,
+    share: Callable[[Floats], Floats] | None,
+    surfaces: tuple[sparse.csr_array, sparse.csr_array],
+    free: Ints,
+    n_dofs: int,
+) -> Operators:
+    """Operators of one material, whose C and branches are combinations of K and M: with what K has
+    beside its stiffness, and R, on the free degrees of freedom.
+    """
+    beside, R = surfaces
+    K, M = (
+        restricted(volume[0](np.ones(1)), free),
+        restricted(volume[1](np.ones(1) * m.density), free),
     )
+    K = K + beside if beside.nnz else K
+    laws, times = proportional(m, rayleigh_rates(m, share), surfaces)
+    each = zip(laws.branches, times, strict=True)
+    return Operators(
+        K=K, C=laws.damping.of(K, M), M=M, R=R, free=free, n_dofs=n_dofs, laws=laws,
+        branches=tuple(MaxwellBranch(K=part.of(K, M), time=time) for part, time in each),
+    )  # fmt: skip
 
 
 def _volume(
@@ -170,7 +190,7 @@ def _volume(
     region: Ints,
     axes: Floats,
     stiffener: sparse.csr_array | None,
-) -> tuple[Callable[[Floats], sparse.csr_array], Callable[[Floats], sparse.csr_array]]:
+) -> Volume:
     """K of a share (r,) of each material's moduli, and M of densities (r,), on all dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
     direct = direct_part(lam, mu) if mesh.order == 2 else lam

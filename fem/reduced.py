@@ -221,12 +221,12 @@ class KrylovBasis:
     def __init__(self, operators: Operators, laws: Laws, most: int) -> None:
         self._branches, self._laws = operators.branches, laws
         self._M, self._K = product(operators.M), product(operators.K)
-        parts = (laws.damping, *laws.branches)
-        self._rests = [None if part.rest is None else product(part.rest) for part in parts]
+        rests = (part.rest for part in laws.parts)
+        self._rests = [None if rest is None else product(rest) for rest in rests]
         self._columns = np.empty((len(operators.free), most), order="F")
-        # Of K and each of the rests (size, size), and of what is seen of a response (size, k).
-        none = np.empty((0, 0))
-        self._projected = [none, *(None if times is None else none for times in self._rests)]
+        # Projected K and rests (size, size), and what is seen of a response (size, k).
+        self._small_K = np.empty((0, 0))
+        self._small_rests = [None if times is None else self._small_K for times in self._rests]
         self._seen = np.empty((0, 0))
         self.size = 0
 
@@ -237,9 +237,9 @@ class KrylovBasis:
 
     def model(self, size: int) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
         """Projected K, C, M and Maxwell branches, in the first vectors, as far as projected."""
-        K, *rests = (None if part is None else part[:size, :size] for part in self._projected)
-        M, parts = np.eye(size), (self._laws.damping, *self._laws.branches)
-        each = (replace(part, rest=rest) for part, rest in zip(parts, rests, strict=True))
+        K, M = self._small_K[:size, :size], np.eye(size)
+        rests = (None if rest is None else rest[:size, :size] for rest in self._small_rests)
+        each = (replace(part, rest=r) for part, r in zip(self._laws.parts, rests, strict=True))
         C, *relaxing = (part.of(K, M) for part in each)
         return K, C, M, _branches(relaxing, self._branches)
 
@@ -250,7 +250,7 @@ class KrylovBasis:
     def radiation(self, R: sparse.csr_array, size: int) -> Floats:
         """Projected damping (size, size) of absorbing boundaries, which may be the rest of C."""
         if R is self._laws.damping.rest:
-            return np.array(self._projected[1][:size, :size])
+            return np.array(self._small_rests[0])[:size, :size]
         basis = self.basis[:, :size]
         return _products(product(R), basis, basis)
 
@@ -303,13 +303,12 @@ class KrylovBasis:
 
     def project(self, seen: Floats) -> None:
         """Project the matrices, and what is seen (n, k), onto the vectors that are new since."""
-        done, Q = len(self._projected[0]), self.basis
-        new = Q[:, done:]
+        Q, new = self.basis, self.basis[:, len(self._small_K) :]
         self._seen = np.vstack([self._seen.reshape(-1, seen.shape[1]), new.T @ seen])
-        for j, times in enumerate((self._K, *self._rests)):
-            if times is not None:
-                columns = _products(times, Q, new)
-                self._projected[j] = _bordered(self._projected[j], columns)
+        self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
+        for j, (times, small) in enumerate(zip(self._rests, self._small_rests, strict=True)):
+            if times is not None and small is not None:
+                self._small_rests[j] = _bordered(small, _products(times, Q, new))
 
 
 def _expansion(
@@ -322,9 +321,7 @@ def _expansion(
         relaxing = 2 * np.pi * RELAXING_POINT * band
         return relaxing if operators.branches else EXPANSION_POINT, operators
     C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
-    return 0.0, replace(
-        operators, C=C + added.rate * added.M, M=M + added.M, laws=None
-    )
+    return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M, laws=None)
 
 
 def _independent(start_vectors: Floats) -> Floats:
@@ -361,10 +358,10 @@ def _moments(
         earlier, latest = _orthonormalised(earlier, latest)
         y, y_before, *y_relaxed = latest
         stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
-        known, *acting = laws.without_stiffness(
+        known, of_mass, of_rests = laws.without_stiffness(
             factors, [y, *stretches], 2 * point * y + scale * y_before
         )
-        upper = -space.extend(factor.solve(space.forces(*acting)))
+        upper = -space.extend(factor.solve(space.forces(of_mass, of_rests)))
         upper -= _padded(known, len(upper))
         lower, _, *before = (_padded(part, len(upper)) for part in latest)
         relaxed = [
@@ -404,12 +401,11 @@ def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
     return np.hstack([W, X]).reshape(parts, size, -1), X.reshape(parts, size, width)
 
 
-def _products(
-    times: Callable[[Floats], Floats], basis: Floats, vectors: Floats
-) -> Floats:
+def _products(times: Callable[[Floats], Floats], basis: Floats, vectors: Floats) -> Floats:
     """Matrix basis^T A vectors (size, k) of a symmetric A, some vectors at a time."""
     starts = range(0, vectors.shape[1], AT_ONCE)
-    return np.hstack([basis.T @ times(vectors[:, k : k + AT_ONCE]) for k in starts])
+    columns = [basis.T @ times(vectors[:, k : k + AT_ONCE]) for k in starts]
+    return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
 
 
 def _bordered(small: Floats, columns: Floats) -> Floats:

@@ -47,7 +47,7 @@ def test_they_are_the_matrices_that_are_assembled_part_by_part(material):
 
 
 @pytest.mark.parametrize("material", [PALM, LOSSY, fem.PRESETS["palm-zener"]])
-def test_moments_without_products_with_K_are_those_with_them(material):
+def test_moments_without_products_are_those_with_them(material):
     mesh, ops, _ = block(material)
     S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
     F = fem.load_operator(mesh) @ np.random.default_rng(0).random((len(facet_points(mesh)), 3))

@@ -122,7 +122,9 @@ def _raised(palm: Palm, points: Floats) -> Floats:
     normals = gradient(bare, points)
     for _ in range(STEPS):
         steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
-        points = points - (level_set(palm, points) / np.maximum(steepness, LEAST))[:, None] * normals
+        points = (
+            points - (level_set(palm, points) / np.maximum(steepness, LEAST))[:, None] * normals
+        )
     return points
 
 
