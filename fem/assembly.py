@@ -41,7 +41,15 @@ from fem.plane_stiffness import (
     tension_stiffness,
 )
 from fem.pressure_projection import projected_divergence
-from fem.sparsity import UPPER, SparsityPattern, from_components, from_nodal, slabs
+from fem.sparsity import (
+    UPPER,
+    SparsityPattern,
+    from_blocks,
+    from_components,
+    from_nodal,
+    slabs,
+    starts_of_kept,
+)
 from fem.viscoelastic import property_of, rayleigh_rates, together, viscoelastic
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
@@ -207,9 +215,12 @@ def _volume(
     if stiffener is not None:
         beside[0] = beside.get(0, 0) + stiffener
 
+    blocked = [part.format == "bsr" for part in beside.values()]
+
     def stiffness(share: Floats) -> sparse.csr_array:
         blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
-        summed = from_components(pattern, pattern.sum(blocks, 6))
+        whole = from_blocks if beside and all(blocked) else from_components
+        summed = whole(pattern, pattern.sum(blocks, 6))
         parts = (part if share[m] == 1 else share[m] * part for m, part in beside.items())
         return sum(parts, start=summed).tocsr()
 
@@ -225,8 +236,8 @@ def restricted(A: sparse.csr_array, free: Ints) -> sparse.csr_array:
     number[free] = np.arange(len(free))
     columns = number[A.indices]
     kept = (columns >= 0) & np.repeat(number >= 0, np.diff(A.indptr))
-    starts = np.append(0, np.cumsum(kept, dtype=A.indptr.dtype))[A.indptr]
-    indptr = np.append(starts[free], starts[-1]).astype(A.indptr.dtype)
+    starts = starts_of_kept(kept, A.indptr)
+    indptr = np.append(starts[free], starts[-1])
     return sparse.csr_array((A.data[kept], columns[kept], indptr), shape=(len(free), len(free)))
 
 

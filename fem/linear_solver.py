@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from fem.sparsity import starts_of_kept
+
 Array = NDArray[Any]  # float64 or complex128
 BACKENDS = ("pardiso", "cholmod", "superlu")
 BLOCKS = 80  # %: how much alike the patterns of rows are that PARDISO takes as a block
@@ -207,7 +209,7 @@ def _upper(A: sparse.csr_array) -> tuple[Array, NDArray[np.int32], NDArray[np.in
     """
     n = A.shape[0]
     kept = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
-    starts = np.append(np.int32(0), np.cumsum(kept, dtype=np.int32))[A.indptr]
+    starts = starts_of_kept(kept, A.indptr)
     columns = A.indices[kept].astype(np.int32, copy=False)
     columns += 1
     starts += 1
