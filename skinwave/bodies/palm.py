@@ -48,9 +48,13 @@ def _grid_lines(body: Body, finest: float, coarsest: float) -> tuple[Floats, Flo
     """Grid lines in metre along x, y and z of cells as `_sizes` asks for."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
     halves = [graded_axis(side / 2, finest, along) for side in (body.width, body.height)]
-    down = Grading(radius=0.0, growth=GROWTH**DOWNWARDS, coarsest=coarsest)
     x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
-    return x, y, -graded_axis(body.depth, finest, down)[::-1]
+    # No cell is higher than asked for: two element sizes that are compared then have different
+    # numbers of layers more often, and one more changes as much as all that is beside it.
+    heights = [finest]
+    while (below := sum(heights)) < body.depth:
+        heights.append(min(heights[-1] * GROWTH**DOWNWARDS, coarsest))
+    return x, y, -np.append(0.0, np.cumsum(heights))[::-1] * (body.depth / below)
 
 
 def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
