@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simple_model.sampling import resolving_step
+from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
 from skinwave.models import Model, named
@@ -51,6 +52,9 @@ class Plan:
     rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
+
+    def _repr_html_(self) -> str:
+        return notebook.plan_page(self)
 
 
 def plan(
