@@ -18,12 +18,12 @@ from meshes.shapes.palm import Palm, gradient, level_set, rise
 from meshes.tetmesh import Floats, MeshError, TetMesh, corner_volumes
 from meshes.volume.palm_mesh import curved_palm
 from meshes.volume.quality import angles_between_faces
+from meshes.volume.tetrahedralise import SHARPEST
 
 INWARDS = 2.0  # power of the distance from the middle with which corners get sharper inwards
 RIM = 2.0  # thicknesses of half a palm from its outline inwards, in which boxes follow the rim
 LEAST = 0.3  # cosine between the normals of a palm with and without mounds
 STEPS = 8  # of Newton's method, onto mounds that lie as high as the palm is thick
-SHARPEST = 8.0  # degrees: least dihedral angle that is accepted
 OFF = 1e-3  # of the thickness: how far a node of the boundary may miss the level set
 
 

@@ -13,7 +13,7 @@ from meshes.tetmesh import Floats
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.hands import hand_size, in_its_layers, support
+from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
 
 COARSEST = 2.0  # elements far from the middle, over those of h
 RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
@@ -21,7 +21,10 @@ RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
 # spot; up to which radius they have that size; and how much slower than sideways they grow
 # downwards.
 SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
-CELL = 0.9  # sides of the boxes that are split into elements, over the mean edges of these
+# Sides of the boxes that are split into elements, over the edges asked for of these; below the
+# default size they grow by its third root, because a row of boxes is as fine from side to side, and
+# 2 mm would take 560,000 dofs, where 230,000 are within 0.3 %.
+CELL = 0.85
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -35,7 +38,8 @@ def discretise(body: Body, h: float) -> Discretised:
     """
     # Larger elements do not follow the rim, where waves reflect and the base's support ends.
     coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
-    lines = _grid_lines(body, CELL * SURFACE * h, CELL * coarsest)
+    side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
+    lines = _grid_lines(body, side * SURFACE * h, side * coarsest)
     try:
         mesh = mapped_palm(body.palm, *lines)
     except MeshError:  # a relief that a structured mesh cannot follow
