@@ -66,6 +66,10 @@ ALIKE = 1e-6  # squared sine below which directions are orthonormalised once mor
 AT_ONCE = 32  # vectors that are multiplied together
 
 
+class NotReduced(ValueError):
+    """A body whose response takes more moments than a reduced-order model is made of."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedModel:
     """Reduced-order model u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
@@ -119,8 +123,10 @@ def reduce(
 
     Raises
     ------
+    NotReduced
+        If the tolerance is out of reach.
     ValueError
-        If the tolerance is out of reach, or no probe can move.
+        If no probe can move.
     """
     free, report = operators.free, progress or (lambda fraction: None)
     start_vectors = probes[:, free].toarray().T
@@ -155,7 +161,7 @@ def reduce(
             report(max(0.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
         moments, size, before = moment, space.size, now
     else:
-        raise ValueError(
+        raise NotReduced(
             f"{MOST_MOMENTS} moments leave an error of {errors[-1]:.2g}, above the tolerance "
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )
