@@ -71,8 +71,8 @@ class Operators:
     `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C in absorbing boundaries
     and layers; `free` (n_free,) numbers their rows among the 3 n displacement components of the
     mesh, component fastest. `branches` are generalised Maxwell branches in parallel with K, the
-    equilibrium (fully relaxed) stiffness. `laws` are C and these as combinations of K and M, or None;
-    they are None where one of these is replaced.
+    equilibrium (fully relaxed) stiffness. `laws` are C and these as combinations of K and M; None
+    where there are none, and where one of the matrices is replaced.
     """
 
     K: sparse.csr_array
