@@ -14,6 +14,8 @@ from fem.materials import Material
 from fem.maxwell import Branch
 from meshes.tetmesh import Floats
 
+ALIKE, ROUND_OFF = 1e-9, 1e-14  # of a product with a vector, and of its terms without their signs
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Combination:
@@ -31,6 +33,11 @@ class Combination:
             terms.append(K if self.stiffness == 1 else self.stiffness * K)
         return sum(terms[1:], start=terms[0])
 
+    def times(self, v: Floats, Kv: Floats, Mv: Floats) -> Floats:
+        """The matrix times v (n, k), with its products with K and M."""
+        found = self.stiffness * Kv + self.mass * Mv
+        return found if self.rest is None else found + self.rest @ v
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Laws:
@@ -43,6 +50,25 @@ class Laws:
     def parts(self) -> tuple[Combination, ...]:
         """That of C, and those of the branches."""
         return self.damping, *self.branches
+
+    def hold(self, K: Any, C: Any, M: Any, branches: Sequence[Branch]) -> bool:
+        """Whether these are the combinations, seen by what they make of two vectors, a smooth one
+        and one that is not: a body's matrices may have been replaced since.
+        """
+        matrices = (C, *(branch.K for branch in branches))
+        if len(matrices) != len(self.parts):
+            return False
+        n = K.shape[0]
+        v = np.column_stack([np.ones(n), np.random.default_rng(0).standard_normal(n)])
+        Kv, Mv = K @ v, M @ v
+        for A, part in zip(matrices, self.parts, strict=True):
+            Av, size = A @ v, abs(A) @ np.abs(v)
+            apart, known, all_of_it = (
+                np.linalg.norm(x, axis=0) for x in (Av - part.times(v, Kv, Mv), Av, size)
+            )
+            if (apart > ALIKE * known + ROUND_OFF * all_of_it).any():
+                return False
+        return True
 
     def at(self, factors: Sequence[float]) -> Combination:
         """Dynamic stiffness A = K + s C + s^2 M + sum_j h_j K_j of factors s in rad/s and h_j."""

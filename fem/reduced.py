@@ -133,7 +133,7 @@ def reduce(
     if not start_vectors.any():
         raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
     point, operators = _expansion(operators, added, band)
-    laws = operators.laws or unrelated(operators.C, operators.branches)
+    laws = _laws(operators)
     A = laws.at(factors_at(operators.branches, point))
     factor = factorise(A.of(operators.K, operators.M), backend=solver)
     report(0.0)
@@ -328,6 +328,13 @@ def _expansion(
         return relaxing if operators.branches else EXPANSION_POINT, operators
     C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
     return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M, laws=None)
+
+
+def _laws(operators: Operators) -> Laws:
+    """C and branches as combinations of K and M if they are, else as what they are."""
+    K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
+    known = operators.laws
+    return known if known and known.hold(K, C, M, branches) else unrelated(C, branches)
 
 
 def _independent(start_vectors: Floats) -> Floats:

@@ -70,3 +70,18 @@ def test_moments_without_products_are_those_with_them(material):
         np.testing.assert_allclose(
             basis.T @ (full.K @ basis), small.K, atol=1e-9 * np.abs(small.K).max()
         )
+
+
+def test_combinations_of_replaced_matrices_are_not_used():
+    mesh, ops, _ = block(PALM)
+    stiffer = replace(ops, K=2 * ops.K)
+    damped = replace(ops, C=ops.C + 1e-3 * abs(ops.C).max() / abs(ops.M).max() * ops.M)
+    assert ops.laws.hold(ops.K, ops.C, ops.M, ops.branches)
+    S = fem.probe_operator(mesh, [[0.0, 0.0]])
+    for changed in (stiffer, damped):
+        assert not ops.laws.hold(changed.K, changed.C, changed.M, changed.branches)
+        found, plain = (fem.reduce(o, S, 300.0) for o in (changed, replace(changed, laws=None)))
+        np.testing.assert_allclose(
+            fem.transfer(found, found.outputs.T, [200.0]),
+            fem.transfer(plain, plain.outputs.T, [200.0]), rtol=1e-6,
+        )  # fmt: skip
