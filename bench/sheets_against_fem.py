@@ -17,6 +17,7 @@ from fem.viscoelastic import LOSS_BAND
 from simple_model.load_spectrum import load_lines
 from simple_model.plate_modes import PlateModes, plate_modes
 from simple_model.plate_response import modal_path_forces
+from skinwave.inference import registered_laws  # noqa: F401
 from skinwave.inference.assess import finest
 from skinwave.inference.design import Candidate, hypercube, middle, plate, pressure, probes, sizes
 from skinwave.inference.scenes import scene_text

@@ -23,7 +23,7 @@ from simple_model.sheet_modes import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.mounting import FRAME, held
+from skinwave.bodies.mounting import FRAME, clip_sides, held
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
@@ -49,8 +49,9 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     Discretised
     """
     thickness = max(body.depth, thickness or SHEET_THICKNESS * min(body.width, body.height))
+    planes = [clip_sides(body.mounting, *each) for each in enumerate((body.width, body.height))]
     return Discretised(
-        mesh=sheet(body.width, body.height, thickness, h),
+        mesh=sheet(body.width, body.height, thickness, h, planes=planes),
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
         held=None if _is_clamped_frame(body) else partial(held, body.mounting),
         tension=tension(body),

@@ -36,6 +36,7 @@ from skinwave.studies.claims import (
     MUCH_LOWER,
     NEEDED,
     rival_levels,
+    rivals,
     strongest_rival,
 )
 from skinwave.studies.paper15 import tactons
@@ -48,6 +49,7 @@ TIMES = np.arange(2500) / 2500.0  # s: lines up to 1250 Hz, for 1 s
 CLAIMED = ("M1", "M2", "M3", "M4", "M5")
 # M4's sentence for a paper sheet adds velocity to displacement; S4 is the same of what is read.
 ASSESSED_AS = {"M4": "S4"}
+TINY = float(np.finfo(float).tiny)
 LINEAR = 0.5  # thicknesses: a plate that deflects further stretches
 
 
@@ -153,14 +155,36 @@ def _rivals(runs: list[Run]) -> dict[str, Any]:
     and M5's bar at all points.
     """
     both = [run for run in runs if (run.is_am, run.is_stm) == BOTH]
-    levels = np.array([rival_levels(run) for run in both])
+    levels, of_multiples = (np.array([of(run) for run in both])
+                            for of in (rival_levels, multiple_levels))  # fmt: skip
     worst = levels.max(axis=1)
     strongest = both[int(np.argmax(worst))]
     sizes = np.array([run.scene.tacton.trajectory.size for run in both])
+
+    def by_path(found: Floats) -> list[float]:
+        return [float(found[sizes == size].max()) for size in np.unique(sizes)]
+
     return {
-        "rival_db": levels.max(axis=0).tolist(),
-        "rival_by_path_db": [float(worst[sizes == size].max()) for size in np.unique(sizes)],
+        "rival_db": levels.max(axis=0).tolist(), "rival_by_path_db": by_path(worst),
+        "multiple_db": of_multiples.max(axis=0).tolist(),
+        "multiple_by_path_db": by_path(of_multiples.max(axis=1)),
+        "rival_of_mean_db": max(map(_rival_of_mean, both)),
         "rival_line": strongest_rival(strongest)[0], "rival_tacton": strongest.tacton,
         "tactons_highest": int((worst < 0).sum()),
         "tactons_much_lower": int((worst < MUCH_LOWER).sum()),
     }  # fmt: skip
+
+
+def multiple_levels(run: Run) -> Floats:
+    """Level of the strongest multiple of f_AM or f_d other than f_AM at each point (p,), dB re f_AM
+    there: without the sums and differences of both.
+    """
+    found = [run.lines[n] for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
+    return 20 * np.log10(np.maximum(np.array(found).max(axis=0), TINY) / run.lines["f_AM"])
+
+
+def _rival_of_mean(run: Run) -> float:
+    """Level of the strongest line other than f_AM in the root mean square over the points, dB."""
+    rms = {name: float(np.sqrt(np.mean(run.lines[name] ** 2))) for name in rivals(run)}
+    own = float(np.sqrt(np.mean(run.lines["f_AM"] ** 2)))
+    return 20 * float(np.log10(max(*rms.values(), TINY) / own))

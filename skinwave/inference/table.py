@@ -35,7 +35,8 @@ COLUMNS = {
     "vibration_over_thickness": "number", "second_harmonic_db": "number",
     **{f"{claim}_holds": "whole" for claim in CLAIMED},
     **{f"{claim}_value": "number" for claim in CLAIMED},
-    "rival_db": "numbers", "rival_by_path_db": "numbers", "rival_line": "text",
+    "rival_db": "numbers", "rival_by_path_db": "numbers", "multiple_db": "numbers",
+    "multiple_by_path_db": "numbers", "rival_of_mean_db": "number", "rival_line": "text",
     "rival_tacton": "text", "tactons_highest": "whole", "tactons_much_lower": "whole",
 }  # fmt: skip
 Row = Mapping[str, Any]

@@ -88,7 +88,7 @@ def is_resolved(run: NamedLines, claim: str) -> bool:
     """Whether the lines that a claim is about are resolved; some are about all lines."""
     if claim in NEEDED:
         return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
-    return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.unresolved
+    return "f_AM" in run.frequencies and bool(rivals(run)) and not run.unresolved
 
 
 def _single_line(runs: Sequence[NamedLines]) -> Assessment:
@@ -245,7 +245,7 @@ def _probe_levels(
     return 20 * np.log10(np.maximum(ratios, 1e-15))
 
 
-def _rivals(run: NamedLines) -> list[str]:
+def rivals(run: NamedLines) -> list[str]:
     """Lines that are resolved from f_AM itself."""
     f_am = run.frequencies["f_AM"]
     return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
@@ -253,12 +253,12 @@ def _rivals(run: NamedLines) -> list[str]:
 
 def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
     """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
-    return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
+    return _probe_levels(run, rivals(run), "f_AM", velocity).max(axis=0)
 
 
 def strongest_rival(run: NamedLines) -> tuple[str, float]:
     """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
-    names = _rivals(run)
+    names = rivals(run)
     levels = _probe_levels(run, names, "f_AM")
     line, probe = np.unravel_index(np.argmax(levels), levels.shape)
     return names[line], 1e3 * float(np.hypot(*run.places[probe]))
