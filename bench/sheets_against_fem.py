@@ -12,11 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.materials import rayleigh_damping
-from fem.viscoelastic import LOSS_BAND
 from simple_model.load_spectrum import load_lines
 from simple_model.plate_modes import PlateModes, plate_modes
 from simple_model.plate_response import modal_path_forces
+from skinwave.bodies.sheet import damping
 from skinwave.inference import registered_laws  # noqa: F401
 from skinwave.inference.assess import finest
 from skinwave.inference.design import Candidate, hypercube, middle, plate, pressure, probes, sizes
@@ -66,7 +65,7 @@ def by_elements(candidate: Candidate, reduced: Prepared) -> Lines:
 def by_modes(candidate: Candidate, modes: PlateModes) -> Lines:
     """As `by_elements`, with modal damping a M + b K of bending."""
     outputs = modes.at(probes(candidate) - middle(candidate))
-    by_mass, by_stiffness = rayleigh_damping(candidate["loss_factor"], LOSS_BAND)
+    by_mass, by_stiffness = damping(loads(scene_text(candidate)).body)
     rate = by_mass + by_stiffness * modes.elastic * modes.squared
     found = {}
     for name, tacton in tactons():

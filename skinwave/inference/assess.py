@@ -35,6 +35,7 @@ from skinwave.studies.claims import (
     CLAIMS,
     MUCH_LOWER,
     NEEDED,
+    multiple_levels,
     rival_levels,
     rivals,
     strongest_rival,
@@ -151,8 +152,9 @@ def _second_harmonic(run: Run) -> float:
 
 def _rivals(runs: list[Run]) -> dict[str, Any]:
     """Level of the strongest line other than f_AM under AM+STM, dB re f_AM: the largest at each
-    point and on each path, which line under which Tacton, and in how many Tactons it is below M4's
-    and M5's bar at all points.
+    point, on each path and in the root mean square over the points, which line under which Tacton,
+    and in how many Tactons it is below 0 dB at all points; the same of multiples of f_AM and f_d
+    alone, and in how many Tactons these are below M5's bar.
     """
     both = [run for run in runs if (run.is_am, run.is_stm) == BOTH]
     levels, of_multiples = (np.array([of(run) for run in both])
@@ -171,16 +173,8 @@ def _rivals(runs: list[Run]) -> dict[str, Any]:
         "rival_of_mean_db": max(map(_rival_of_mean, both)),
         "rival_line": strongest_rival(strongest)[0], "rival_tacton": strongest.tacton,
         "tactons_highest": int((worst < 0).sum()),
-        "tactons_much_lower": int((worst < MUCH_LOWER).sum()),
+        "tactons_much_lower": int((of_multiples.max(axis=1) < MUCH_LOWER).sum()),
     }  # fmt: skip
-
-
-def multiple_levels(run: Run) -> Floats:
-    """Level of the strongest multiple of f_AM or f_d other than f_AM at each point (p,), dB re f_AM
-    there: without the sums and differences of both.
-    """
-    found = [run.lines[n] for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
-    return 20 * np.log10(np.maximum(np.array(found).max(axis=0), TINY) / run.lines["f_AM"])
 
 
 def _rival_of_mean(run: Run) -> float:

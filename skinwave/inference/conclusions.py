@@ -155,7 +155,7 @@ def _where(found: Region) -> str:
 
 
 def _rivals(fair: Sequence[Row]) -> str:
-    levels = np.array([row["M5_value"] for row in fair])
+    levels = np.array([row["M4_value"] for row in fair])
     lines, counts = np.unique([row["rival_line"] for row in fair], return_counts=True)
     paths = np.argmax([row["rival_by_path_db"] for row in fair], axis=1)
     common, largest = int(np.argmax(counts)), int(np.bincount(paths).argmax())
@@ -221,4 +221,4 @@ def _value(p: Parameter, row: Row) -> str:
 
 
 def _level(row: Row) -> str:
-    return decibel(float(row["M5_value"]), signed=True)
+    return decibel(float(row["M4_value"]), signed=True)

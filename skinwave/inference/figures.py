@@ -61,7 +61,7 @@ def decision_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
     for claim in claims:
         by_key = {t.parameter.key: t.fraction for t in told(rows, holds(rows, claim).astype(int))}
         columns.append([by_key[p.key] for p in PARAMETERS])
-    levels = np.array([row["M5_value"] for row in rows])
+    levels = np.array([row["M4_value"] for row in rows])
     columns.append([variance_share(rows, levels, p) for p in PARAMETERS])
     table = 100 * np.array(columns).T
     with mpl.rc_context(style.rc):
@@ -103,7 +103,7 @@ def rival_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
 
 def region_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
     """Level of the strongest rival over each parameter: median, and the middle half."""
-    levels = np.array([row["M5_value"] for row in rows])
+    levels = np.array([row["M4_value"] for row in rows])
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(11.0, 9.5), layout="constrained")
         axes = figure.subplots(4, 4, sharey=True).ravel()

@@ -17,6 +17,7 @@ from skinwave import record
 from skinwave.effort import Progress, one_thread, silent
 from skinwave.inference.assess import CLAIMED, row
 from skinwave.inference.design import PARAMETERS, Candidate, Parameter, name
+from skinwave.studies.claims import MUCH_LOWER
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.sweep import SweepOutcome
 
@@ -135,12 +136,13 @@ def offspring(rows: Sequence[Row], count: int, seed: int) -> list[Candidate]:
 
 
 def nearest(rows: Sequence[Row]) -> list[Row]:
-    """Rows with a response, those first that show the most of M1 to M3, and of these those whose
-    strongest line other than f_AM is the weakest, as M4 and M5 ask.
+    """Rows with a response, those first that show the most of M1 to M3, and of these those that
+    come nearest to what M4 and M5 ask.
     """
 
     def shortfall(row: Row) -> tuple[int, float]:
-        return -sum(row[f"{claim}_holds"] or 0 for claim in CLAIMED[:3]), float(row["M5_value"])
+        beyond = max(row["M4_value"], row["M5_value"] - MUCH_LOWER)
+        return -sum(row[f"{claim}_holds"] or 0 for claim in CLAIMED[:3]), beyond
 
     return sorted((r for r in rows if r["M5_value"] is not None), key=shortfall)
 
