@@ -90,6 +90,8 @@ def rival_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
             ax.step(np.sort(levels), part, where="post", color=colour, label=f"path of {size}")
         worst = np.sort(by_path.max(axis=1))
         ax.step(worst, part, where="post", color="black", lw=2, label="all paths")
+        multiples = np.sort([row["M5_value"] for row in rows])
+        ax.step(multiples, part, where="post", color="black", ls="--", label="multiples alone")
         for limit, words in ((0.0, "M4 asks"), (MUCH_LOWER, "M5 asks")):
             ax.axvline(limit, color="grey", ls=":")
             ax.text(limit, 101, words, ha="center", va="bottom", fontsize="small", color="grey")
