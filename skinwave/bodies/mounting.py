@@ -14,6 +14,7 @@ EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # 
 SUPPORTS = ("clamped", "simply")
 STEEPEST = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
 FEWEST = 3  # columns of nodes in a clip: fewer let the sheet turn about it
+BESIDE = (0.1, 0.25, 0.5)  # of a clip's radius from its sides: lines of a mesh
 NEARLY = 0.01  # of a clip's radius: a side of it so near an edge of the sheet is there
 
 
@@ -146,11 +147,21 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
             )
 
 
-def clip_sides(mounting: Mounting, axis: int, size: float) -> list[float]:
-    """Coordinates in metre along an axis of the sides of clips that are within a sheet of a size."""
+def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
+    """Coordinates in metre along an axis of the sides of clips that are within a sheet of a size,
+    and of lines beside them: at the corners of a clip the curvature has no bound.
+    """
     reach = mounting.clip_radius
-    sides = {round(clip[axis] + side, 9) for clip in mounting.clips for side in (-reach, reach)}
-    return sorted(at for at in sides if abs(at) < size / 2 - NEARLY * reach)
+    sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]
+    found: list[float] = []
+    for part in (0.0, *BESIDE):
+        gap = (part / 2 or NEARLY) * reach
+        lines = {side + turn * part * reach for side in sides for turn in (-1, 1)}
+        found += [
+            at for at in sorted(lines, key=abs)
+            if abs(at) < size / 2 - gap and all(abs(at - other) > gap for other in found)
+        ]  # fmt: skip
+    return sorted(found)
 
 
 def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
