@@ -105,7 +105,8 @@ def by_modes(
 def backward_error(elements: Lines, of_part: Callable[[float], Lines]) -> tuple[float, float]:
     """Least error of the lines over stiffnesses that are a little off, and by how much."""
     best = minimize_scalar(
-        lambda part: line_error(elements, of_part(part)), bounds=(-OFF, OFF), method="bounded", options={"xatol": 1e-5},
+        lambda part: line_error(elements, of_part(part)), bounds=(-OFF, OFF), method="bounded",
+        options={"xatol": 1e-5},
     )  # fmt: skip
     return float(best.fun), float(best.x)
 

@@ -59,7 +59,9 @@ def smoothed(line: LineBasis, t: float) -> Floats:
     spacing = np.pi / (1 + DECAYED * tau)
     kappa = (np.arange(int(np.ceil(DECAYED / tau / spacing)) + 1) + 0.5) * spacing
     weight = 2 / np.pi * spacing * np.exp(-((kappa * tau) ** 2))
-    return np.asarray(sum((part * weight) @ part.T for part in _transforms(line, kappa)))
+    return np.asarray(
+        sum((part * weight) @ part.T for part in _transforms(line, np.asarray(kappa, np.float64)))
+    )
 
 
 def _transforms(line: LineBasis, kappa: Floats) -> tuple[Floats, Floats]:

@@ -6,11 +6,11 @@ Plates (1969), eqs. 9.4 and 10.1; orthotropic: Timoshenko and Woinowsky-Krieger,
     2 U = iint D11 w_xx^2 + 2 D12 w_xx w_yy + D22 w_yy^2 + 4 D66 w_xy^2 + Tx w_x^2 + Ty w_y^2 dA
     2 T = w^2 iint m w^2 dA + w^2 rho/pi iint iint w(x) w(y) / |x - y| dA dA
 
-X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; what a free
-edge asks follows from the energies. A clip holds a square: between its sides the polynomials are of
-their own, and products that would move it are left out. Where a plate is the same on both sides of
-its middle, even and odd modes are found apart. The second term of T is the air on both sides of a
-plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
+X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; what a
+free edge asks follows from the energies. A clip holds a square: between its sides the polynomials
+are their own, and products that would move it are left out. Where a plate is the same on both sides
+of its middle, even and odd modes are found apart. The second term of T is the air on both sides of
+a plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
 """
 
 from collections.abc import Sequence
@@ -246,9 +246,7 @@ def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
     return sorted(_apart(kept, beside, size / 2, LAYER * reach / 2))
 
 
-def _apart(
-    kept: Sequence[float], others: Sequence[float], end: float, gap: float
-) -> list[float]:
+def _apart(kept: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
     """Places and those of others that are farther than a gap from them and from both ends."""
     found = [-end, *kept, end]
     for place in sorted(others, key=abs):
@@ -259,7 +257,7 @@ def _apart(
 
 def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     bending, stretching = _stiffness(plate, x, y)
-    mass = plate.mass_per_area * np.kron(x.mass, y.mass)
+    mass = np.asarray(plate.mass_per_area * np.kron(x.mass, y.mass), np.float64)
     if plate.air_density:
         mass += air_mass(x, y, plate.air_density)
     K = bending if stretching is None else bending + stretching
@@ -267,7 +265,8 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     if free is None:
         squared, shapes = _modes(K, mass)
     else:
-        squared, shapes = _modes(free.T @ K @ free, free.T @ mass @ free)
+        held = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
+        squared, shapes = _modes(*held)
         shapes = free @ shapes
     elastic = np.ones(len(squared))
     if stretching is not None:
@@ -324,8 +323,7 @@ def _outside(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:
         moved = (
-            line.moved_within(at - reach, at + reach)
-            for line, at in ((x, along), (y, across))
+            line.moved_within(at - reach, at + reach) for line, at in ((x, along), (y, across))
         )
         found &= ~np.outer(*moved)
     return found.ravel()

@@ -172,8 +172,8 @@ def _inner(degrees: Sequence[int]) -> Iterator[Floats]:
 
 
 def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
-    """Even and odd combinations (e, n, i) of functions (e, n, k), each of whose mirror images is one
-    of them or its negative.
+    """Even and odd combinations (e, n, i) of functions (e, n, k), each of whose mirror images is
+    one of them or its negative.
     """
     sign = np.where(np.arange(functions.shape[1]) % 2, -1.0, 1.0)
     mirrored = functions[::-1] * sign[:, None]

@@ -148,8 +148,18 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
 
 
 def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
-    """Coordinates in metre along an axis of the sides of clips that are within a sheet of a size,
-    and of lines beside them: at the corners of a clip the curvature has no bound.
+    """Places of the sides of clips that are within a sheet, and of lines beside them, as the
+    curvature has no bound at their corners.
+
+    Parameters
+    ----------
+    mounting : Mounting
+    axis : 0 for x, 1 for y
+    size : metre, of the sheet along it
+
+    Returns
+    -------
+    Coordinates in metre, ascending
     """
     reach = mounting.clip_radius
     sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]

@@ -42,8 +42,8 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     ----------
     body : Body, a sheet
     h : metre, element size
-    thickness : of the equivalent in metre, `SHEET_THICKNESS` of the shorter side and `CLIP_THICKNESS`
-        of a clip at most if not given, and no less than the sheet's own
+    thickness : of the equivalent in metre, `SHEET_THICKNESS` of the shorter side and
+        `CLIP_THICKNESS` of a clip at most if not given, and no less than the sheet's own
 
     Returns
     -------

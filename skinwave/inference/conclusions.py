@@ -189,8 +189,8 @@ def _multiples(fair: Sequence[Row]) -> str:
         return "No candidate shows M3."
     median, least = (decibel(float(x), signed=True) for x in (np.median(there), min(there)))
     return (
-        f"Where M3 holds, the strongest multiple of f_AM or f_d is at {median} dB in the median and "
-        f"{least} dB at the least, where M5 asks for {MUCH_LOWER:g} dB."
+        f"Where M3 holds, the strongest multiple of f_AM or f_d is at {median} dB in the median "
+        f"and {least} dB at the least, where M5 asks for {MUCH_LOWER:g} dB."
     )
 
 

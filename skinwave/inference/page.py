@@ -41,8 +41,8 @@ METHOD = (
     "orthotropic, stretched thin plate with the air on both sides as in a baffle; a clip holds a "
     "square of 10 mm in a corner; modes by Ritz's method; the steady displacement or velocity at "
     "five points, 5 mm apart, under all 15 Tactons; then the claims as skinwave compare assesses "
-    "them, M4 in the quantity that was read. Intervals are those of Clopper and Pearson at 95 %. Information is of numbers in five "
-    "bins, less what chance makes of as many rows."
+    "them, M4 in the quantity that was read. Intervals are those of Clopper and Pearson at 95 %. "
+    "Information is of numbers in five bins, less what chance makes of as many rows."
 )
 LEFT_OUT = (
     "Left out: the mean deflection, which stretches a sheet on fixed edges. A clamped disc of "
@@ -54,7 +54,7 @@ LEFT_OUT = (
     "linear sheet adds: of the drive laws only the clipped and the compressed ones have it."
 )
 WHY_NOT = (
-    "M4 is about all lines: f_AM is to be the highest. M5 is about \"these frequency harmonics\", "
+    'M4 is about all lines: f_AM is to be the highest. M5 is about "these frequency harmonics", '
     "the multiples of f_AM and f_d, which are to be much lower: here by 20 dB. A load without a "
     "mean has no multiple of f_d, so that it shows M5 without M3. Why both ask so much of a linear "
     "sheet: on the path the load itself has a line at f_d that is 1.25, 1.57 and 1.71 times as "
