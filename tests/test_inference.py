@@ -272,6 +272,10 @@ def test_the_paragraph_says_what_the_table_holds():
     assert "M1 is decided by the drive law" in said
     assert "M2 always holds. " in said
     assert "M5 never holds." in said
+    four = np.logical_and.reduce([holds(rows, f"M{k}") for k in range(1, 5)])
+    lower = [sum(four & (np.array([r["M5_value"] for r in rows]) < bar)) for bar in (-10, -6)]
+    counts = [count or "none" for count in lower]
+    assert f"of all candidates {counts[0]} with 10 dB and {counts[1]} with 6 dB would" in said
     also = [row["M5_value"] for row in rows if row["M3_holds"]]
     assert f"or f_d is at {np.median(also):+.1f} dB in the median" in said
     assert "M3 and M5 in 0 % (0 to" in said
