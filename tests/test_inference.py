@@ -146,7 +146,7 @@ def test_claims_of_a_candidate_follow_from_its_lines():
     assert found["M5_value"] == pytest.approx(strongest, abs=1e-4)
     assert max(rivals["multiple_db"]) == pytest.approx(strongest, abs=1e-4)
     assert max(rivals["multiple_by_path_db"]) == pytest.approx(strongest, abs=1e-4)
-    assert found["M5_holds"] == int(strongest < -20)
+    assert found["M5_holds"] == int(-60 <= strongest < -20)
     assert min(rivals["rival_db"]) <= rivals["rival_of_mean_db"] <= level
     worst = runs[rivals["rival_tacton"]]
     ratio = worst.lines[rivals["rival_line"]] / worst.lines["f_AM"]

@@ -54,7 +54,8 @@ def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
         assert published[claim]["holds"] == "True", published[claim]
     assert float(published["S3"]["value"]) < -120
     # What the measurement had and the model lacks.
-    assert published["M1"]["holds"] == published["M3"]["holds"] == "False"
+    for claim in ("M1", "M3", "M5"):  # M5 is about lines that are not there
+        assert published[claim]["holds"] == "False"
 
 
 def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):

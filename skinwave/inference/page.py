@@ -55,13 +55,14 @@ LEFT_OUT = (
 )
 WHY_NOT = (
     'M4 is about all lines: f_AM is to be the highest. M5 is about "these frequency harmonics", '
-    "the multiples of f_AM and f_d, which are to be much lower: here by 20 dB. A load without a "
-    "mean has no multiple of f_d, so that it shows M5 without M3. Why both ask so much of a linear "
-    "sheet: on the path the load itself has a line at f_d that is 1.25, 1.57 and 1.71 times as "
-    "strong as that at f_AM, for paths of 10, 20 and 30 mm (force corrected; weaker by a quarter "
-    "where the squared pressure is modulated to its full depth). The sheet would have to weaken "
-    "f_d and 2 f_AM by a factor of ten and more at every point and for each f_AM. It does so where "
-    "its waves are much longer than the path, and else by chance between two of its modes."
+    "the multiples of f_AM and f_d, which are to be there, above -60 dB, and much lower: here by "
+    "20 dB. A load without a mean has none of them, and shows neither M3 nor M5. Why both ask so "
+    "much of a linear sheet: on the path the load itself has a line at f_d that is 1.25, 1.57 and "
+    "1.71 times as strong as that at f_AM, for paths of 10, 20 and 30 mm (force corrected; weaker "
+    "by a quarter where the squared pressure is modulated to its full depth). The sheet would "
+    "have to weaken f_d and 2 f_AM by a factor of ten and more at every point and for each f_AM. "
+    "It does so where its waves are much longer than the path, and else by chance between two of "
+    "its modes."
 )
 LIMITS = (0.0, -6.0, -10.0, MUCH_LOWER)  # dB
 HALF_DRIVE = (

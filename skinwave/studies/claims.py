@@ -185,7 +185,9 @@ def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
         f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM; in "
         f"{lower} of {len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
     )
-    return value < MUCH_LOWER, value, MUCH_LOWER, sentence
+    if value < PRESENT:
+        sentence += f"; those that the claim is about are not there, above {PRESENT:g} dB"
+    return bool(PRESENT <= value < MUCH_LOWER), value, MUCH_LOWER, sentence
 
 
 def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
