@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,7 @@ def body_from_file(
     A surface (`.stl .ply .obj .glb .vtp`) is repaired where that takes no guess, turned so that
     `up` is +z, moved so that the middle of its palm is the origin and its top there is z = 0,
     cut to `clip` and filled with tetrahedra of h that grow beyond 30 mm from the middle. A mesh
-    (`.vtu .msh .inp .vtk`) is taken as it is.
+    (`.vtu .msh .inp .vtk .mesh`) is taken as it is.
 
     Parameters
     ----------
@@ -133,12 +134,7 @@ def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 
         is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))
         sides = {"cut": is_cut, "top": seen & ~is_cut}
     made = tag_boundary(mesh, rest="bottom", **sides)
-    return TetMesh(
-        points=mesh.points,
-        tets=mesh.tets,
-        region=mesh.region,
-        facets={**made.facets, **mesh.facets},
-    )
+    return replace(mesh, facets={**made.facets, **mesh.facets})
 
 
 def _described(mesh: TetMesh, say: Say) -> TetMesh:
