@@ -7,10 +7,12 @@ import numpy as np
 from meshes.facets import geometry
 from meshes.shapes.fingertip import Fingertip, lattice_of, placed, shell_of
 from meshes.shapes.structured import check_size, round_up
-from meshes.tetmesh import EDGES, MeshError, TetMesh, boundary_facets, quadratic
-from meshes.volume.curving import keep_jacobians
+from meshes.tetmesh import EDGES, Floats, MeshError, TetMesh, boundary_facets, quadratic
+from meshes.volume.curving import LEAST_RATIO, keep_jacobians
+from meshes.volume.quality import jacobian_ratios
 
 TISSUE, BONE = 0, 1  # regions
+EASINGS, EASED = 6, 0.7
 FEWEST, BONY = 3, 2  # shells, and those of them in the bone
 
 
@@ -50,7 +52,16 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
         own = (shell_of(lattice)[edges] == shell).all(axis=0)
         middles = lattice[edges[:, own]].mean(axis=0)
         curved[mesh.tets[:, 4:][own]] = placed(shape, middles, (bone, shells), layers)
-    return _tagged(shape, replace(mesh, points=keep_jacobians(mesh.tets, mesh.points, curved)[0]))
+    return _tagged(shape, replace(mesh, points=_eased(mesh, curved)))
+
+
+def _eased(mesh: TetMesh, curved: Floats) -> Floats:
+    """Curved nodes (n, 3), less so where elements would be distorted: the bone has few elements."""
+    share, way = np.ones((len(curved), 1)), curved - mesh.points
+    for _ in range(EASINGS):
+        bad = jacobian_ratios(mesh.points + share * way, mesh.tets) < LEAST_RATIO
+        share[np.unique(mesh.tets[bad, 4:])] *= EASED
+    return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * way)[0]
 
 
 def _tagged(shape: Fingertip, mesh: TetMesh) -> TetMesh:
