@@ -10,7 +10,8 @@ SECTORS = 8  # so that no element crosses x = 0 or y = 0
 
 
 def disc(diameter: float, thickness: float, h: float) -> TetMesh:
-    """Ten-node tetrahedra of a cylinder below the plane z = 0, about the z axis.
+    """Ten-node tetrahedra of a cylinder below the plane z = 0, about the z axis: a prism on a
+    polygon of 8 sides for each ring of elements.
 
     Parameters
     ----------
@@ -33,15 +34,11 @@ def disc(diameter: float, thickness: float, h: float) -> TetMesh:
     check_size((2 * rings, 2 * rings, layers), order=2)
     plane, triangles = _rings(rings)
     mesh = extruded(plane * diameter / 2, triangles, np.linspace(-thickness, 0.0, layers + 1))
-    points, flat = np.array(mesh.points), mesh.points[:, :2]
-    named = tag_boundary(
+    return tag_boundary(
         mesh,
         bottom=lambda centroids, normals: normals[:, 2] < -0.9,
         sides=lambda centroids, normals: np.abs(normals[:, 2]) < 0.1,
     )
-    rim = np.unique(named.facets["sides"])
-    points[rim, :2] *= diameter / 2 / np.linalg.norm(flat[rim], axis=1, keepdims=True)
-    return TetMesh(points=points, tets=named.tets, facets=named.facets)
 
 
 def _rings(rings: int) -> tuple[Floats, Ints]:

@@ -49,7 +49,9 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     edges = np.moveaxis(mesh.tets[:, EDGES], 2, 0)
     curved = np.array(mesh.points)
     for shell in (bone, shells):
-        own = (shell_of(lattice)[edges] == shell).all(axis=0)
+        # Seen from above, the outline stays the polygon of facets in which probes are looked for.
+        outline = (lattice[edges, 2] == 0).all(axis=0) & (shell == shells)
+        own = (shell_of(lattice)[edges] == shell).all(axis=0) & ~outline
         middles = lattice[edges[:, own]].mean(axis=0)
         curved[mesh.tets[:, 4:][own]] = placed(shape, middles, (bone, shells), layers)
     return _tagged(shape, replace(mesh, points=_eased(mesh, curved)))

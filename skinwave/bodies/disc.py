@@ -21,7 +21,7 @@ def check(body: Body) -> None:
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra of at most h in metre, curved at the rim, in even layers."""
+    """Ten-node tetrahedra of at most h in metre, in even rings and layers."""
     mesh = disc(body.width, body.depth, h)
     depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh, materials = in_layers(mesh, body.strata, depths)
