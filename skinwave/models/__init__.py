@@ -31,6 +31,7 @@ BUILT_IN = {  # name -> the file that registers it
     "fem-nonlinear": "nonlinear_elements",
     "fem-nonlinear-transient": "nonlinear_elements",
     "plate-modes": "plate_modes",
+    "plate-modes-transient": "plate_modes",
 }
 
 
@@ -132,6 +133,15 @@ def check_reading(model: Model, scene: "Scene") -> None:
             f"{model.name} has no {scene.reading.words}; use --model fem, or ask for the "
             "displacement at the surface"
         )
+
+
+def takes(model: Model, scene: "Scene") -> bool:
+    """Whether a model is for a scene's body, and has the quantity that it asks for."""
+    try:
+        model.refuse(scene.body)
+    except ValueError:
+        return False
+    return model.reads(scene)
 
 
 def names() -> tuple[str, ...]:
