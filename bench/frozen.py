@@ -4,7 +4,7 @@ code, `python -m bench.frozen compare DIR`.
 Everything goes through the command line, on scenes that are kept in DIR, so that what is inside may
 be rebuilt in between: `compare` runs the same commands again. Text may differ (it is counted), and
 what took how long; numbers must agree to 1e-9 of the largest of their column, or of their tolerance
-in a verification. Palms are meshed anew in each run: their numbers are compared to 5 %.
+in a verification.
 """
 
 import argparse
@@ -20,8 +20,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parent.parent
-AGREE, MESHED_ANEW = 1e-9, 0.05
-OF_MESHER = {"palm", "flat"}  # words in a name: of a body that the mesher has filled
+AGREE = 1e-9
 NOT_COMPARED = ("seconds", "memory", "versions", "peak", "typed", "arguments")
 SCENES, PLANNED = ("skin-slab", "paper-sheet"), 20
 
@@ -128,15 +127,13 @@ def differences(before: Path, after: Path) -> Iterator[str]:
         yield f"{len(old)} columns and {len(old_text)} texts, now {len(new)} and {len(new_text)}"
         return
     for (name, a), (_, b) in zip(old.items(), new.items(), strict=True):
-        words = f"{before.parent.name.removeprefix('run-')} {name}".replace("/", " ").split()
-        bar = AGREE if OF_MESHER.isdisjoint(words) else MESHED_ANEW
         if a.shape != b.shape:
             yield f"{name}: {a.shape}, now {b.shape}"
         elif a.dtype.kind not in "fc":
             continue
-        elif not np.allclose(a, b, rtol=0, atol=bar * _size(a), equal_nan=True):
+        elif not np.allclose(a, b, rtol=0, atol=AGREE * _size(a), equal_nan=True):
             worst = np.nanmax(np.abs(a - b)) / _size(a)
-            yield f"{name}: differs by {worst:.2g} of its largest (may by {bar:g})"
+            yield f"{name}: differs by {worst:.2g} of its largest (may by {AGREE:g})"
 
 
 def _size(values: np.ndarray) -> float:

@@ -46,6 +46,7 @@ from fem.load_and_probe import (
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles
+from fem.nodal_strain import SolidPart, nodal_strain, solid_parts
 from fem.plane_stiffness import Tension
 from fem.reduced import NotReduced, ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
@@ -53,7 +54,6 @@ from fem.shallow_shell import shell_stiffness
 from fem.static import modes, static
 from fem.stress import (
     materials_at,
-    nodal_strain,
     relaxation,
     relaxed,
     strain_operator,
@@ -80,6 +80,7 @@ __all__ = [
     "Poles",
     "PronyTerm",
     "ReducedModel",
+    "SolidPart",
     "State",
     "StretchingModes",
     "Support",
@@ -116,6 +117,7 @@ __all__ = [
     "relaxation",
     "relaxed",
     "shell_stiffness",
+    "solid_parts",
     "static",
     "stored",
     "strain_operator",

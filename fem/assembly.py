@@ -28,10 +28,11 @@ from scipy import sparse
 
 from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.coat import Coat, coat_operators
+from fem.combination import Laws, proportional
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_products, jacobians, shape_nodes
 from fem.materials import Material
-from fem.maxwell import Branch, on_free
+from fem.maxwell import Branch, MaxwellBranch, on_free
 from fem.plane_stiffness import (
     SIDES,
     Tension,
@@ -40,8 +41,16 @@ from fem.plane_stiffness import (
     tension_stiffness,
 )
 from fem.pressure_projection import projected_divergence
-from fem.sparsity import UPPER, SparsityPattern, from_components, from_nodal, slabs
-from fem.viscoelastic import Matrices, property_of, together, viscoelastic
+from fem.sparsity import (
+    UPPER,
+    SparsityPattern,
+    from_blocks,
+    from_components,
+    from_nodal,
+    slabs,
+    starts_of_kept,
+)
+from fem.viscoelastic import property_of, rayleigh_rates, together, viscoelastic
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
@@ -51,6 +60,10 @@ UNPROJECTED = (
 )
 
 
+# K of shares (r,) of each material's moduli, and M of their densities (r,), on all dofs.
+Volume = tuple[Callable[[Floats], sparse.csr_array], Callable[[Floats], sparse.csr_array]]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Operators:
     """M u'' + C u' + K u = f on the free degrees of freedom.
@@ -58,7 +71,8 @@ class Operators:
     `K`, `C`, `M` are sparse (n_free, n_free), and so is `R`, the part of C in absorbing boundaries
     and layers; `free` (n_free,) numbers their rows among the 3 n displacement components of the
     mesh, component fastest. `branches` are generalised Maxwell branches in parallel with K, the
-    equilibrium (fully relaxed) stiffness.
+    equilibrium (fully relaxed) stiffness. `laws` are C and these as combinations of K and M; None
+    where there are none, and where one of the matrices is replaced.
     """
 
     K: sparse.csr_array
@@ -68,6 +82,7 @@ class Operators:
     free: Ints
     n_dofs: int
     branches: tuple[Branch, ...] = ()
+    laws: Laws | None = None
 
     def expand(self, values: Floats) -> Floats:
         """Values (n_free, ...) on all dofs (n_dofs, ...), 0 where the body is fixed."""
@@ -124,48 +139,74 @@ def assemble(
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
 
-    K, C, M, branches = _volume_operators(
-        mesh, pattern, materials, region, axes, tension.share if tension else None, stiffener
-    )
+    share = tension.share if tension else None
+    volume = _volume(mesh, pattern, materials, region, axes, stiffener)
+    beside = sparse.csr_array((mesh.n_dofs, mesh.n_dofs))  # of K
+    if support is not None and support.stiffness.any():
+        beside = beside + springs(mesh, support)
+    if tension is not None:
+        beside = beside + tension_stiffness(mesh, pattern, tension, axes)
+    R = sparse.csr_array(beside.shape)
+    if absorbing is not None:
+        R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+    if support is not None and support.absorbed.any():
+        R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
+    if drag is not None:
+        R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
+    beside, R = restricted(beside, free), restricted(R, free)
+    if coat is None and len(materials) == 1 and materials[0].law is None:
+        return _of_one_material(materials[0], volume, share, (beside, R), free, mesh.n_dofs)
+    K, C, M, branches = viscoelastic(materials, *volume, share)
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
         K, C, M, branches = together((K, C, M, branches), added)
-    R = sparse.csr_array(K.shape)
-    if absorbing is not None:
-        R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
-    if support is not None and support.stiffness.any():
-        K = (K + springs(mesh, support)).tocsr()
-    if support is not None and support.absorbed.any():
-        R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
-    if tension is not None:
-        K = (K + tension_stiffness(mesh, pattern, tension, axes)).tocsr()
-    if drag is not None:
-        R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
-    if R.nnz:
-        C = C + R
-    if len(free) < mesh.n_dofs:
-        K, C, M, R = (operator[free][:, free] for operator in (K, C, M, R))
-        branches = on_free(branches, free)
+    K, C, M = (restricted(A, free) for A in (K, C, M))
+    K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
+    branches = on_free(branches, free)
     return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
 
 
-def _volume_operators(
+def _of_one_material(
+    m: Material,
+    volume: Volume,
+    share: Callable[[Floats], Floats] | None,
+    surfaces: tuple[sparse.csr_array, sparse.csr_array],
+    free: Ints,
+    n_dofs: int,
+) -> Operators:
+    """Operators of one material, whose C and branches are combinations of K and M: with what K has
+    beside its stiffness, and R, on the free degrees of freedom.
+    """
+    beside, R = surfaces
+    K, M = (
+        restricted(volume[0](np.ones(1)), free),
+        restricted(volume[1](np.ones(1) * m.density), free),
+    )
+    K = K + beside if beside.nnz else K
+    laws, times = proportional(m, rayleigh_rates(m, share), surfaces)
+    each = zip(laws.branches, times, strict=True)
+    return Operators(
+        K=K, C=laws.damping.of(K, M), M=M, R=R, free=free, n_dofs=n_dofs, laws=laws,
+        branches=tuple(MaxwellBranch(K=part.of(K, M), time=time) for part, time in each),
+    )  # fmt: skip
+
+
+def _volume(
     mesh: TetMesh,
     pattern: SparsityPattern,
     materials: list[Material],
     region: Ints,
     axes: Floats,
-    share: Callable[[Floats], Floats] | None,
     stiffener: sparse.csr_array | None,
-) -> Matrices:
-    """K, C, M and the branches of all materials, on all dofs."""
+) -> Volume:
+    """K of a share (r,) of each material's moduli, and M of densities (r,), on all dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
     D = {
-        m: projected_divergence(elements_of(mesh, region == m))
+        m: (lam - direct)[m] ** 0.5 * projected_divergence(elements_of(mesh, region == m))
         for m in np.flatnonzero(lam > direct).tolist()
     }
-    beside: dict[int, Any] = {m: (lam - direct)[m] * (D[m].T @ D[m]) for m in D}
+    beside: dict[int, Any] = {m: D[m].T @ D[m] for m in D}
     for m, added in directional_parts(materials).items():
         own = region == m
         part = replace(pattern, slot=pattern.slot[own])
@@ -174,13 +215,30 @@ def _volume_operators(
     if stiffener is not None:
         beside[0] = beside.get(0, 0) + stiffener
 
-    def stiffness(share: Floats) -> sparse.csr_array:
-        """K with a share (r,) of each material's moduli."""
-        blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
-        summed = from_components(pattern, pattern.sum(blocks, 6))
-        return sum((share[m] * part for m, part in beside.items()), start=summed).tocsr()
+    blocked = [part.format == "bsr" for part in beside.values()]
 
-    return viscoelastic(materials, stiffness, lambda rho: _mass(mesh, pattern, rho[region]), share)
+    def stiffness(share: Floats) -> sparse.csr_array:
+        blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
+        whole = from_blocks if beside and all(blocked) else from_components
+        summed = whole(pattern, pattern.sum(blocks, 6))
+        parts = (part if share[m] == 1 else share[m] * part for m, part in beside.items())
+        return sum(parts, start=summed).tocsr()
+
+    return stiffness, lambda rho: _mass(mesh, pattern, rho[region])
+
+
+def restricted(A: sparse.csr_array, free: Ints) -> sparse.csr_array:
+    """Rows and columns of a matrix that are free, in rising order."""
+    n, A = A.shape[0], A.tocsr()
+    if len(free) == n:
+        return A
+    number = np.full(n, -1, A.indices.dtype)
+    number[free] = np.arange(len(free))
+    columns = number[A.indices]
+    kept = (columns >= 0) & np.repeat(number >= 0, np.diff(A.indptr))
+    starts = starts_of_kept(kept, A.indptr)
+    indptr = np.append(starts[free], starts[-1])
+    return sparse.csr_array((A.data[kept], columns[kept], indptr), shape=(len(free), len(free)))
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:

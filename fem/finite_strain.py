@@ -148,7 +148,7 @@ def finite_strain(
         return body
     part, lag = membrane_part(mesh, membrane), stress_lag(membrane.material)
     K = tangent(part, np.zeros((n, 3)))[free][:, free]
-    at_rest = replace(operators, K=operators.K + K, C=operators.C + lag * K)
+    at_rest = replace(operators, K=operators.K + K, C=operators.C + lag * K, laws=None)
     return Elastic(
         operators=at_rest,
         internal=lambda u: body.internal(u) + internal_force(part, spread(u)).ravel()[free],

@@ -44,6 +44,17 @@ def dilatation_operator(mesh: TetMesh, elements: Ints) -> sparse.csr_array:
     return (Q @ D).tocsr()
 
 
+def projected_dilatation(mesh: TetMesh, u: Floats) -> Floats:
+    """Projected dilatation (e, q, m) of displacements u (3 n, m) in metre, at the quadrature points
+    for degree 2, as `dilatation_operator` reads it.
+    """
+    cluster, sloping = macroelements(mesh)
+    q = linear_functions(mesh, cluster, sloping)
+    D = _coefficients(mesh, cluster, q)
+    values = (D @ u).reshape(-1, 4, u.shape[1])[cluster]
+    return np.asarray(np.einsum("eqv,evm->eqm", q, values, optimize=True))
+
+
 def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
     """Matrix D of `projected_divergence`, by macroelements (e,) and functions (e, q, v)."""
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)

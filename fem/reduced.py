@@ -39,6 +39,7 @@ from scipy.sparse.linalg import aslinearoperator
 
 from fem.added_mass import AddedMass
 from fem.assembly import Operators
+from fem.combination import Laws, factors_at, unrelated
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
 from fem.maxwell import Branch, MaxwellBranch, with_internal
@@ -61,6 +62,8 @@ SMALLEST = np.finfo(np.float64).tiny
 DISTINCT = 1e-6  # of the largest singular value: probes that differ by less count as dependent
 ROUND_OFF = 1e-12  # of a direction: what orthogonalisation leaves of it is round-off
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
+ALIKE = 1e-6  # squared sine below which directions are orthonormalised once more
+AT_ONCE = 32  # vectors that are multiplied together
 
 
 class NotReduced(ValueError):
@@ -130,21 +133,24 @@ def reduce(
     if not start_vectors.any():
         raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
     point, operators = _expansion(operators, added, band)
-    factor = factorise(_stiffness_at(operators, point), backend=solver)
+    laws = _laws(operators)
+    A = laws.at(factors_at(operators.branches, point))
+    factor = factorise(A.of(operators.K, operators.M), backend=solver)
     report(0.0)
 
     independent = _independent(start_vectors)
-    space = KrylovBasis(operators, independent.shape[1] * (MOST_MOMENTS + 1))
+    space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
+    seen = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
     # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
     fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, LOOKED_AT), np.complex128)
     coarse = fine[::AT_FIRST]  # until the error is below the tolerance there
     moments, size, before = 0, 0, None
     errors: list[float] = []
-    for moment in _moments(space, operators, point, factor, independent):
+    for moment in _moments(space, operators, laws, point, factor, independent):
         if moment < moments + max(FEWEST_BETWEEN, SHARE_BETWEEN * moment):
             continue
-        weights = None if loads is None else space.basis.T @ loads[free]
-        respond = partial(_band_response, space, space.basis.T @ start_vectors, weights)
+        space.project(seen)
+        respond = partial(_band_response, space, start_vectors.shape[1])
         now = respond(coarse, space.size)
         if before is not None:
             errors.append(_largest_change(before, now))
@@ -160,18 +166,18 @@ def reduce(
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )
 
+    K, C, _, branches = space.model(size)
     basis = space.basis[:, :size]
-    K, C, *relaxing = (part[:size, :size].copy() for part in space.projected)
     return ReducedModel(
         basis=operators.expand(basis),
-        K=K,
-        C=C,
-        R=basis.T @ (operators.R @ basis),
-        outputs=start_vectors.T @ basis,
+        K=K.copy(),
+        C=C.copy(),
+        R=space.radiation(operators.R, size),
+        outputs=space.seen(size)[:, : start_vectors.shape[1]].T.copy(),
         moments=moments,
         estimate=errors[-1],
         solver=factor.backend,
-        branches=_branches(relaxing, operators.branches),
+        branches=branches,
     )
 
 
@@ -211,20 +217,23 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 
 
 class KrylovBasis:
-    """Mass-orthonormal basis that grows, and the `projected` K, C and K_j (size, size) of the
-    Maxwell branches.
+    """Mass-orthonormal basis that grows, and what is projected onto it.
 
     Only the vectors are kept: their products with sparse matrices are formed where they are needed,
-    in less time than it takes to read them from memory. Memory is touched only as far as used.
+    in less time than it takes to read them from memory. Memory is touched only as far as used, and
+    new vectors are orthonormalised in place: memory touched anew costs as much as the arithmetic.
     """
 
-    def __init__(self, operators: Operators, most: int) -> None:
-        self._branches = operators.branches
-        self._M = product(operators.M)
-        stiffnesses = [branch.K for branch in operators.branches]
-        self._K, self._C, *self._relaxing = map(product, (operators.K, operators.C, *stiffnesses))
+    def __init__(self, operators: Operators, laws: Laws, most: int) -> None:
+        self._branches, self._laws = operators.branches, laws
+        self._M, self._K = product(operators.M), product(operators.K)
+        rests = (part.rest for part in laws.parts)
+        self._rests = [None if rest is None else product(rest) for rest in rests]
         self._columns = np.empty((len(operators.free), most), order="F")
-        self.projected = [np.empty((0, 0)) for _ in (None, None, *stiffnesses)]
+        # Projected K and rests (size, size), and what is seen of a response (size, k).
+        self._small_K = np.empty((0, 0))
+        self._small_rests = [None if times is None else self._small_K for times in self._rests]
+        self._seen = np.empty((0, 0))
         self.size = 0
 
     @property
@@ -233,53 +242,79 @@ class KrylovBasis:
         return self._columns[:, : self.size]
 
     def model(self, size: int) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
-        """Projected K, C, M and Maxwell branches, in the first vectors."""
-        K, C, *relaxing = (part[:size, :size] for part in self.projected)
-        return K, C, np.eye(size), _branches(relaxing, self._branches)
+        """Projected K, C, M and Maxwell branches, in the first vectors, as far as projected."""
+        K, M = self._small_K[:size, :size], np.eye(size)
+        rests = (None if rest is None else rest[:size, :size] for rest in self._small_rests)
+        each = (replace(part, rest=r) for part, r in zip(self._laws.parts, rests, strict=True))
+        C, *relaxing = (part.of(K, M) for part in each)
+        return K, C, M, _branches(relaxing, self._branches)
 
-    def forces(self, y: Floats, z: Floats, stretches: Sequence[Floats]) -> Floats:
-        """Nodal forces C y + M z + sum_j K_j s_j (n, k) of coordinates (size, k) in the basis."""
-        width = y.shape[1]
-        fields = self.basis @ np.hstack([y, z, *stretches])  # reads the basis once
-        applied = (self._C, self._M, *self._relaxing)
-        parts = (times(fields[:, j * width :][:, :width]) for j, times in enumerate(applied))
-        return sum(parts, np.zeros((len(fields), width)))
+    def seen(self, size: int) -> Floats:
+        """Components (size, k) of the vectors that `project` was given."""
+        return self._seen[:size]
+
+    def radiation(self, R: sparse.csr_array, size: int) -> Floats:
+        """Projected damping (size, size) of absorbing boundaries, which may be the rest of C."""
+        if R is self._laws.damping.rest:
+            return np.array(self._small_rests[0])[:size, :size]
+        basis = self.basis[:, :size]
+        return _products(product(R), basis, basis)
+
+    def forces(self, of_mass: Floats, of_rests: Sequence[Floats]) -> Floats:
+        """Nodal forces M z + sum_j rest_j r_j (n, k) of coordinates z and r_j (size, k)."""
+        acting = [(self._M, of_mass)]
+        acting += [(A, r) for A, r in zip(self._rests, of_rests, strict=True) if A is not None]
+        fields = _combined(self.basis, np.hstack([r for _, r in acting]))  # reads the basis once
+        each = np.split(fields, len(acting), axis=1)
+        forces = acting[0][0](each[0])
+        for (A, _), field in zip(acting[1:], each[1:], strict=True):
+            forces += A(field)
+        return forces
 
     def extend(self, block: Floats) -> Floats:
-        """Add the linearly independent directions of a block (n, k); its coordinates (size, k)."""
+        """Add the linearly independent directions of a block (n, k), by block Gram-Schmidt and a
+        decomposition of its Gram matrix; its coordinates (size, k).
+        """
         M, Q = self._M, self.basis
         moved = M(block)
         scale = _norms(block, moved)
-        block, moved, overlap = block / scale, moved / scale, np.zeros((self.size, len(scale)))
-        for _ in range(2):  # twice is enough
-            coordinates = Q.T @ moved
-            block = block - Q @ coordinates
-            overlap, moved = overlap + coordinates, M(block)
-        left = _norms(block, moved)
-        fresh = left > ROUND_OFF  # of 1: a space of all of a body's dofs has no new direction
-        block, moved = (np.where(fresh, x / left, 0.0) for x in (block, moved))
-        squares, directions = np.linalg.eigh(block.T @ moved)
+        first = Q.T @ moved
+        block = block - _combined(Q, first)
+        # Twice is enough, and once is not: after 90 moments vectors were orthogonal to 1e-3.
+        moved = M(block)
+        second = Q.T @ moved
+        gram = block.T @ moved - second.T @ second
+        block -= _combined(Q, second)
+        size = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        # A space of all of a body's dofs has no new direction.
+        inverse = np.divide(1, size, out=np.zeros_like(size), where=size > ROUND_OFF * scale)
+        squares, directions = np.linalg.eigh(gram * np.outer(inverse, inverse))
         distinct = squares > max(DEPENDENT * squares.max(), SMALLEST)
-        apart = directions[:, distinct] / np.sqrt(squares[distinct])
-        # Orthonormal but for round-off that the scaling has raised, also of what is in the basis.
-        new = block @ apart
-        new = new - Q @ (Q.T @ (moved @ apart))
-        moved_new = M(new)
-        upright = np.linalg.inv(np.linalg.cholesky(new.T @ moved_new)).T
-        self._append(new @ upright)
-        return np.vstack([overlap, (upright.T @ (moved_new.T @ block)) * left]) * scale
+        squares, directions = squares[distinct], directions[:, distinct]
+        upright = inverse[:, None] * directions / np.sqrt(squares)
+        if len(squares) and squares.min() < ALIKE * squares.max():
+            upright = self._again(block, upright)
+        start, self.size = self.size, self.size + upright.shape[1]
+        np.matmul(block, upright, out=self._columns[:, start : self.size])
+        return np.vstack([first + second, upright.T @ gram])
 
-    def _append(self, new: Floats) -> None:
-        """Append vectors (n, k), and project the matrices onto them."""
-        width, start = new.shape[1], self.size
-        self.size = start + width
-        self._columns[:, start : self.size] = new
-        forces = np.hstack([times(new) for times in (self._K, self._C, *self._relaxing)])
-        columns = self.basis.T @ forces
-        self.projected = [
-            _bordered(small, columns[:, j * width :][:, :width])
-            for j, small in enumerate(self.projected)
-        ]
+    def _again(self, block: Floats, upright: Floats) -> Floats:
+        """Orthonormalise directions of a block that are much alike once more: scaled, their
+        round-off is no longer small, also that of what is in the basis.
+        """
+        new = block @ upright
+        block -= _combined(self.basis, self.basis.T @ self._M(new)) @ np.linalg.pinv(upright)
+        new = block @ upright
+        return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ self._M(new))).T
+
+    def project(self, seen: Floats) -> None:
+        """Project the matrices, and what is seen (n, k), onto the vectors that are new since."""
+        Q, new = self.basis, self.basis[:, len(self._small_K) :]
+        self._seen = np.vstack([self._seen.reshape(-1, seen.shape[1]), new.T @ seen])
+        self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
+        for j, (times, small) in enumerate(zip(self._rests, self._small_rests, strict=True)):
+            if times is not None and small is not None:
+                self._small_rests[j] = _bordered(small, _products(times, Q, new))
 
 
 def _expansion(
@@ -292,12 +327,14 @@ def _expansion(
         relaxing = 2 * np.pi * RELAXING_POINT * band
         return relaxing if operators.branches else EXPANSION_POINT, operators
     C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
-    return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M)
+    return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M, laws=None)
 
 
-def _stiffness_at(operators: Operators, point: float) -> sparse.csr_array:
-    K, C, M = operators.K, operators.C, operators.M
-    return dynamic_stiffness(K, C, M, operators.branches, point) if point else K
+def _laws(operators: Operators) -> Laws:
+    """C and branches as combinations of K and M if they are, else as what they are."""
+    K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
+    known = operators.laws
+    return known if known and known.hold(K, C, M, branches) else unrelated(C, branches)
 
 
 def _independent(start_vectors: Floats) -> Floats:
@@ -309,13 +346,19 @@ def _independent(start_vectors: Floats) -> Floats:
 
 
 def _moments(
-    space: KrylovBasis, operators: Operators, point: float, factor: Factor, start_vectors: Floats
+    space: KrylovBasis,
+    operators: Operators,
+    laws: Laws,
+    point: float,
+    factor: Factor,
+    start_vectors: Floats,
 ) -> Iterator[int]:
     """Numbers, from 1, of the moments of start vectors (n, p), by each of which the space has
     been extended.
     """
     branches = with_internal(operators.branches)
     lags = [branch.time / (1 + point * branch.time) for branch in branches]
+    factors = factors_at(branches, point)
     scale = point or EXPANSION_POINT
     # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
     # those of all moments are orthonormalised, so that nothing grows however many there are.
@@ -328,13 +371,22 @@ def _moments(
         earlier, latest = _orthonormalised(earlier, latest)
         y, y_before, *y_relaxed = latest
         stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
-        rest = space.forces(y, 2 * point * y + scale * y_before, stretches)
-        upper = space.extend(-factor.solve(rest))
+        known, of_mass, of_rests = laws.without_stiffness(
+            factors, [y, *stretches], 2 * point * y + scale * y_before
+        )
+        upper = -space.extend(factor.solve(space.forces(of_mass, of_rests)))
+        upper -= _padded(known, len(upper))
         lower, _, *before = (_padded(part, len(upper)) for part in latest)
         relaxed = [
             (1 - point * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
         ]
         latest = np.stack([upper, lower / scale, *relaxed])
+
+
+def _combined(basis: Floats, coordinates: Floats) -> Floats:
+    """Vectors (n, k) of coordinates (size, k), column by column as the basis, which is faster."""
+    found = np.empty((len(basis), coordinates.shape[1]), order="F")
+    return np.matmul(basis, coordinates, out=found)
 
 
 def _norms(block: Floats, product: Floats) -> Floats:
@@ -362,6 +414,13 @@ def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
     return np.hstack([W, X]).reshape(parts, size, -1), X.reshape(parts, size, width)
 
 
+def _products(times: Callable[[Floats], Floats], basis: Floats, vectors: Floats) -> Floats:
+    """Matrix basis^T A vectors (size, k) of a symmetric A, some vectors at a time."""
+    starts = range(0, vectors.shape[1], AT_ONCE)
+    columns = [basis.T @ times(vectors[:, k : k + AT_ONCE]) for k in starts]
+    return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
+
+
 def _bordered(small: Floats, columns: Floats) -> Floats:
     """Symmetric matrix bordered by its last columns (r, k) and rows."""
     r, k = columns.shape
@@ -379,19 +438,17 @@ def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBr
     )
 
 
-def _band_response(
-    space: KrylovBasis, start_vectors: Floats, loads: Floats | None, s: Complex, size: int
-) -> Complex:
-    """Responses (f, k, p) of the probes to the loads (r, k), or their fields (f, size, p), at
-    complex frequencies s (f,) in rad/s, by the first vectors of the basis.
+def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Complex:
+    """Responses (f, k, p) of the probes to the loads that the space has seen beside them, or their
+    fields (f, size, p), at complex frequencies s (f,) in rad/s, by the first vectors of the basis.
     """
     K, C, M, branches = space.model(size)
-    loads = loads if loads is None else loads[:size]
+    start_vectors, loads = np.split(space.seen(size), [probes], axis=1)
     # One by one: all at once would be as large as the body's own factors.
     fields: Iterator[Any] = (
-        np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors[:size]) for at in s
+        np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors) for at in s
     )
-    return np.array([x if loads is None else loads.T @ x for x in fields])
+    return np.array([loads.T @ x if loads.shape[1] else x for x in fields])
 
 
 def _largest_change(before: Complex, now: Complex) -> float:

@@ -34,6 +34,7 @@ from fem.finite_strain import (
     tangent,
 )
 from fem.linear_solver import factorise
+from fem.sheet_reading import SheetReading, modal_slopes
 from fem.static import modes
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
@@ -173,6 +174,47 @@ def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
     return Elastic(
         operators=modal, internal=internal, tangent=stiffness, viscous=viscous, energy=energy
     )
+
+
+def in_plane_matrices(
+    reading: SheetReading,
+    basis: Floats,
+    rows: sparse.csr_array,
+    operators: Operators,
+    *,
+    solver: str = "auto",
+) -> Floats:
+    """In-plane motion that follows bending modes z quasi-statically, as quadratic forms of z.
+
+    A linear output s v of the in-plane displacement v is -g f(z), with g = K^-1 s and the forces
+    f(z) of the stretching e(w, w): -z^T H z / 2, with H of the states of stress that g has.
+
+    Parameters
+    ----------
+    reading : SheetReading, of the sheet with its whole membrane stiffness
+    basis : (3 n, m) float, of bending modes
+    rows : (c, 3 n) sparse, of the in-plane displacement of the middle plane
+    operators : those of the sheet, for its constraints
+    solver : of `linear_solver.factorise`
+
+    Returns
+    -------
+    (c, m, m) float, symmetric Q of the outputs z^T Q z / 2
+    """
+    part = reading.part
+    fixed = np.ones(operators.n_dofs, bool)
+    fixed[operators.free] = False
+    plane = _Plane.of(part, fixed, solver)
+    slopes = modal_slopes(reading, basis).reshape(*part.G.shape[:3], -1)
+    weighted = (slopes * part.volume[..., None, None]).reshape(-1, slopes.shape[3])
+    found = np.empty((rows.shape[0], *(2 * basis.shape[1:])))
+    for k, row in enumerate(rows.toarray()):
+        g = np.zeros(operators.n_dofs)
+        g[plane.moving] = plane.solve(row[plane.moving])
+        slope = (part.D @ g.reshape(-1, 3)[:, :2]).reshape(*part.G.shape[:3], 2)
+        strain = (slope + slope.swapaxes(2, 3)) / 2
+        found[k] = -weighted.T @ (stress(part, strain) @ slopes).reshape(weighted.shape)
+    return found
 
 
 def _states_of_stress(

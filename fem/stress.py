@@ -22,7 +22,7 @@ from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 from fem.assembly import by_region, direct_part, elements_of
-from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
+from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
 from fem.materials import Material, rayleigh_damping
@@ -30,7 +30,7 @@ from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
 from fem.viscoelastic import LOSS_BAND
 from meshes import TetMesh
-from meshes.tetmesh import EDGES, Floats, Ints
+from meshes.tetmesh import Floats, Ints
 from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
@@ -101,34 +101,6 @@ def stress_operator(
     solids = materials_at(mesh, material, points)
     moduli = sparse.block_diag([hooke(solid) for solid in solids], format="csr")
     return moduli @ strain_operator(mesh, material, points)
-
-
-def nodal_strain(points: Floats, tets: Ints, u: Floats) -> Floats:
-    """Strain at all nodes for pictures: the mean of the elements around each, by their volumes. At
-    the surface and between materials it is less accurate than `strain_operator`.
-
-    Parameters
-    ----------
-    points : (n, 3) float, metre
-    tets : (e, a) int
-    u : (n, 3) float, metre
-
-    Returns
-    -------
-    (n, 6) float; components xx, yy, zz, xy, xz, yz
-    """
-    nodes = tets.shape[1]
-    corners = np.eye(4)
-    at = np.vstack([corners, corners[EDGES].mean(axis=1)])[:nodes]
-    derivatives, places = shape_derivatives(at, nodes), points[tets]
-    tangents = np.einsum("qad,eai->eqdi", derivatives, places)
-    along = np.einsum("qad,eaj->eqdj", derivatives, u[tets])
-    slopes = np.linalg.solve(tangents, along)  # (e, q, i, j), of u_j along i
-    strain = np.einsum("cij,eqij->eqc", SYMMETRIC, slopes)
-    volumes = np.repeat(np.abs(np.linalg.det(tangents[:, 0])), nodes)
-    total = [np.bincount(tets.ravel(), volumes * e.ravel(), len(points))
-             for e in np.moveaxis(strain, -1, 0)]  # fmt: skip
-    return np.stack(total, axis=1) / np.bincount(tets.ravel(), volumes, len(points))[:, None]
 
 
 def relaxation(material: Material, s: Any) -> Any:
@@ -224,29 +196,39 @@ def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> spar
         size = np.ptp(mesh.points[mesh.tets[patch, :4]], axis=1).mean(axis=0)
         away = (places[chosen] - point).reshape(-1, 3) / size
         root = np.exp(-LOCAL / 2 * (away**2).sum(axis=1))  # of the weight
-        values.append(_weights(away, root))
+        values.append(fitted_polynomial(away, root)[0][0])
         columns.append((POINTS * chosen[:, None] + np.arange(POINTS)).ravel())
     starts = np.cumsum([0, *map(len, values)])
     shape = (len(points), POINTS * len(used))
     return sparse.csr_array((np.concatenate(values), np.concatenate(columns), starts), shape=shape)
 
 
-def _weights(x: Floats, root: Floats) -> Floats:
-    """Weights (k,) of samples at places x (k, 3) about the point, in elements, in the value at the
-    point of the polynomial that fits them best; `root` (k,) of the weights of the fit.
+def fitted_polynomial(x: Floats, root: Floats) -> tuple[Floats, int]:
+    """Polynomial that fits samples best, of the highest of `DEGREES` that they determine.
+
+    Parameters
+    ----------
+    x : (s, 2 or 3) float, places of the samples about the point, in elements
+    root : (s,) float, roots of their weights in the fit
+
+    Returns
+    -------
+    coefficients (n, s) of the `polynomials`, the first of which is the value at the point, by the
+    values of the samples; and the degree
     """
     for degree in DEGREES:
-        fitted = root[:, None] * _polynomials(x, degree)
+        fitted = root[:, None] * polynomials(x, degree)
         left, sizes, right = np.linalg.svd(fitted, full_matrices=False)
         enough = len(x) >= 2 * len(sizes) and sizes[-1] > INDEPENDENT * sizes[0]
         if enough or degree == DEGREES[-1]:
             break
-    return np.asarray((right[:, 0] / sizes) @ left.T * root)
+    return np.asarray((right.T / sizes) @ left.T * root), degree
 
 
-def _polynomials(x: Floats, degree: int) -> Floats:
-    """Monomials (k, n) up to a degree at places (k, 3)."""
-    powers = (c for d in range(degree + 1) for c in combinations_with_replacement(range(3), d))
+def polynomials(x: Floats, degree: int) -> Floats:
+    """Monomials (s, n) up to a degree at places (s, 2 or 3)."""
+    axes = range(x.shape[1])
+    powers = (c for d in range(degree + 1) for c in combinations_with_replacement(axes, d))
     return np.column_stack([np.prod(x[:, list(power)], axis=1) for power in powers])
 
 

@@ -19,6 +19,13 @@ def property_of(materials: list[Material], name: str) -> Floats:
     return np.array([getattr(m, name) for m in materials], np.float64)
 
 
+def rayleigh_rates(
+    material: Material, share: Callable[[Floats], Floats] | None = None
+) -> tuple[float, float]:
+    """`rayleigh_damping` of a material over the lines that a Tacton makes."""
+    return rayleigh_damping(material.loss_factor, LOSS_BAND, share)
+
+
 def viscoelastic(
     materials: list[Material],
     stiffness: Callable[[Floats], sparse.csr_array],
@@ -39,9 +46,7 @@ def viscoelastic(
     K in N/m, C in N s/m, M in kg, and branches
     """
     rho, mu = (property_of(materials, name) for name in ("density", "shear_modulus"))
-    mass_rate, hysteretic_lag = np.array(
-        [rayleigh_damping(m.loss_factor, LOSS_BAND, share) for m in materials]
-    ).T
+    mass_rate, hysteretic_lag = np.array([rayleigh_rates(m, share) for m in materials]).T
     K, M = stiffness(np.ones(len(materials))), mass(rho)
 
     def portion(share: Floats) -> sparse.csr_array:

@@ -34,6 +34,7 @@ from meshes.tetmesh import (
 from meshes.volume.builtin import builtin
 from meshes.volume.curving import curve_boundary
 from meshes.volume.fingertip_mesh import fingertip_mesh
+from meshes.volume.mapped_palm import mapped_palm
 from meshes.volume.palm_mesh import palm_mesh
 from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
 from meshes.volume.tetrahedralise import graded, tetrahedralise
@@ -62,6 +63,7 @@ __all__ = [
     "half",
     "interface_facets",
     "jacobian_ratios",
+    "mapped_palm",
     "middle_plane",
     "palm_mesh",
     "part",

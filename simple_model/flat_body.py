@@ -108,6 +108,25 @@ def field_lines(
     return merge_lines(lines.frequencies, np.hstack(amplitudes))
 
 
+def sampled_lines(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> tuple[Floats, Complex]:
+    """Lines of `field_lines` that samples at some times can show.
+
+    Parameters
+    ----------
+    field, pressure, probes : as of `field_lines`, with its errors
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m)
+    """
+    f, a = field_lines(field, pressure, probes)
+    below = shown(pressure, f, times)
+    return f[below], a[below]
+
+
 def steady_state(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
@@ -133,12 +152,10 @@ def steady_state(
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
-    f, a = steady_lines(compliance, pressure, probes)
     times = np.array(times)
-    below = shown(pressure, f, times)
-    f, a = f[below], a[below]
-    effort = {"steps": len(f), "dofs": len(f)}
-    return _timed("flat-body-harmonic", started, times, probes, synthesise(f, a, times), **effort)
+    f, a = sampled_lines(normal_field(compliance), pressure, probes, times)
+    found = synthesise(f, a[..., 0], times)
+    return _timed("flat-body-harmonic", started, times, probes, found, steps=len(f), dofs=len(f))
 
 
 def flat_body(

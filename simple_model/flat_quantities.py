@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.compliance import Compliance
-from simple_model.flat_body import field_history, field_lines
+from simple_model.flat_body import field_history, sampled_lines
 from simple_model.flat_motion import motion_field
 from simple_model.layered import clearance, transfer
 from simple_model.layers import Stack
@@ -25,7 +25,6 @@ from simple_model.load_spectrum import synthesise
 from simple_model.material import Complex, Material
 from simple_model.pressure import MovingPressure
 from simple_model.quantities import NORMAL, VECTOR, Quantity
-from simple_model.sampling import shown
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import Field, normal_field
 
@@ -155,7 +154,5 @@ def steady(
     ValueError
         As `steady_lines` does.
     """
-    f, a = field_lines(field, pressure, probes)
-    below = shown(pressure, f, times)
-    lines = a[below].reshape(int(below.sum()), -1)
-    return asked.waveforms(synthesise(f[below], lines, times), a.shape[1])
+    f, a = sampled_lines(field, pressure, probes, times)
+    return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.stress import nodal_strain
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import step
 from skinwave.files import folder_name
-from skinwave.pictures.views import View
+from skinwave.pictures.views import View, field_frames
 from skinwave.plain_text import csv_table
 
-FIELD_FRAMES = 8  # of a period, written for ParaView
+PARAVIEW = [0, 1, 2, 3, 5, 4]  # its order of the components of a tensor
+UNITS = {"displacement_m": "m", "strain": "1", "stress_pa": "Pa"}
 FULL_SCALE = 32767
 IN_NAMES = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # of files
 
@@ -62,39 +62,46 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     return path
 
 
-def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
-    """`column`.pvd and a file of each of `count` frames through a period; the .pvd.
+def write_field(folder: Path, view: View) -> Path:
+    """`column`.pvd and a file of each of `FIELD_FRAMES` frames through a period; the .pvd.
 
-    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) about its mean and, but for sheets,
-    whose mesh has another thickness, its `strain` (n, 6) in ParaView's order of components, XX, YY,
-    ZZ, XY, YZ, XZ; the point kernel a surface with `pressure_pa` about its mean.
+    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) and, but for sheets, whose mesh has
+    another thickness, `strain` and `stress_pa` (n, 6), tension positive, in ParaView's order of
+    components, XX, YY, ZZ, XY, YZ, XZ; nodes between two materials are there for each. The point
+    kernel is a surface with `pressure_pa`. All are about their mean; field data name their units.
     """
-    frames = np.unique(np.arange(count) * len(view.times) // count)
+    frames = field_frames(len(view.times)) if view.tensors is None else view.tensors.frames
     names, stem = [], folder_name(view.column)  # which was read from a file
-    for k, frame in enumerate(frames):
+    for k, frame in enumerate(frames.tolist()):
         ending = "vtu" if len(view.tets) else "vtp"
         names.append(f"{stem}_{k:03d}.{ending}")
-        _grid(view, int(frame)).save(folder / names[-1])
+        _grid(view, frame, k).save(folder / names[-1])
     path = folder / f"{stem}.pvd"
     path.write_text(collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
     return path
 
 
-def _grid(view: View, frame: int) -> Any:
+def _grid(view: View, frame: int, number: int) -> Any:
+    """A frame of a view, which is the `number`-th of those that are written."""
     import pyvista as pv
 
     if not len(view.tets):
         surface = pv.PolyData.from_regular_faces(view.points, view.triangles)
         surface["pressure_pa"] = view.pushed[frame]
         return surface
+    kept = view.tensors
+    nodes, tets = (np.arange(len(view.points)), view.tets) if kept is None else (
+        kept.nodes, kept.tets
+    )  # fmt: skip
     kinds = {4: pv.CellType.TETRA, 10: pv.CellType.QUADRATIC_TETRA}
-    nodes = view.tets.shape[1]
-    cells = np.insert(view.tets, 0, nodes, axis=1).ravel()
-    grid = pv.UnstructuredGrid(cells, np.full(len(view.tets), kinds[nodes]), view.points)
-    grid["displacement_m"] = view.motion[frame]
-    if not view.scene.body.of_kind.is_plate:
-        strain = nodal_strain(view.points, view.tets, view.motion[frame])
-        grid["strain"] = strain[:, [0, 1, 2, 3, 5, 4]].astype(np.float32)
+    cells = np.insert(tets, 0, tets.shape[1], axis=1).ravel()
+    grid = pv.UnstructuredGrid(cells, np.full(len(tets), kinds[tets.shape[1]]), view.points[nodes])
+    grid["displacement_m"] = view.motion[frame][nodes]
+    if kept is not None:
+        grid["strain"] = kept.strain[number][:, PARAVIEW]
+        grid["stress_pa"] = kept.stress[number][:, PARAVIEW]
+    units = {name: UNITS[name] for name in grid.point_data}
+    grid.field_data["units"] = [f"{name}: {unit}" for name, unit in units.items()]
     return grid
 
 

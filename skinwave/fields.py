@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import fem
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.quantities import DISPLACEMENT
 from skinwave.effort import Progress, SkinwaveWarning
-from skinwave.models.reduction import from_rest, oscillating, read_at
+from skinwave.models.reduction import from_rest, oscillating
 from skinwave.pictures import field_plot
-from skinwave.pictures.motion import Waves, check_values, probe_response, waves
+from skinwave.pictures.motion import Waves, check_values, probe_lines, probe_response, waves
 from skinwave.planning.assessment import told
 from skinwave.progress_bar import reported
 from skinwave.scene import Scene
@@ -121,7 +120,8 @@ def field(
         moved = waves(scene, tolerance, report, h=h, solver=solver)
     check_values(len(times), len(moved.mesh.points))
     displacement = (from_rest(moved.motion, times) @ moved.basis.T).reshape(len(times), -1, 3)
-    at_probes = assessed_probes(scene, moved, h, tolerance, solver)
+    surface = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # what is assessed is motion
+    at_probes = assessed_probes(surface, moved, h, tolerance, solver)
     for sentence in at_probes.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return Field(
@@ -143,12 +143,10 @@ def assessed_probes(
 
     Returns
     -------
-    Response, displacement (t, p) in metre
+    Response, (t, p) of the scene's quantity
     """
-    scene = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # what is assessed is motion
     found = probe_response(scene, moved)
     if scene.body.is_held:
-        return told(scene, found, found.displacement, h, tolerance, solver)
-    read = fem.probe_operator(moved.mesh, scene.probe_points) @ moved.basis
-    lines = read_at(oscillating(moved.motion), read).lines
+        return told(scene, found, found.values, h, tolerance, solver)
+    lines = oscillating(probe_lines(scene, moved)).lines
     return told(scene, found, lines, h, tolerance, solver)

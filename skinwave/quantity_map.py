@@ -17,14 +17,14 @@ from simple_model.load_spectrum import synthesise
 from simple_model.quantities import Quantity
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
+from skinwave.models import of_waves
 from skinwave.models.flat_body import field_read
 from skinwave.models.loads import line_factor, probe_rows
 from skinwave.models.reduction import read_at
-from skinwave.pictures.motion import DrivenBody, driven
+from skinwave.pictures.motion import TOLERANCE, DrivenBody, driven
 from skinwave.scene import Reading, Scene
 from skinwave.surface import FAINT, Lines, grid, has_wavenumber_integral
 
-TOLERANCE = 0.02  # relative error of the reduced-order model
 COARSER, ORDER = 1.5, 2  # element size of a second map, and its order: Richardson extrapolation
 # Times at which an invariant is looked at, in steps of s that are no multiple of any period. Its
 # mean over all phases of a load of several frequencies is that of a smooth window over them: Das,
@@ -87,7 +87,7 @@ def quantity_map(
         )
     depth, (x, y) = scene.depths[0], grid(scene, reach, step)
     asked, places = scene.reading.asked, np.stack(np.meshgrid(x, y), axis=-1)
-    if has_wavenumber_integral(scene):
+    if has_wavenumber_integral(scene) and of_waves(scene):
         return QuantityMap(
             x=x, y=y, rms=_flat_rms(scene, depth, places), asked=asked, depth=depth,
             note="wavenumber integral of the laterally infinite body",

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model import MovingPressure, Tacton
-from simple_model.quantities import DISPLACEMENT, Quantity, quantity
+from simple_model.quantities import DISPLACEMENT, STRAIN, Quantity, quantity
 from skinwave.bodies import (
     BODIES,
     FLAT,
@@ -138,12 +138,8 @@ class Scene:
                 f"quantity '{self.quantity}' is that of the point kernel, which needs none; leave "
                 "it out"
             )
-        if body.of_kind.is_plate and not (asked.is_normal and self.reading.is_on_surface):
-            raise ValueError(
-                f"a {body.kind} is modelled by an equivalent one of another thickness, which has "
-                f"the motion normal to its surface alone, not {asked.words} at a depth; take "
-                "displacement, velocity or acceleration at depth_mm = 0"
-            )
+        if body.of_kind.is_plate:
+            _check_sheet(body, self.reading)
         if (deepest := max(self.depths)) >= body.depth and body.of_kind.is_layer:
             raise ValueError(
                 f"depth_mm = {1e3 * deepest:g} of a probe is not within the body, which is "
@@ -195,6 +191,28 @@ class Scene:
         return scene_plot.page(self)
 
 
+def _check_sheet(body: Body, reading: Reading) -> None:
+    """Refuse what a sheet has not."""
+    asked = reading.asked
+    if (deepest := max(reading.depths, default=0.0)) > body.depth:
+        raise ValueError(
+            f"depth_mm = {1e3 * deepest:g} of a probe is not within the {body.kind}, which is "
+            f"{1e3 * body.depth:g} mm thick; give that or less"
+        )
+    if asked.is_normal:
+        return
+    if body.mounting.is_curled or body.placement.is_tilted:
+        raise ValueError(
+            f"{asked.words} is that of a flat {body.kind} across the beam; lay it flat, or ask for "
+            "displacement, velocity or acceleration"
+        )
+    if asked.field == STRAIN and body.solid.orthotropy is not None:
+        raise ValueError(
+            f"{asked.words} of an orthotropic {body.kind} needs its moduli across its thickness, "
+            "which it has not; ask for its displacement, or take an isotropic material"
+        )
+
+
 def check_motion(scene: Scene, command: str) -> None:
     """Refuse a scene for a command that is about the displacement of the surface.
 
@@ -206,7 +224,7 @@ def check_motion(scene: Scene, command: str) -> None:
     if not scene.reading.is_plain:
         raise ValueError(
             f"{command} is about the displacement of the surface, not {scene.reading.words}; leave "
-            "out depth_mm and quantity, or use skinwave run or sweep"
+            "out depth_mm and quantity, or use skinwave run, compare, report, film or sweep"
         )
 
 

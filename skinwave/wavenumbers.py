@@ -4,13 +4,16 @@ A pulse of pressure on a focus at rest moves probes on the x axis. Their transfe
 over the pulse at each frequency, is transformed along x for a picture. As bodies are few
 wavelengths wide, wavenumbers are better read from a fit: a sum of Hankel functions
 sum_j a_j H_0^(2)(k_j r) in least squares beyond the focal spot, begun by the matrix pencil (Y. Hua
-and T. K. Sarkar, IEEE Trans Acoust Speech Signal Process 38:814 (1990)) and refined by variable
-projection.
+and T. K. Sarkar, IEEE Trans Acoust Speech Signal Process 38:814 (1990)), or by the fit at the next
+frequency if that is better, and refined by variable projection. A wave counts as resolved if its
+wavenumber has a small standard error, by the misfit that is left, and if it does not fade along the
+line to where reflections and the errors of elements are as large as it is.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import hankel2
 
@@ -30,6 +33,8 @@ BEYOND = 1.5  # of the main lobe's radius: where a sum of modes is the motion wi
 WAVES = 3  # at most, in a fit
 MISFIT = 0.02  # of the motion, above which a fit says nothing
 LEADS = 0.5  # of the magnitudes of all modes where the fit begins: what the strongest must have
+UNSURE = 0.03  # relative standard error of a wavenumber that is not resolved
+FADED = 3.0  # nepers: to a twentieth along the line
 FAINT = 1e-3  # of the largest singular value: what is no wave of its own
 MOST_PADDED = 1024  # wavenumbers of a spectrum
 
@@ -46,14 +51,23 @@ class LineOfProbes:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedWaves:
     """Wavenumbers (f, n) in 1/m of exp(i (w t - k x)), the strongest where the fit begins
-    first, their motion there (f, n) in m/Pa, and the relative misfit (f,); NaN where there are
-    fewer.
+    first, their motion there (f, n) in m/Pa, the relative standard errors (f, n) of their real
+    parts, and the relative misfit (f,); NaN where there are fewer. The `aperture` in metre is that
+    of the fit.
     """
 
     frequencies: Floats
     wavenumbers: Complex
     amplitudes: Complex
+    errors: Floats
     misfit: Floats
+    aperture: float
+
+    @property
+    def is_resolved(self) -> NDArray[np.bool_]:
+        """Mask (f, n) of waves that the line resolves."""
+        faded = np.abs(self.wavenumbers.imag) * self.aperture > FADED
+        return (self.errors <= UNSURE) & ~faded
 
 
 def pulse_scene(scene: Scene) -> Scene:
@@ -129,32 +143,55 @@ def wavenumber_spectrum(line: LineOfProbes, most: float) -> tuple[Floats, Floats
     return k[kept], shown / shown.max(axis=1, keepdims=True)
 
 
-def ridge(wavenumbers: Floats, magnitudes: Floats) -> Floats:
-    """Wavenumber (f,) in 1/m at which a spectrum is largest at each frequency."""
-    return np.asarray(wavenumbers[magnitudes.argmax(axis=1)])
-
-
 def fitted_waves(line: LineOfProbes, height: float) -> FittedWaves:
     """Hankel functions fitted to the motion beyond the focal spot of a height in metre."""
     edge = BEYOND * lobe_width(height)
     beyond = line.distances >= edge
     r = line.distances[beyond]
+    found = _fits(r, line.transfer[:, beyond])
     shape = (len(line.frequencies), WAVES)
     wavenumbers, amplitudes = np.full((2, *shape), np.nan + 0j)
-    misfit = np.zeros(len(line.frequencies))
-    for n, motion in enumerate(line.transfer[:, beyond]):
-        k, a, misfit[n] = _fitted(r, motion)
-        at_edge = a * hankel2(0, k * edge)
-        order = np.argsort(-np.abs(at_edge))
-        wavenumbers[n, : len(k)], amplitudes[n, : len(k)] = k[order], at_edge[order]
+    errors = np.full(shape, np.nan)
+    for n, fit in enumerate(found):
+        at_edge = fit.coefficients * hankel2(0, fit.wavenumbers * edge)
+        order, own = np.argsort(-np.abs(at_edge)), slice(len(at_edge))
+        wavenumbers[n, own], amplitudes[n, own] = fit.wavenumbers[order], at_edge[order]
+        errors[n, own] = fit.errors[order]
     return FittedWaves(
-        frequencies=line.frequencies, wavenumbers=wavenumbers, amplitudes=amplitudes, misfit=misfit
-    )
+        frequencies=line.frequencies, wavenumbers=wavenumbers, amplitudes=amplitudes,
+        errors=errors, misfit=np.array([fit.misfit for fit in found]), aperture=float(np.ptp(r)),
+    )  # fmt: skip
 
 
-def _fitted(r: Floats, motion: Complex) -> tuple[Complex, Complex, float]:
-    """Wavenumbers and coefficients of Hankel functions, and the relative misfit."""
-    start = _matrix_pencil(motion * np.sqrt(r), r[1] - r[0])
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Fit:
+    """Wavenumbers and coefficients (n,) of Hankel functions at one frequency, the relative standard
+    errors (n,) of their real parts, and the relative misfit.
+    """
+
+    wavenumbers: Complex
+    coefficients: Complex
+    errors: Floats
+    misfit: float
+
+
+def _fits(r: Floats, motions: Complex) -> list[_Fit]:
+    """The fit of the motion (f, r) at each frequency, the best of those that begin by the matrix
+    pencil, and by the fits below and above it.
+    """
+    found = [_fitted(r, motion, _matrix_pencil(motion * np.sqrt(r), r[1] - r[0]))
+             for motion in motions]  # fmt: skip
+    upwards = [(n, n - 1) for n in range(1, len(found))]
+    downwards = [(n - 1, n) for n, _ in reversed(upwards)]
+    for n, other in [*upwards, *downwards]:
+        near = _fitted(r, motions[n], found[other].wavenumbers)
+        if near.misfit < found[n].misfit:
+            found[n] = near
+    return found
+
+
+def _fitted(r: Floats, motion: Complex, start: Complex) -> _Fit:
+    """Hankel functions that fit a motion (r,) best, from the wavenumbers (n,) of a start."""
     weights = np.sqrt(r)
 
     def projected(x: Floats) -> tuple[Complex, Complex]:
@@ -169,9 +206,16 @@ def _fitted(r: Floats, motion: Complex) -> tuple[Complex, Complex, float]:
 
     low = np.tile([-np.inf, 0.0], len(start))
     x0 = np.column_stack([start.real, np.maximum(-start.imag, 1e-3)]).ravel()
-    x = least_squares(residual, x0, bounds=(low, np.inf), x_scale=np.maximum(np.abs(x0), 10.0)).x
-    a, rest = projected(x)
-    return _wavenumbers(x), a, float(np.linalg.norm(rest))
+    scale = np.maximum(np.abs(x0), 10.0)
+    best = least_squares(residual, x0, bounds=(low, np.inf), x_scale=scale)
+    a, rest = projected(best.x)
+    k, misfit = _wavenumbers(best.x), float(np.linalg.norm(rest))
+    freedom = max(1, 2 * len(r) - 4 * len(k))
+    spread = np.diag(np.linalg.pinv(best.jac.T @ best.jac))[::2] * misfit**2 / freedom
+    return _Fit(
+        wavenumbers=k, coefficients=a, misfit=misfit,
+        errors=np.sqrt(spread) / np.maximum(np.abs(k.real), 1e-9),
+    )  # fmt: skip
 
 
 def _wavenumbers(x: Floats) -> Complex:
@@ -194,12 +238,13 @@ def _matrix_pencil(signal: Complex, spacing: float) -> Complex:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Matched:
     """The leading mode at frequencies (g,) in Hz, its wavenumber (g,) in 1/m, and the nearest one
-    (g,) that was fitted.
+    (g,) that was fitted; and at how many frequencies more the line does not resolve it.
     """
 
     frequencies: Floats
     modes: Complex
     fitted: Complex
+    unresolved: int = 0
 
     @property
     def apart(self) -> Floats:
@@ -210,8 +255,9 @@ class Matched:
 def matched_modes(
     curves: DispersionCurves, fitted: FittedWaves, height: float, width: float
 ) -> Matched:
-    """Modes beside fitted waves, at frequencies where a fit leaves less than 2 % of the motion and
-    one propagating mode has more than half of the magnitudes of all.
+    """Modes beside fitted waves, at frequencies where a fit leaves less than 2 % of the motion, one
+    propagating mode has more than half of the magnitudes of all, and the line resolves the wave
+    that is nearest to it.
 
     Parameters
     ----------
@@ -227,13 +273,16 @@ def matched_modes(
     at = BEYOND * lobe_width(height)
     size = np.nan_to_num([np.abs(mode.amplitude(width, at)) for mode in curves.modes])
     share = size / size.sum(axis=0)
-    found = []
+    found, unresolved = [], 0
     for n, f in enumerate(fitted.frequencies):
         best = int(np.argmax(share[:, n]))
         leads = share[best, n] > LEADS and curves.modes[best].is_wave[n]
-        waves = fitted.wavenumbers[n][np.isfinite(fitted.wavenumbers[n])]
+        waves, k = fitted.wavenumbers[n], curves.modes[best].wavenumbers[n]
         if leads and fitted.misfit[n] < MISFIT:
-            k = curves.modes[best].wavenumbers[n]
-            found.append((f, k, waves[np.argmin(np.abs(waves - k))]))
+            nearest = int(np.nanargmin(np.abs(waves - k)))
+            if fitted.is_resolved[n, nearest]:
+                found.append((f, k, waves[nearest]))
+            else:
+                unresolved += 1
     f, k, own = np.array(found, np.complex128).reshape(-1, 3).T
-    return Matched(frequencies=f.real, modes=k, fitted=own)
+    return Matched(frequencies=f.real, modes=k, fitted=own, unresolved=unresolved)

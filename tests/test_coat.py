@@ -16,9 +16,11 @@ from simple_model import Stack
 from simple_model.compliance import layered
 from simple_model.material import PronyTerm
 from simple_model.wavenumber_integral import point_response
-from skinwave.bodies import BODIES, Body, Layer
+from skinwave.bodies import BODIES, Body, Layer, Relief
+from skinwave.bodies.build import build, operators
 from skinwave.bodies.coat import coarsest_size, coat, coat_count, meshed_strata
 from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.models.loads import surface_load
 from skinwave.planning.extent import coat_rows
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
@@ -292,6 +294,10 @@ def test_thin_layers_on_a_palm_are_a_coat_and_leave_its_elements_as_they_are():
     assert row.value == "epidermis of 0.3 mm"
     assert "thinner than half an element of 5 mm" in row.reason
     assert not coat_rows(BODIES["palm"], 5e-3)
+    assert "times as stiff" not in row.reason
+    stiff = Layer(thickness=0.3e-3, material="forearm-epidermis")
+    (row,) = coat_rows(replace(body, layers=(stiff,), material="forearm-dermis"), 5e-3)
+    assert "it is 100 times as stiff as what it covers, and of 100 times the error is" in row.reason
 
 
 def test_as_few_layers_as_need_be_are_a_coat():
@@ -352,3 +358,26 @@ def test_presets_of_layers_are_scenes(name):
     scene = replace(loads(""), body=body)
     assert loads(dumps(scene)).body == body
     assert body.strata[0][1].shear_modulus > body.strata[1][1].shear_modulus
+
+
+@pytest.mark.slow
+def test_a_small_palm_is_meshed_with_its_coat():
+    """On coarse elements: stiff epidermis on the same mesh holds the surface back, at rest."""
+    small = Relief(
+        cup_depth=1e-3, thenar_height=2e-3, hypothenar_height=1e-3, pad_height=0.5e-3,
+        corner_radius=14e-3, edge_radius=4e-3,
+    )  # fmt: skip
+    stiff = Layer(thickness=0.3e-3, material="forearm-epidermis")
+    plain = Body(kind="palm", width=0.04, height=0.045, depth=0.014, relief=small)
+    made = {name: build(replace(plain, layers=layers), 7e-3)
+            for name, layers in (("plain", ()), ("coated", (stiff,)))}  # fmt: skip
+    assert made["plain"].coat is None
+    assert made["coated"].coat.thicknesses == (0.3e-3,)
+    np.testing.assert_array_equal(made["coated"].mesh.points, made["plain"].mesh.points)
+    motion = {}
+    for name, each in made.items():
+        P, points = surface_load(each)
+        force = P @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
+        u = fem.static(operators(each), force)
+        motion[name] = float((fem.probe_operator(each.mesh, [[0.0, 0.0]]) @ u)[0])
+    assert 0.7 < motion["coated"] / motion["plain"] < 0.99

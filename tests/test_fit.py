@@ -10,13 +10,15 @@ from simple_model.flat_body import flat_body, steady_lines
 from simple_model.load_spectrum import synthesise
 from skinwave import cli
 from skinwave.bodies.analytic import compliance
-from skinwave.fits.fit import cautions, fit, shown
+from skinwave.fits.findings import cautions, shown
+from skinwave.fits.fit import fit
 from skinwave.fits.identify import correlations, estimates, whiteness, width
 from skinwave.fits.observed import Data, is_steady
 from skinwave.fits.parameters import Parameter, check, parse
 from skinwave.fits.predicted import predicted_lines, target
+from skinwave.fits.problem import Problem
 from skinwave.fits.profile import profiles
-from skinwave.fits.solve import Problem, solve
+from skinwave.fits.solve import solve
 from skinwave.measurements import Measurement
 from skinwave.measurements.writing import write
 from skinwave.scene_file import loads

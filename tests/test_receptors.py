@@ -89,22 +89,23 @@ def test_what_cannot_be_read_is_refused_in_a_sentence(quantity, depth, sentence)
         scene(quantity, depth)
 
 
-def test_a_sheet_has_the_motion_of_its_surface_alone():
+def test_a_sheet_has_quantities_within_its_thickness():
     words = '[body]\nkind = "sheet"\nmaterial = "paper"\n[probes]\npoints_mm = [[0, 0]]\n'
     assert loads(f'{words}quantity = "acceleration"').reading.asked.unit == "m/s2"
-    for more in ('quantity = "strain_xx"', "depth_mm = 0.02"):
-        with pytest.raises(ValueError, match="has the motion normal to its surface alone"):
-            loads(words + more)
+    assert loads(f'{words}quantity = "strain_xx"\ndepth_mm = 0.02').depths == (2e-5,)
+    with pytest.raises(ValueError, match="is not within the sheet, which is 0.1 mm thick"):
+        loads(words + "depth_mm = 0.2")
 
 
 def test_a_model_without_the_quantity_refuses_it():
     sheet = loads('[tacton]\nduration_s = 0.01\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
                   'sides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n')  # fmt: skip
-    assert named("fem-nonlinear").reads(replace(sheet, quantity="velocity"))
+    assert named("plate-modes").reads(replace(sheet, quantity="velocity"))
+    assert named("fem-nonlinear").reads(replace(sheet, quantity="strain_xx"))
     kernel = compute(scene("strain_zz", "2"), "point-kernel")
     assert (kernel.quantity, kernel.unit) == ("pressure", "Pa")
-    with pytest.raises(ValueError, match="fem-nonlinear has no strain zz at a depth of 2 mm"):
-        check_reading(named("fem-nonlinear"), scene("strain_zz", "2"))
+    with pytest.raises(ValueError, match="plate-modes has no strain zz at a depth of 2 mm"):
+        check_reading(named("plate-modes"), scene("strain_zz", "2"))
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])
@@ -244,8 +245,7 @@ def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):
     page = Path("out/report/index.html").read_text()
     assert "µm/m peak" in page
     assert "dB re threshold" not in page
-    for command in ("compare", "relax", "report"):
-        assert main([command, "below.toml", "--quiet", "--out", "other"]) == 2
+    assert main(["relax", "below.toml", "--quiet", "--out", "other"]) == 2
 
 
 def test_a_displacement_keeps_its_columns_and_old_files_load(tmp_path, monkeypatch):
@@ -282,8 +282,6 @@ def test_the_interactive_tool_has_quantity_and_depth():
     drawn = spectrum_plot(curves, with_threshold=False)
     assert drawn["y2"]["said"] == "strain zz, µm/m"
     assert not any(curve["role"] == "threshold" for curve in drawn["data"])
-    with pytest.raises(ValueError, match="strain zz at a depth of 0.7 mm of a palm is not"):
-        BodyResponses()(scene_of(values | {"body": "palm"}), lambda phase, done: None)
 
 
 def test_strain_in_a_coat_is_refused():

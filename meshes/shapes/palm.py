@@ -128,10 +128,19 @@ def level_set_and_gradient(
     return lambda points: level_set(palm, points), lambda points: gradient(palm, points)
 
 
+def rise(palm: Palm, places: Floats) -> Floats:
+    """Height (...,) in metre by which the cup raises the palm at places (..., 2) in metre."""
+    return np.asarray(places**2 @ _bend(palm))
+
+
+def _bend(palm: Palm) -> Floats:
+    return np.asarray(palm.cup_depth * np.array([2 / palm.breadth, 2 / palm.length]) ** 2)
+
+
 def _field(palm: Palm, points: Floats) -> LevelSet:
-    bend = palm.cup_depth * np.array([2 / palm.breadth, 2 / palm.length]) ** 2
+    bend = _bend(palm)
     flat = points.copy()
-    flat[:, 2] -= points[:, :2] ** 2 @ bend
+    flat[:, 2] -= rise(palm, points[:, :2])
     value, slope = _box_distance(palm, flat)
     for height, centre, half_axes in _mounds(palm):
         value, slope = _join((value, slope), _ellipsoid(flat - centre, half_axes), height)

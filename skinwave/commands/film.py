@@ -1,6 +1,7 @@
 """A period of motion as a film, models side by side."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,10 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
         help="on these bodies, too: paper-sheet, skin-slab or palm, with commas between",
+    )  # fmt: skip
+    parser.add_argument(
+        "--quantity", metavar="NAME",
+        help="that colours the surface, instead of the scene's, such as largest_shear_strain",
     )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     add_mesh(parser)
@@ -61,21 +66,36 @@ def run(options: argparse.Namespace) -> int:
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """Motion to show: of a folder what it keeps, of a scene every model's response."""
-    from skinwave.document import worst_warnings
-    from skinwave.reports.album import answers, open_album, shown_scenes
-    from skinwave.scene_file import read
+    from skinwave.reports.album import open_album
 
     if not options.source.is_dir():
-        scene = read(options.source)
-        found = list(answers(
-            scene, shown_scenes(scene, options.beside), progress, h=metre(options.h),
-            solver=options.solver, frames=options.frames,
-        ))  # fmt: skip
-        warn(worst_warnings((run.body, run.response.effort) for _, run in found))
-        return [view for view, _ in found if view]
+        return _computed(options, progress)
+    if options.quantity is not None:
+        raise ValueError(
+            f"{options.source} keeps the motion alone, not {options.quantity}; give its scene.toml"
+        )
     if views := list(open_album(options.source).views.values()):
         return views
     raise ValueError(
         f"{options.source} keeps no motion of whole bodies; give its scene.toml, or a folder "
         "that skinwave report wrote"
     )
+
+
+def _computed(options: argparse.Namespace, progress: "Progress") -> "list[View]":
+    """Views of a scene, coloured by the quantity that is asked for."""
+    from skinwave.document import worst_warnings
+    from skinwave.reports.album import answers, coloured, shown_scenes
+    from skinwave.scene_file import read
+
+    scene = read(options.source)
+    if options.quantity is not None:
+        scene = replace(scene, quantity=options.quantity)
+    scene = replace(scene, depth=0.0)  # what is seen is the surface
+    found = list(answers(
+        scene, shown_scenes(scene, options.beside), progress, h=metre(options.h),
+        solver=options.solver, frames=options.frames,
+    ))  # fmt: skip
+    views, said = coloured([(view, run.scene) for view, run in found if view])
+    warn([*worst_warnings((run.body, run.response.effort) for _, run in found), *said])
+    return views

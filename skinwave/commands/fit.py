@@ -40,7 +40,8 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave import record
-    from skinwave.fits.fit import cautions, fit, sampled, sentences
+    from skinwave.fits.findings import cautions, sentences
+    from skinwave.fits.fit import fit, sampled
     from skinwave.fits.page import summary, write
     from skinwave.outputs import output_folder
     from skinwave.scene_file import read

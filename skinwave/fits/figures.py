@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
 from skinwave.fits.fit import Fit
-from skinwave.fits.identify import width
 from skinwave.fits.observed import place_names
 from skinwave.fits.profile import Profile
 from skinwave.pictures.figures import REPORT
@@ -145,7 +144,6 @@ def _autocorrelation(ax: Axes, found: Fit) -> None:
 
 def profile_figure(found: Fit, style: Style = REPORT) -> Figure:
     """Profiles of the likelihood, with the parabolas of the covariance."""
-    wanted = width(found.solution) ** 2
     rows = -(-len(found.profiles) // ACROSS)
     across = min(len(found.profiles), ACROSS)
     with mpl.rc_context(style.rc):
@@ -154,14 +152,14 @@ def profile_figure(found: Fit, style: Style = REPORT) -> Figure:
         for ax in axes[len(found.profiles) :]:
             ax.set_visible(False)
         for ax, each in zip(axes, found.profiles, strict=False):
-            _profile(ax, found, each, wanted)
+            _profile(ax, found, each)
         for ax in axes[::ACROSS]:
             ax.set_ylabel("chi squared over its scale,\nabove the least")
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     return figure
 
 
-def _profile(ax: Axes, found: Fit, profile: Profile, wanted: float) -> None:
+def _profile(ax: Axes, found: Fit, profile: Profile) -> None:
     estimate = next(each for each in found.estimates if each.key == profile.key)
     free = next(
         each for each in found.solution.problem.parameters.free if each.key == profile.key
@@ -171,11 +169,11 @@ def _profile(ax: Axes, found: Fit, profile: Profile, wanted: float) -> None:
     away = np.linspace(-1.3, 1.3, 41) * half
     inside = (middle + away >= 0) & (middle + away <= 1)
     x = [free.value(float(u)) for u in middle + away[inside]]
-    ax.plot(x, wanted * (away[inside] / half) ** 2, color=MEASURED, lw=1, ls=":",
+    ax.plot(x, profile.level * (away[inside] / half) ** 2, color=MEASURED, lw=1, ls=":",
             label="by the covariance")  # fmt: skip
-    near = profile.excess <= 2 * wanted
+    near = profile.excess <= 2 * profile.level
     ax.plot(profile.values[near], profile.excess[near], "o", color=FITTED, ms=5, label="profile")
-    ax.axhline(wanted, color=LEFT, lw=0.8, ls="--", label="95 %")
+    ax.axhline(profile.level, color=LEFT, lw=0.8, ls="--", label="95 %")
     ax.ticklabel_format(useOffset=False)
     ax.xaxis.set_major_locator(mpl.ticker.MaxNLocator(3))
     ax.set_xlabel(profile.key)

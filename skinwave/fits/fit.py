@@ -13,25 +13,24 @@ from skinwave.fits.identify import (
     Direction,
     Estimate,
     Whiteness,
-    combined,
     correlations,
     estimates,
     unresolved,
     whiteness,
+    widenings,
 )
 from skinwave.fits.observed import KINDS, data_of
 from skinwave.fits.parameters import check, of_scene, parse
 from skinwave.fits.posterior import Posterior, posterior
 from skinwave.fits.predicted import Target, target, with_reduction
+from skinwave.fits.problem import Problem
 from skinwave.fits.profile import Profile, profiles
-from skinwave.fits.solve import Problem, Solution, solve
+from skinwave.fits.solve import Solution, solve
 from skinwave.measurements import Measurement
-from skinwave.numbers import significant
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import varied
 
 STARTS = 8
-MISFIT = 1.5  # chi squared over its degrees of freedom, of known errors, from which a model misfits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,6 +47,7 @@ class Fit:
     unresolved : directions that the data do not resolve
     profiles : of the parameters that are resolved
     whiteness : Whiteness of the residuals
+    widenings : (k,) float, factors of the intervals for residuals that are not white
     posterior : Posterior, if it was sampled
     """
 
@@ -59,6 +59,7 @@ class Fit:
     unresolved: tuple[Direction, ...]
     profiles: tuple[Profile, ...]
     whiteness: Whiteness
+    widenings: Floats
     posterior: Posterior | None = None
 
     @property
@@ -150,6 +151,7 @@ def assessed(
         measured=measured, target=aim, solution=solution, estimates=estimates(solution),
         correlations=correlations(solution), unresolved=unresolved(solution),
         profiles=profiles(solution, progress), whiteness=whiteness(solution.residual),
+        widenings=widenings(solution),
     )  # fmt: skip
 
 
@@ -175,114 +177,3 @@ def _model(scene: Scene, model: str) -> str:
         return model
     flat = has_exact_waves(scene.body) or scene.body.of_kind.is_plate
     return "flat-body" if flat else "fem"
-
-
-def sentences(found: Fit) -> list[str]:
-    """Sentences on what was fitted, and how well."""
-    solution, data = found.solution, found.solution.problem.data
-    n = len(solution.starts)
-    ratio = solution.cost / solution.dof
-    expected = ", of errors that are known" if data.is_known else ""
-    return [
-        f"{found.target.model} was fitted to {data.words}.",
-        f"{solution.reached} of {n} start{'s' * (n > 1)} reached the solution, "
-        f"which leaves {significant(100 * found.misfit, 2)} % of the measured motion"
-        + (f"; chi squared over its degrees of freedom is {significant(ratio)}{expected}."
-           if expected else "."),
-        *(_resolved(each) for each in found.estimates if each.is_resolved and not each.at_limit),
-    ]  # fmt: skip
-
-
-def _resolved(each: Estimate) -> str:
-    value, low, high = shown(each.value, each.low, each.high)
-    return f"{each.key} = {value}, 95 % interval {low} to {high}."
-
-
-def shown(value: float, low: float, high: float) -> tuple[str, str, str]:
-    """A value and its interval, to two digits of the interval's width."""
-    width = max(high - low, 1e-12 * abs(value), 1e-300)
-    largest = max(abs(value), abs(low), abs(high))
-    digits = min(max(3, int(np.ceil(np.log10(largest / width))) + 2), 12) if largest else 3
-    return significant(value, digits), significant(low, digits), significant(high, digits)
-
-
-def cautions(found: Fit) -> list[str]:
-    """Sentences, without a full stop, on what is not to be trusted."""
-    solution = found.solution
-    said = [
-        "the fit did not converge: its steps ended before chi squared was least; give more starts "
-        "or closer limits"
-    ] * (not solution.converged)
-    said += [_at_limit(found, each) for each in found.estimates if each.at_limit]
-    said += [_unresolved(found, each) for each in found.unresolved]
-    said += _beyond_errors(found) + _coloured(found) + _elsewhere(found)
-    named = {key for each in found.unresolved for key in each.keys}
-    said += [
-        f"the data do not determine {each.key} between its limits; measure more, or leave it out"
-        for each in found.estimates if not each.is_resolved and each.key not in named
-    ]  # fmt: skip
-    said += [
-        f"the interval of {each.key} by its profile ends at a limit; widen the limits if they are "
-        "not known" for each in found.profiles if each.is_open
-    ]  # fmt: skip
-    return said
-
-
-def _at_limit(found: Fit, each: Estimate) -> str:
-    free = found.solution.problem.parameters.free
-    limits = next((one.low, one.high) for one in free if one.key == each.key)
-    return (
-        f"{each.key} = {significant(each.value, 4)} is at a limit of its range, {limits[0]:g} to "
-        f"{limits[1]:g}, and the intervals are of no use; widen it, or check the scene"
-    )
-
-
-def _unresolved(found: Fit, direction: Direction) -> str:
-    """Sentence on keys of which the data determine a combination, or nothing."""
-    keys = direction.keys
-    if len(keys) == 1:
-        return f"the data do not determine {keys[0]} between its limits; fix it, or measure more"
-    together = f"{', '.join(keys[:-1])} and {keys[-1]}"
-    said = f"the data do not resolve {together} from each other"
-    if np.isfinite(direction.exponent):
-        value, low, high = combined(found.solution, direction)
-        power = round(direction.exponent, 2)
-        product = (
-            f"{keys[0]} times {keys[1]}" if power == 1
-            else f"{keys[0]} over {keys[1]}" if power == -1
-            else f"{keys[0]} times {keys[1]} to the power of {power:g}"
-        )  # fmt: skip
-        middle, least, most = shown(value, low, high)
-        said += f"; only {product} is determined, {middle} (95 % interval {least} to {most})"
-    return f"{said}; fix {'one' if len(keys) == 2 else 'some'} of them"
-
-
-def _beyond_errors(found: Fit) -> list[str]:
-    solution = found.solution
-    if not solution.problem.data.is_known or solution.scale < MISFIT:
-        return []
-    return [
-        f"chi squared is {significant(solution.scale)} times its degrees of freedom: the model "
-        "leaves more than the errors of the measurement explain, and the intervals, widened by "
-        f"{significant(np.sqrt(solution.scale), 2)}, have no sure meaning"
-    ]
-
-
-def _coloured(found: Fit) -> list[str]:
-    if found.whiteness.is_white or np.isnan(found.whiteness.p):
-        return []
-    return [
-        f"the residuals are not white (Ljung-Box, p = {found.whiteness.p:.1g}): what is left has "
-        "structure, and the intervals, which are for independent errors, are likely too narrow"
-    ]
-
-
-def _elsewhere(found: Fit) -> list[str]:
-    """Sentence on starts that did not reach the solution."""
-    missed = len(found.solution.starts) - found.solution.reached
-    if missed <= len(found.solution.starts) / 2:
-        return []
-    return [
-        f"{missed} of {len(found.solution.starts)} starts ended elsewhere, with a larger misfit; "
-        "there may be a better solution yet, give more --starts"
-    ]

@@ -4,7 +4,8 @@ At the solution the residual r changes by its slopes J over the unit cube. With 
 variances and J / s = U diag(S) V^T, a move by d along a column of V changes the residual by S d of
 its standard errors. Where the 95 % interval of such a direction is wider than the limits, the data
 do not resolve it, and of a parameter no interval is given whose own is as wide (Transtrum, Machta
-and Sethna, Phys Rev E 83:036701 (2011), of such sloppy directions).
+and Sethna, Phys Rev E 83:036701 (2011), of such sloppy directions). Where residuals are not white,
+intervals are widened as `coloured` says.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.stats import chi2, t
 
 from meshes.tetmesh import Floats
+from skinwave.fits.coloured import widening
 from skinwave.fits.parameters import Parameter
 from skinwave.fits.solve import AT_LIMIT, Solution
 
@@ -70,7 +72,7 @@ class Whiteness:
 
 def covariance(solution: Solution) -> Floats:
     """Covariance (k, k) over the unit cube; huge along directions that are not resolved."""
-    singular, v = _singular(solution)
+    _, singular, v = _singular(solution)
     return (v / singular**2) @ v.T
 
 
@@ -79,10 +81,30 @@ def width(solution: Solution) -> float:
     return float(t.ppf((1 + LEVEL) / 2, solution.dof))
 
 
+def half_widths(solution: Solution) -> Floats:
+    """Halves (k,) of the 95 % intervals over the unit cube, widened if residuals are not white."""
+    error = np.sqrt(np.diag(covariance(solution)))
+    return np.asarray(width(solution) * widenings(solution) * error)
+
+
+def widenings(solution: Solution) -> Floats:
+    """Factors (k,) of the intervals for residuals that are not white; 1 if they are."""
+    left, singular, v = _singular(solution)
+    return _widened(solution, (v / singular) @ left.T)
+
+
+def _widened(solution: Solution, rows: Floats) -> Floats:
+    """Factors (k,) of the intervals of combinations (k, n s) of the errors."""
+    test = whiteness(solution.residual)
+    if test.is_white or np.isnan(test.p):
+        return np.ones(len(rows))
+    return widening(solution.residual, rows.reshape(-1, *solution.residual.shape))
+
+
 def estimates(solution: Solution) -> tuple[Estimate, ...]:
     """Estimates with intervals by the covariance, those by logarithms symmetric in these."""
     parameters = solution.problem.parameters.free
-    half = width(solution) * np.sqrt(np.diag(covariance(solution)))
+    half = half_widths(solution)
     return tuple(
         _estimate(each, float(u), float(h))
         for each, u, h in zip(parameters, solution.u, half, strict=True)
@@ -102,7 +124,7 @@ def correlations(solution: Solution) -> Floats:
     """Correlations (k, k) of the estimates; nan with those that are not resolved."""
     found = covariance(solution)
     error = np.sqrt(np.diag(found))
-    unresolved = width(solution) * error >= 0.5
+    unresolved = half_widths(solution) >= 0.5
     table = found / np.outer(error, error)
     table[unresolved] = np.nan
     table[:, unresolved] = np.nan
@@ -111,9 +133,14 @@ def correlations(solution: Solution) -> Floats:
 
 def unresolved(solution: Solution) -> tuple[Direction, ...]:
     """Directions that the data do not resolve, the least resolved first."""
-    singular, v = _singular(solution)
-    weak = singular < 2 * width(solution)
-    return tuple(_direction(solution, part) for part in v.T[weak][::-1])
+    _, _, v = _singular(solution)
+    return tuple(_direction(solution, part) for part in v.T[~_resolved(solution)][::-1])
+
+
+def _resolved(solution: Solution) -> np.ndarray:
+    """Mask (k,) of the directions of the singular vectors that the data resolve."""
+    left, singular, _ = _singular(solution)
+    return np.asarray(singular >= 2 * width(solution) * _widened(solution, left.T))
 
 
 def _direction(solution: Solution, parts: Floats) -> Direction:
@@ -143,22 +170,25 @@ def combined(solution: Solution, direction: Direction) -> tuple[float, float, fl
     powers = np.zeros(len(solution.u))
     powers[at] = [1.0, direction.exponent]
     spans = np.array([each.span for each in parameters.free])
-    singular, v = _singular(solution)
-    resolved = singular >= 2 * width(solution)
+    left, singular, v = _singular(solution)
+    resolved = _resolved(solution)
     parts = ((powers * spans) @ v[:, resolved]) / singular[resolved]
-    half = width(solution) * float(np.linalg.norm(parts))
+    (factor,) = _widened(solution, (parts @ left[:, resolved].T)[None])
+    half = width(solution) * float(factor * np.linalg.norm(parts))
     values = parameters.values(solution.u)
     first, second = (values[key] for key in direction.keys)
     middle = first * second**direction.exponent
     return middle, middle * np.exp(-half), middle * np.exp(half)
 
 
-def _singular(solution: Solution) -> tuple[Floats, Floats]:
-    """Singular values (k,) of slopes over standard errors, none below round-off, and V (k, k)."""
+def _singular(solution: Solution) -> tuple[Floats, Floats, Floats]:
+    """U (n s, k), singular values (k,), none below round-off, and V (k, k) of slopes over standard
+    errors.
+    """
     scale = max(solution.scale, 1e-300)
-    _, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
+    left, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
     least = ROUND_OFF * max(float(singular.max()), 1e-300)
-    return np.maximum(singular, least), vt.T
+    return left, np.maximum(singular, least), vt.T
 
 
 def whiteness(residual: Floats) -> Whiteness:

@@ -16,9 +16,11 @@ from skinwave.fits.figures import (
     profile_figure,
     residual_figure,
 )
-from skinwave.fits.fit import Fit, cautions, sentences, shown
+from skinwave.fits.findings import cautions, probability, sentences, shown
+from skinwave.fits.fit import Fit
 from skinwave.fits.identify import Estimate
-from skinwave.fits.solve import Start
+from skinwave.fits.measured_lines import LeftOut
+from skinwave.fits.starts import Start
 from skinwave.numbers import significant
 from skinwave.pictures.figures import png
 from skinwave.plain_text import csv_table
@@ -29,9 +31,10 @@ COLUMNS = (
     "posterior_high", "resolved", "at_limit", "limit_low", "limit_high",
 )  # fmt: skip
 WORST = 20  # starts in the table
+MOST_LEFT_OUT = 20  # lines in the table
 EXPLAINED = (
     "An interval holds the true value in 95 of 100 measurements, if the model is the true one and "
-    "errors are independent: by the covariance at the solution, and by the profile of the "
+    "what it leaves is noise: by the covariance at the solution, and by the profile of the "
     "likelihood, which need not be symmetric. Where the two differ take the latter."
 )
 FITTED = {
@@ -69,6 +72,10 @@ def write(folder: Path, found: Fit) -> None:
             picture("residuals", residual_figure(found), RESIDUALS),
         ),
     ]  # fmt: skip
+    if data.left_out:
+        parts.append(document.section(
+            "Lines that are not fitted", document.table(*left_out_table(found))
+        ))  # fmt: skip
     if found.profiles:
         parts.append(document.section(
             "Profiles of the likelihood",
@@ -115,11 +122,37 @@ def whiteness_sentence(found: Fit) -> str:
     test = found.whiteness
     if not isfinite(test.p):
         return "There are too few data along an axis for a test of whiteness."
-    said = "nothing speaks against white residuals" if test.is_white else "they are not white"
+    said = "nothing speaks against white residuals." if test.is_white else (
+        "they are not white. Intervals are those of a sandwich covariance, with the residuals' "
+        "autocovariances in place of independent errors (Newey and West 1987; of profiles Kent "
+        "1982), as far as it widens them: " + ", ".join(
+            f"{each.key} by {significant(factor, 3)}"
+            for each, factor in zip(found.estimates, found.widenings, strict=True)
+            if each.is_resolved
+        ) + "."
+    )  # fmt: skip
     return (
-        f"By the test of Ljung and Box over {len(test.correlations)} lags, p = "
-        f"{significant(test.p, 2)}: {said}."
+        f"By the test of Ljung and Box over {len(test.correlations)} lags, p "
+        f"{probability(test.p)}: {said}"
     )
+
+
+def left_out_table(found: Fit) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the lines of the load that are not fitted, the strongest first."""
+    left_out = found.solution.problem.data.left_out
+    rows = [
+        [line.name, f"{line.frequency:.1f}", _share(line), line.why]
+        for line in left_out[:MOST_LEFT_OUT]
+    ]  # fmt: skip
+    if len(left_out) > MOST_LEFT_OUT:
+        rows.append([f"{len(left_out) - MOST_LEFT_OUT} more", "", "", ""])
+    return ["line", "frequency, Hz", "of the measured power, %", "why"], rows
+
+
+def _share(line: LeftOut) -> str:
+    if not isfinite(line.share):
+        return "not resolved"
+    return significant(100 * line.share, 2) if line.share else "no more than noise"
 
 
 def estimate_table(found: Fit) -> tuple[list[str], list[list[str]]]:
@@ -193,9 +226,23 @@ def summary(found: Fit) -> dict[str, Any]:
         "degrees_of_freedom": solution.dof,
         "misfit": found.misfit,
         "whiteness_p": found.whiteness.p if isfinite(found.whiteness.p) else None,
+        "widened": dict(
+            zip(solution.problem.parameters.keys, found.widenings.tolist(), strict=True)
+        ),
+        "left_out": [
+            {
+                "line": line.name,
+                "frequency_hz": line.frequency,
+                "why": line.why,
+                "share": line.share if isfinite(line.share) else None,
+            }
+            for line in solution.problem.data.left_out
+        ],
+        "may_be_turned": solution.may_be_turned,
         "starts": len(solution.starts),
         "starts_that_reached_it": solution.reached,
         "predictions": solution.runs,
+        "factorisations": found.target.reduced and found.target.reduced.effort.factorisations,
         "sentences": sentences(found),
         "warnings": cautions(found),
     }

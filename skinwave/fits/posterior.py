@@ -1,7 +1,8 @@
 """Samples of the posterior of a fit, uniform between the limits, by emcee's walkers.
 
 An affine-invariant ensemble (Foreman-Mackey et al., Publ Astron Soc Pac 125:306 (2013)); of the
-likelihood of independent normal errors with the scale that the fit found.
+likelihood of independent normal errors with the scale that the fit found, of errors that are not
+independent flattened by the largest factor of the variances.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from skinwave.effort import Progress
-from skinwave.fits.identify import LEVEL, covariance
+from skinwave.fits.identify import LEVEL, covariance, widenings
 from skinwave.fits.solve import Solution
 
 WALKERS = 4  # a parameter
@@ -61,11 +62,12 @@ def posterior(solution: Solution, steps: int, seed: int, progress: Progress) -> 
     if steps < 10:
         raise ValueError(f"{steps} steps of each walker are too few; give at least 10")
     problem, k = solution.problem, len(solution.u)
+    scale = solution.scale * float(widenings(solution).max()) ** 2
 
     def log_posterior(u: Floats) -> float:
         if not ((u >= 0) & (u <= 1)).all():
             return -np.inf
-        return -0.5 * float((problem.residual(u) ** 2).sum()) / solution.scale
+        return -0.5 * float((problem.residual(u) ** 2).sum()) / scale
 
     sampler = emcee.EnsembleSampler(WALKERS * k + 2, k, log_posterior)
     rng = np.random.RandomState(seed)  # the generator that emcee takes

@@ -1,8 +1,10 @@
 """Profile likelihood: the least chi squared at each value of a parameter, over all the others.
 
 Its 95 % interval is where it exceeds the least by the square of Student's t (Venzon and Moolgavkar,
-Appl Stat 37:87 (1988)); unlike that by the covariance it need not be symmetric. The other
-parameters follow by Gauss-Newton steps with the slopes at the solution, a run of the model each.
+Appl Stat 37:87 (1988)); unlike that by the covariance it need not be symmetric. Where residuals are
+not white that level is as much higher as the variance of a sandwich covariance is (Kent, Biometrika
+69:19 (1982)). The other parameters follow by Gauss-Newton steps with the slopes at the solution, a
+run of the model each.
 """
 
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from skinwave.effort import Progress
-from skinwave.fits.identify import covariance, width
+from skinwave.fits.identify import half_widths, widenings, width
 from skinwave.fits.solve import CLOSE, Solution
 
 STEPS = 3  # of the other parameters at each value
@@ -28,13 +30,15 @@ class Profile:
     key : str
     values, excess : (n,) float, values of the parameter, ascending, and twice the log of the
         likelihood ratio there
-    low, high : ends of the 95 % interval, a limit of the range where it is not reached
+    level : float, the excess at the ends of its 95 % interval
+    low, high : these ends, a limit of the range where one is not reached
     is_open : bool, whether one of these is such a limit
     """
 
     key: str
     values: Floats
     excess: Floats
+    level: float
     low: float
     high: float
     is_open: bool
@@ -42,33 +46,33 @@ class Profile:
 
 def profiles(solution: Solution, progress: Progress) -> tuple[Profile, ...]:
     """Profiles of all parameters that are resolved."""
-    half = width(solution) * np.sqrt(np.diag(covariance(solution)))
+    half, levels = half_widths(solution), (width(solution) * widenings(solution)) ** 2
     resolved = np.flatnonzero(half < 0.5)
     found = []
     for n, k in enumerate(resolved.tolist()):
         progress("profile likelihood", n / len(resolved))
-        found.append(_profile(solution, k, float(half[k])))
+        found.append(_profile(solution, k, float(half[k]), float(levels[k])))
     return tuple(found)
 
 
-def _profile(solution: Solution, k: int, half: float) -> Profile:
+def _profile(solution: Solution, k: int, half: float, level: float) -> Profile:
     parameter = solution.problem.parameters.free[k]
-    sides = [_side(solution, k, sign * half) for sign in (-1, 1)]
+    sides = [_side(solution, k, sign * half, level) for sign in (-1, 1)]
     points = sorted([(float(solution.u[k]), 0.0), *sides[0], *sides[1]])
     u, excess = (np.array(column) for column in zip(*points, strict=True))
     ends = [side[-1] for side in sides]
     return Profile(
         key=parameter.key, values=np.array([parameter.value(x) for x in u]), excess=excess,
-        low=parameter.value(ends[0][0]), high=parameter.value(ends[1][0]),
-        is_open=any(x in (0.0, 1.0) and found < 0.9 * width(solution) ** 2 for x, found in ends),
+        level=level, low=parameter.value(ends[0][0]), high=parameter.value(ends[1][0]),
+        is_open=any(x in (0.0, 1.0) and found < 0.9 * level for x, found in ends),
     )  # fmt: skip
 
 
-def _side(solution: Solution, k: int, half: float) -> list[tuple[float, float]]:
+def _side(solution: Solution, k: int, half: float, level: float) -> list[tuple[float, float]]:
     """Points and excesses towards an end of the interval, which is the last one: the root of the
     excess is nearly in proportion to the distance.
     """
-    least, wanted = float(solution.u[k]), width(solution)
+    least, wanted = float(solution.u[k]), np.sqrt(level)
     found, at = [], least + half
     for _ in range(ATTEMPTS):
         at = float(np.clip(at, 0.0, 1.0))

@@ -1,80 +1,29 @@
 """Weighted least squares within limits, from several starts.
 
-At each start the parameters that cost no run of the model are placed first: the delay by a scan of
-its range, the gain or the peak pressure as linear least squares at each delay (variable projection;
-Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)). From there a trust-region method takes over.
+Each searches as `starts` says, on data that cost less if there are any; the best one goes on with
+the data themselves. The measurement with its sign turned is searched, too, from one start.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from meshes.tetmesh import Floats
 from skinwave.effort import Progress
 from skinwave.fits.observed import Data
-from skinwave.fits.parameters import DELAY, Parameters
+from skinwave.fits.parameters import DELAY
+from skinwave.fits.problem import Problem
+from skinwave.fits.starts import CANDIDATES, Start, best_placed, refine, search
+from skinwave.measurements.alignment import AS_GOOD
 
-FORWARD, CENTRAL = 1e-5, 1e-3  # steps of differences, of the unit interval
-MOST_EVALUATIONS = 40  # steps of one start
-TOLERANCE = 1e-8
-CANDIDATES = 8  # points of the hypercube, of which the best one is a start
-DELAYS = 4  # of a scan, to a period of the highest frequency
-MOST_DELAYS = 400
+ROUND_OFF = 1e-8  # of chi squared
 POLISHED = 6  # steps, which get closer by a digit each
 CLOSE = 0.01  # of a standard error: a step that no longer matters
 AT_LIMIT = 1e-3  # of the unit interval
+CLOSE_FIT = 0.1  # of the power of the data: a fit that leaves less is close
 SAME_COST = 1.0  # of twice the log-likelihood: starts as near to the best reached it
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Problem:
-    """Problem of a fit: parameters, data, and the keys that the model is in proportion to."""
-
-    parameters: Parameters
-    data: Data
-    linear: tuple[str, ...]
-
-    def residual(self, u: Floats) -> Floats:
-        """Weighted residual (n s,) at a point u (k,) of the unit cube."""
-        return self._weighted(self.predicted(u) - self.data.values)
-
-    def predicted(self, u: Floats) -> Floats:
-        """Prediction (n, s)."""
-        return self.data.predict(self.parameters.values(u))
-
-    def slopes(self, u: Floats, step: float = CENTRAL) -> Floats:
-        """Derivatives (n s, k) of the residual, by central differences within the limits."""
-        columns = []
-        for k in range(len(u)):
-            ends = np.clip([u[k] - step, u[k] + step], 0, 1)
-            low, high = (np.where(np.arange(len(u)) == k, end, u) for end in ends)
-            columns.append((self.residual(high) - self.residual(low)) / (ends[1] - ends[0]))
-        return np.array(columns).T
-
-    def forward(self, u: Floats) -> Floats:
-        """Derivatives (n s, k) of the residual, by differences towards the middle."""
-        at = self.residual(u)
-        steps = np.where(u < 0.5, FORWARD, -FORWARD)
-        each = (self.residual(u + moved) for moved in np.diag(steps))
-        return np.array([(moved - at) / step for moved, step in zip(each, steps, strict=True)]).T
-
-    def _weighted(self, difference: Floats) -> Floats:
-        return np.asarray((difference / self.data.error).ravel())
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Start:
-    """Start of a search: where it `begun` and `ended` (k,), chi squared there, and whether it
-    converged.
-    """
-
-    begun: Floats
-    ended: Floats
-    cost: float
-    converged: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,8 +37,10 @@ class Solution:
     residual : (n, s) float, weighted
     slopes : (n s, k) float, derivatives of the residual
     starts : of the search, the best first
+    turned : of the measurement with its sign turned, if that makes a difference and no linear
+        factor may be negative
     converged : bool
-    runs : int, predictions that were asked for
+    runs : int, of the model: predictions that differ by more than a delay or a linear factor
     """
 
     problem: Problem
@@ -97,6 +48,7 @@ class Solution:
     residual: Floats
     slopes: Floats
     starts: tuple[Start, ...]
+    turned: Start | None
     converged: bool
     runs: int
 
@@ -132,6 +84,20 @@ class Solution:
         best = self.starts[0].cost
         return sum(start.cost - best <= SAME_COST * self.scale for start in self.starts)
 
+    @property
+    def may_be_turned(self) -> bool:
+        """Whether the measurement with its sign turned fits as well, at a lesser delay or better;
+        or a linear factor is negative.
+        """
+        parameters, best = self.problem.parameters, self.starts[0]
+        values, other = (parameters.values(u) for u in (self.u, (self.turned or best).ended))
+        if self.turned is None:
+            return any(values.get(key, 1.0) < 0 for key in self.problem.linear)
+        scale = best.cost / max(self.problem.rough.data.values.size - len(self.u), 1)
+        more = self.turned.cost - best.cost
+        nearer = abs(other.get(DELAY, 0.0)) < abs(values.get(DELAY, 0.0))
+        return more < AS_GOOD * scale and (nearer or more < 0)
+
 
 def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
     """Best of several starts, which a Latin hypercube spreads between the limits.
@@ -162,60 +128,21 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
             f"{problem.data.values.size} values cannot determine {k} parameters; measure more, or "
             "vary fewer keys"
         )
-    problem, calls = _counted(problem)
-    rough = replace(problem, data=problem.data.rough) if problem.data.rough else problem
-    found = []
-    points = qmc.LatinHypercube(k, rng=seed).random(starts * CANDIDATES)
-    for n, candidates in enumerate(np.split(points, starts)):
-        progress("search from several starts", n / starts)
-        found.append(search(rough, candidates))
-    found.sort(key=lambda start: start.cost)
+    problem, seen = _counted(problem)
+    rough, hypercube = problem.rough, qmc.LatinHypercube(k, rng=seed)
+    points = [hypercube.random(CANDIDATES) for _ in range(starts)]
+    found = sorted(search(rough, points, progress), key=lambda start: start.cost)
+    turned = _turned(rough, found[0], points[0], progress)
     best = found[0]
-    if rough is not problem:
-        progress("fit to all data", 0.0)
-        best = polished(problem, best.ended)
+    progress("fit to all data", 0.0)
+    best = polished(problem, best.ended)
     progress("derivatives", 0.0)
     return Solution(
         problem=problem, u=best.ended,
         residual=problem.residual(best.ended).reshape(problem.data.values.shape),
-        slopes=problem.slopes(best.ended), starts=tuple(found), converged=best.converged,
-        runs=len(calls),
+        slopes=problem.slopes(best.ended), starts=tuple(found), turned=turned,
+        converged=best.converged, runs=len(seen),
     )  # fmt: skip
-
-
-def _counted(problem: Problem) -> tuple[Problem, list[None]]:
-    """The problem, and a list that grows with each prediction."""
-    calls: list[None] = []
-
-    def counting(data: Data) -> Data:
-        predict: Callable[..., Floats] = data.predict
-
-        def counted(values: Mapping[str, float]) -> Floats:
-            calls.append(None)
-            return predict(values)
-
-        rough = counting(data.rough) if data.rough else None
-        return replace(data, predict=counted, rough=rough)
-
-    return replace(problem, data=counting(problem.data)), calls
-
-
-def search(problem: Problem, candidates: Floats) -> Start:
-    """Local solution from the best of candidates (c, k), of each the parameters that cost no run
-    placed first.
-    """
-    trials = [placed(problem, u) for u in candidates]
-    return refine(problem, min(trials, key=lambda trial: trial[0])[1])
-
-
-def refine(problem: Problem, u: Floats) -> Start:
-    """Local solution from a point of the unit cube."""
-    inside = np.clip(u, 1e-6, 1 - 1e-6)
-    found = least_squares(
-        problem.residual, inside, problem.forward, bounds=(0, 1), x_scale="jac", xtol=TOLERANCE,
-        ftol=TOLERANCE, gtol=TOLERANCE, max_nfev=MOST_EVALUATIONS,
-    )  # fmt: skip
-    return Start(begun=u, ended=found.x, cost=2 * float(found.cost), converged=found.status > 0)
 
 
 def polished(problem: Problem, u: Floats) -> Start:
@@ -227,48 +154,44 @@ def polished(problem: Problem, u: Floats) -> Start:
     ended, cost = u, np.inf
     for _ in range(POLISHED):
         residual = problem.residual(ended)
-        if not (residual**2).sum() <= cost * (1 + TOLERANCE):
+        if not (residual**2).sum() <= cost * (1 + ROUND_OFF):
             break
         cost = float((residual**2).sum())
         move = inverse @ residual
         if np.linalg.norm(slopes @ move) <= CLOSE * np.sqrt(cost / residual.size):
             return Start(begun=u, ended=ended, cost=cost, converged=True)
         ended = np.clip(ended - move, 0, 1)
-    return refine(problem, u)
+    return refine(problem, u, tolerance=ROUND_OFF)
 
 
-def placed(problem: Problem, u: Floats) -> tuple[float, Floats]:
-    """Chi squared and the point with the best delay and linear factor, all others as they are."""
-    keys = problem.parameters.keys
-    trials = [u]
-    if DELAY in keys:
-        at = keys.index(DELAY)
-        trials = [np.where(np.arange(len(u)) == at, x, u) for x in _delays(problem, at)]
-    linear = next((keys.index(key) for key in problem.linear if key in keys), None)
-    found = [_in_proportion(problem, trial, linear) for trial in trials]
-    return min(found, key=lambda pair: pair[0])
+def _turned(problem: Problem, best: Start, candidates: Floats, progress: Progress) -> Start | None:
+    """Solution for the measurement with its sign turned, if no linear factor may turn it: where the
+    best one is close, next to it.
+    """
+    linear = (each for each in problem.parameters.free if each.key in problem.linear)
+    if not problem.data.has_sign or any(each.low < 0 for each in linear):
+        return None
+    power = float(((problem.data.values / problem.data.error) ** 2).sum())
+    if best.cost <= CLOSE_FIT * power:
+        return refine(problem.turned, best_placed(problem.turned, best.ended[None]))
+    return search(problem.turned, [candidates], progress)[0]
 
 
-def _delays(problem: Problem, at: int) -> Floats:
-    """Places of delays that resolve the periods of the data."""
-    delay = problem.parameters.free[at]
-    axis = problem.data.axis
-    highest = axis.max() if problem.data.unit == "Hz" else 0.1 / np.diff(axis).min()
-    count = int(np.ceil(DELAYS * highest * (delay.high - delay.low) / 1e3)) + 2
-    delays = np.linspace(delay.low, delay.high, min(count, MOST_DELAYS))
-    return np.array([delay.place(x) for x in delays])
+def _counted(problem: Problem) -> tuple[Problem, set[tuple[tuple[str, float], ...]]]:
+    """The problem, and a set that grows with each prediction that is not of one run of the model
+    with another delay or linear factor.
+    """
+    seen: set[tuple[tuple[str, float], ...]] = set()
+    free_of_cost = {DELAY, *problem.linear}
 
+    def counting(data: Data) -> Data:
+        predict: Callable[..., Floats] = data.predict
 
-def _in_proportion(problem: Problem, u: Floats, at: int | None) -> tuple[float, Floats]:
-    """Chi squared and the point with the linear parameter, if any is free, of least squares."""
-    data = problem.data
-    predicted, values = problem.predicted(u) / data.error, data.values / data.error
-    factor = 1.0
-    if at is not None:
-        linear = problem.parameters.free[at]
-        now = linear.value(float(u[at]))
-        best = float((predicted * values).sum() / max((predicted**2).sum(), 1e-300))
-        place = linear.place(best * now)
-        factor = linear.value(place) / now if now else 1.0
-        u = np.where(np.arange(len(u)) == at, place, u)
-    return float(((factor * predicted - values) ** 2).sum()), u
+        def counted(values: Mapping[str, float]) -> Floats:
+            seen.add(tuple((key, x) for key, x in values.items() if key not in free_of_cost))
+            return predict(values)
+
+        rough = counting(data.rough) if data.rough else None
+        return replace(data, predict=counted, rough=rough)
+
+    return replace(problem, data=counting(problem.data)), seen

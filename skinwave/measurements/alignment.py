@@ -103,6 +103,21 @@ def align(
     return replace(result, chi_square=_chi_square(away, lines, free))
 
 
+def opposite_sign(of: str, has_delay: bool) -> str:
+    """Sentence, without a full stop, where the other sign of a measurement fits as well.
+
+    Parameters
+    ----------
+    of : what it fits
+    has_delay : whether the delay is fitted, too
+    """
+    return (
+        f"with its sign turned the measurement fits {of} as well or better"
+        + ", at another delay" * has_delay
+        + ": check which direction was taken as positive"
+    )
+
+
 def _weights(lines: MeasuredLines) -> Floats:
     """Weight (f, 1) of each line: one over its variance; 1 where none is known.
 

@@ -120,6 +120,16 @@ def register(model: Model) -> Model:
     return model
 
 
+def of_surface_motion(scene: "Scene") -> bool:
+    """Whether a scene asks for the normal motion of the surface, or its rates."""
+    return scene.reading.asked.is_normal and scene.reading.is_on_surface
+
+
+def of_waves(scene: "Scene") -> bool:
+    """Whether wavenumber integrals have the quantity: of layers any, of a sheet the same."""
+    return not scene.body.of_kind.is_plate or of_surface_motion(scene)
+
+
 def check_reading(model: Model, scene: "Scene") -> None:
     """Refuse a scene whose quantity or depth a model does not have.
 

@@ -11,7 +11,7 @@ from simple_model import Effort, Response, steady_state
 from simple_model.flat_quantities import from_rest, quantity_field, steady, surface_field
 from simple_model.wavenumber_integral import Field
 from skinwave.bodies.analytic import exact_waves, stack
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, Request, of_waves, register
 from skinwave.models.laws import has_table
 from skinwave.scene import Scene
 
@@ -72,7 +72,7 @@ FLAT_BODY = register(
         seconds=2.0,
         memory=3e8,
         colour="#009E73",
-        reads=lambda scene: True,
+        reads=of_waves,
         is_infinite=True,
         takes_series=has_table,
     )
@@ -89,7 +89,7 @@ HARMONIC = register(
         seconds=2.0,
         memory=3e8,
         colour="#E69F00",
-        reads=lambda scene: True,
+        reads=of_waves,
         is_infinite=True,
         is_steady=True,
     )

@@ -20,6 +20,7 @@ from simple_model.material import Material
 from simple_model.quantities import STRAIN, Quantity
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
+from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene import Reading
 
 
@@ -76,9 +77,11 @@ def probe_rows(
         If a probe is not in the body, or its strain in a coat.
     """
     asked = reading.asked
-    _check_coat(build, reading)
-    if asked.is_normal and reading.is_on_surface:
+    check_coat(build, reading)
+    if asked.is_normal and (reading.is_on_surface or body.of_kind.is_plate):
         return surface_motion(body, build, probes), ()
+    if body.of_kind.is_plate:
+        return sheet_rows(body, build, probes, reading)
     mesh = build.mesh
     places, normals = surface_frame(mesh, probes, patch=body.of_kind.normal_patch)
     points = places - np.broadcast_to(reading.depths or 0.0, len(probes))[:, None] * normals
@@ -92,7 +95,7 @@ def probe_rows(
     return (rows @ displacement_operator(mesh, points)).tocsr(), solids
 
 
-def _check_coat(build: Build, reading: Reading) -> None:
+def check_coat(build: Build, reading: Reading) -> None:
     """Refuse strain and stress in a coat, where elements are of the material below it.
 
     Raises

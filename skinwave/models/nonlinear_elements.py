@@ -23,11 +23,6 @@ def _error(scene: Scene, h: float | None) -> float:
     return expected_error(scene.body, h)
 
 
-def of_surface_motion(scene: Scene) -> bool:
-    """Whether a scene asks for the normal motion of the surface, or its rates."""
-    return scene.reading.asked.is_normal and scene.reading.is_on_surface
-
-
 def _refuse_of_reduced(body: Body) -> None:
     sheet_only(body, "fem-nonlinear")
     without_own_law("fem-nonlinear", body)
@@ -49,7 +44,7 @@ REDUCED = register(
         refuse=_refuse_of_reduced,
         error=_error,
         default_size=partial(stretching_size, reduced=True),
-        reads=of_surface_motion,
+        reads=lambda scene: True,
         is_nonlinear=True,
     )
 )
@@ -62,7 +57,7 @@ FULL = register(
         refuse=_refuse_of_full,
         error=_error,
         default_size=partial(stretching_size, reduced=False),
-        reads=of_surface_motion,
+        reads=lambda scene: True,
         is_nonlinear=True,
     )
 )

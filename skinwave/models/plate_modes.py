@@ -19,8 +19,7 @@ from simple_model.sampling import shown
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.effort import peak_memory
-from skinwave.models import Model, Request, register
-from skinwave.models.nonlinear_elements import of_surface_motion
+from skinwave.models import Model, Request, of_surface_motion, register
 from skinwave.scene import Scene
 
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air

@@ -12,6 +12,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_width
 from simple_model.material import Material
+from simple_model.quantities import Quantity
 from simple_model.sampling import shown
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
@@ -276,14 +277,31 @@ def components(prepared: Prepared, pressure: MovingPressure) -> ReducedResponse:
     relaxation of stress.
     """
     motion = read_at(respond(prepared.body, pressure), prepared.read)
-    asked = prepared.reading.asked
+    return in_motion(motion, prepared.reading.asked, prepared.solids)
+
+
+def in_motion(
+    rest: ReducedResponse, asked: Quantity, solids: tuple[Material, ...]
+) -> ReducedResponse:
+    """Components of a quantity with its rates and the relaxation of stress.
+
+    Parameters
+    ----------
+    rest : ReducedResponse, of the components (p c) at rest
+    asked : Quantity
+    solids : p materials of the probes, or none
+
+    Returns
+    -------
+    ReducedResponse
+    """
     if not (asked.rate or asked.relaxes):
-        return motion
-    s, poles = 2j * np.pi * motion.frequencies, motion.poles
+        return rest
+    s, outputs = 2j * np.pi * rest.frequencies, rest.lines.shape[1]
     return replace(
-        motion,
-        lines=motion.lines * line_factor(asked, s, prepared.solids, prepared.read.shape[0]),
-        start=motion.start * line_factor(asked, poles, prepared.solids, prepared.read.shape[0]),
+        rest,
+        lines=rest.lines * line_factor(asked, s, solids, outputs),
+        start=rest.start * line_factor(asked, rest.poles, solids, outputs),
     )
 
 

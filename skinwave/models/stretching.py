@@ -33,6 +33,7 @@ from skinwave.effort import Clock
 from skinwave.models import Request
 from skinwave.models.full import TRANSIENT_RATE, in_time, marched, spent, step_count
 from skinwave.models.loads import surface_load
+from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.scene import Body, Scene
 
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
@@ -136,14 +137,13 @@ def full_answer(scene: Scene, request: Request) -> Response:
         made = meshed_sheet(scene.body, size)
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
-    S = fem.probe_operator(made.mesh, scene.probe_points)
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     return _about_rest(
         "fem-nonlinear-transient", scene, request, clock, made, size,
         body=body,
         mean=P @ mean_pressure(scene.pressure, points),
         force=lambda t: P @ scene.pressure(points, t, over=dt),
-        read=lambda u: S @ u,
+        read=full_reader(scene.body, made, scene.probe_points, scene.reading),
         dt=dt,
         effort=Effort(dofs=len(body.operators.free)),
     )  # fmt: skip
@@ -157,7 +157,7 @@ class _Reduced:
     modes: fem.StretchingModes
     load: Floats  # (n, r), modal forces of unit pressure at the points (n, 3)
     points: Floats
-    dofs: int
+    operators: fem.Operators
 
 
 def reduced_answer(scene: Scene, request: Request) -> Response:
@@ -167,7 +167,10 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
         request.report("reduce", 0.0)
         sheet = _reduced(scene.body, size, request.solver)
         hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
-        read = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
+        read = modal_reader(
+            scene.body, sheet.made, sheet.modes, sheet.operators, scene.probe_points,
+            scene.reading, request.solver,
+        )  # fmt: skip
 
     def force(t: float) -> Floats:
         return (np.exp(2j * pi * hz * t) @ forces).real
@@ -178,10 +181,11 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
         body=sheet.modes.elastic,
         mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
-        read=lambda z: read @ z,
+        read=read,
         dt=dt,
         effort=Effort(
-            dofs=sheet.dofs, reduced_dofs=len(sheet.modes.hz), estimate=sheet.modes.left_out
+            dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
+            estimate=sheet.modes.left_out,
         ),
     )  # fmt: skip
 
@@ -197,7 +201,7 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
     )  # fmt: skip
     P, points = surface_load(made)
     return _Reduced(
-        made=made, modes=modes, load=P.T @ modes.basis, points=points, dofs=len(operators.free)
+        made=made, modes=modes, load=P.T @ modes.basis, points=points, operators=operators
     )
 
 
@@ -234,6 +238,6 @@ def _about_rest(
     )  # fmt: skip
     return Response(
         model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
-        values=in_time(stepped, dt, times, scene),
+        values=in_time(stepped, dt, times, scene, (scene.body.solid,) * len(scene.probes)),
         effort=spent(effort, clock, made, h),
     )  # fmt: skip

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter
 
 from meshes.tetmesh import Floats
@@ -22,7 +21,6 @@ PALE = 0.35  # opacity of a curve where its mode is evanescent
 ROWS = 3  # of the names of lines above the panels
 APART = 0.085  # of the axis: names nearer than this are in rows of their own
 MOST_SHAPES = 4
-OUTLINED = [Stroke(linewidth=2.4, foreground="#000000"), Normal()]  # white on any grey
 
 
 def colour(number: int) -> str:
@@ -74,7 +72,6 @@ def dispersion_figure(
 def wavenumber_figure(
     curves: DispersionCurves,
     spectrum: tuple[Floats, Floats, Floats],
-    ridge: tuple[Floats, Floats],
     fitted: tuple[Floats, Floats],
     title: str,
     style: Style = REPORT,
@@ -86,7 +83,6 @@ def wavenumber_figure(
     curves : DispersionCurves
     spectrum : frequencies (f,) in Hz, wavenumbers (k,) in 1/m, and magnitudes (f, k), 0..1 at each
         frequency
-    ridge : frequencies (r,) in Hz and wavenumbers (r,) in 1/m where they are largest
     fitted : frequencies (g,) in Hz and fitted wavenumbers (g,) in 1/m
     title : str
     style : Style
@@ -106,22 +102,13 @@ def wavenumber_figure(
             if wave[fine <= f[-1]].any():
                 ax.plot(fine, np.where(wave, real, np.nan), color=colour(n), lw=2, label=mode.name)
         ax.plot(
-            *ridge,
-            "+",
-            color="#FFFFFF",
-            ms=6,
-            mew=1.2,
-            path_effects=OUTLINED,
-            label="ridge of the spectrum",
-        )
-        ax.plot(
             *fitted,
             "o",
             mfc="none",
             color="#A33C00",
             ms=7,
             mew=1.4,
-            label="fitted, where one mode leads",
+            label="fitted, where one mode leads and is resolved",
         )
         ax.set(xlim=(f[0], f[-1]), ylim=(0, k[-1]), xlabel="frequency, Hz",
                ylabel="wavenumber Re k, rad/m")  # fmt: skip

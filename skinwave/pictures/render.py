@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats, Ints, boundary_facets
+from simple_model.quantities import quantity
 from skinwave.pictures.figures import colour, label
 from skinwave.pictures.maps import SIGNED, carrier
 from skinwave.pictures.styles import Style
-from skinwave.pictures.views import View, path_points, split
+from skinwave.pictures.views import Singles, View, path_points, split
 
 Image = NDArray[np.uint8]
 Carrier = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
@@ -27,6 +28,7 @@ CAMERAS = {
     "front": ((0.0, -1.0, 0.45), (0.0, 0.2, 0.0), 0.5),
     "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
 }
+UNSIGNED = "cividis"  # of quantities without a sign
 SHOWN = 0.06  # of the body's width: how far the largest motion is drawn at most
 BAR = 10.0  # mm, the scale bar
 COLUMN = 112  # pixels for the colour bar
@@ -61,9 +63,12 @@ def exaggeration(view: View) -> float:
 
 
 def shown_scale(view: View) -> str:
-    """How motion is drawn, in words."""
+    """How motion is drawn, in words, and what colours it if that is not the motion."""
     factor = exaggeration(view)
-    return f"motion drawn {factor:,.0f} times" if factor else "pressure; nothing moves"
+    if not factor:
+        return "pressure; nothing moves"
+    named = f"{quantity(view.shade.quantity).words}; " if view.shade else ""
+    return f"{named}motion drawn {factor:,.0f} times"
 
 
 def picture(
@@ -93,7 +98,7 @@ def stage(
     """A scene that is built once, and what shows it at a frame.
 
     One colour scale serves all views: motion into the body over each model's largest or, of a
-    single view, motion in its own unit.
+    single view, motion in its own unit; another quantity in its unit, from 0 if it has no sign.
     """
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -108,12 +113,12 @@ def stage(
     try:
         plotter.set_background(style.paper)
         small = height / 432 * 11
-        limit, title = scale(views)
+        limits, title = scale(views)
         panels = []
         for k, view in enumerate(views):
             plotter.subplot(0, k)
             panels.append(prepared(view, cut))
-            actor = _add(plotter, panels[-1], style, limit, small, lit=camera != "top")
+            actor = _add(plotter, panels[-1], style, limits, small, lit=camera != "top")
             if not cut:
                 _add_outline(plotter, view)
             look(plotter, camera, panels)
@@ -126,7 +131,7 @@ def stage(
         plotter.subplot(0, 0)
 
         def show(frame: int) -> Image:
-            place(panels, frame, limit)
+            place(panels, frame, limits[1])
             plotter.subplot(0, 0)
             stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
             plotter.add_text(stamp, position=(0.66, 0.03), viewport=True, font_size=small,
@@ -139,11 +144,18 @@ def stage(
         plotter.close()
 
 
-def scale(views: Sequence[View]) -> tuple[float, str]:
-    """The end of the colour scale, and its title."""
+def scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
+    """The ends of the colour scale, and its title."""
+    shades = [view.shade for view in views if view.shade]
+    if shades:
+        asked = quantity(shades[0].quantity)
+        most = asked.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
+        return (-most if asked.invariant is None else 0.0, most), f"{asked.shown}\n"
     if len(views) > 1:
-        return 1.0, "over the\nlargest\n"
-    return (views[0].peak, "Pa\n") if views[0].unit == "Pa" else (1e6 * views[0].peak, "µm\n")
+        return (-1.0, 1.0), "over the\nlargest\n"
+    view = views[0]
+    most, unit = (view.peak, "Pa") if view.unit == "Pa" else (1e6 * view.peak, "µm")
+    return (-most, most), f"{unit}\n"
 
 
 def prepared(view: View, cut: bool = False) -> Panel:
@@ -195,11 +207,15 @@ def _lifted(places: Floats) -> Floats:
     return np.column_stack([1e3 * places, np.full(len(places), ABOVE)])
 
 
-def _add(plotter: Any, panel: Panel, style: Style, limit: float, small: float, *, lit: bool) -> Any:
+def _add(
+    plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], small: float, *,
+    lit: bool,
+) -> Any:  # fmt: skip
     """Everything of a panel; the actor of its skin."""
     view = panel.view
     actor = plotter.add_mesh(
-        panel.skin, scalars="motion", cmap=SIGNED, clim=(-limit, limit), show_scalar_bar=False,
+        panel.skin, scalars="motion", cmap=SIGNED if limits[0] else UNSIGNED, clim=limits,
+        show_scalar_bar=False,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
     add_marks(plotter, panel, "black")
@@ -264,6 +280,15 @@ def look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
     plotter.renderer.reset_camera_clipping_range()
 
 
+def _colours(panel: Panel, frame: int, limit: float) -> Singles:
+    """Values (n,) on the colour scale, which ends at `limit`."""
+    view = panel.view
+    if view.shade is None:
+        return -np.float32(limit / view.peak) * view.motion[frame, panel.nodes, 2]
+    values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
+    return np.float32(quantity(view.shade.quantity).per_unit) * values
+
+
 def place(panels: Sequence[Panel], frame: int, limit: float) -> None:
     """Every panel at a frame, in place."""
     for panel in panels:
@@ -271,7 +296,7 @@ def place(panels: Sequence[Panel], frame: int, limit: float) -> None:
         motion = np.asarray(view.motion[frame], np.float64)
         drawn = 1e3 * view.points + 1e3 * panel.factor * motion
         panel.skin.points[:] = drawn[panel.nodes]
-        panel.skin["motion"] = (-limit / view.peak * motion[panel.nodes, 2]).astype(np.float32)
+        panel.skin["motion"] = _colours(panel, frame, limit)
         height = 1e3 * panel.factor * motion[view.surface, 2]
         for mark, carried in panel.marks:
             raised = np.array(mark.points)

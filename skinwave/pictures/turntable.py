@@ -47,7 +47,7 @@ def _export(view: View, frame: int, path: str) -> None:
 
     plotter = pv.Plotter(off_screen=True, lighting="none", window_size=(800, 500))
     plotter.set_background("white")
-    limit, _ = scale([view])
+    (_, limit), _ = scale([view])
     panel = prepared(view)
     place([panel], frame, limit)
     plotter.add_mesh(

@@ -5,7 +5,7 @@ Motion is about its mean: a steady push bends a sheet far more than its vibratio
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 import fem
 from meshes import reading
-from meshes.tetmesh import Floats, Ints
+from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import Effort, sensation_level
 from simple_model.load_spectrum import pressure_lines
 from skinwave.fitting import effort_of, fitting
 from skinwave.models.reduction import oscillating
 from skinwave.models.speeds import repeated, shown_part, strongest_tone
 from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
+from skinwave.pictures.nodal import Shade, Tensors, shade, tensors
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
 
@@ -30,6 +31,7 @@ SLOWEST = 20.0  # Hz: slower tones are not followed by diagrams of motion over p
 GRID = 121  # points along a side of the point kernel's surface
 ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
 TYPICAL = 140.0  # Hz, where nothing vibrates
+FIELD_FRAMES = 8  # of those that are shown, written for other programs
 ROOM = 5e-3  # m beside the path that waves can be watched in
 
 Singles = NDArray[np.float32]
@@ -68,6 +70,9 @@ class View:
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
     ray : outwards along x from the path's outermost point; track : along the path, None if the
         focus rests; both in the steady state, about the mean
+    tensors : strain and stress at some of its times, of a solid body that was saved; shade : the
+        quantity that colours it, instead of its motion; moved : the motion that it was made of,
+        which no file keeps
     """
 
     body: str
@@ -88,6 +93,9 @@ class View:
     ray: Trace
     track: Trace | None
     effort: Effort = field(default_factory=Effort)
+    tensors: Tensors | None = None
+    shade: Shade | None = None
+    moved: Waves | None = None
 
     @property
     def column(self) -> str:
@@ -158,9 +166,34 @@ def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | N
         surface=surface, triangles=triangles, period=period, times=times,
         motion=motion.reshape(frames, -1, 3).astype(np.float32),
         rms=np.sqrt((amplitudes**2).sum(axis=0) / 2), sensation=levels,
-        tone=tone, speed=speed, effort=moved.effort,
+        tone=tone, speed=speed, effort=moved.effort, moved=moved,
         ray=_ray(scene, reach, trace), track=_track(scene, trace),
     )  # fmt: skip
+
+
+def shaded(view: View, scene: Scene) -> View:
+    """A body's view, coloured by the quantity that a scene's probes read.
+
+    Raises
+    ------
+    ValueError
+        As `nodal.shade` does.
+    """
+    assert view.moved
+    nodes = np.unique(boundary_facets(view.tets))
+    return replace(view, shade=shade(scene, view.moved, view.times, nodes))
+
+
+def with_tensors(view: View) -> View:
+    """A view with strain and stress at `FIELD_FRAMES` of its times, if it is of a solid body."""
+    if view.moved is None or view.scene.body.of_kind.is_plate:
+        return view
+    return replace(view, tensors=tensors(view.moved, view.times, field_frames(len(view.times))))
+
+
+def field_frames(count: int) -> Ints:
+    """Numbers (k,) of the frames, of so many, that are written for other programs."""
+    return np.unique(np.arange(FIELD_FRAMES) * count // FIELD_FRAMES)
 
 
 def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = None) -> View:
@@ -222,6 +255,8 @@ def save(path: Path, view: View) -> None:
     for name in ("ray", "track"):
         if (trace := getattr(view, name)) is not None:
             arrays |= {f"{name}_{key}": value for key, value in asdict(trace).items()}
+    if (kept := with_tensors(view).tensors) is not None:
+        arrays |= {f"{TENSORS}{key}": value for key, value in vars(kept).items()}
     meta = {n: getattr(view, n) for n in META} | {
         "scene": dumps(view.scene), "effort": asdict(view.effort)
     }  # fmt: skip
@@ -242,8 +277,9 @@ def load(path: Path) -> View:
         fitting(meta, FITTING, "meta")
         meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
         meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
-        fields: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
-        return _checked(View(**fields))
+        meta |= {"tensors": _tensors(arrays)}
+        found: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
+        return _checked(View(**found))
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
 
@@ -251,6 +287,7 @@ def load(path: Path) -> View:
 ARRAYS = (
     "points", "tets", "surface", "triangles", "times", "motion", "rms", "sensation",
 )  # fmt: skip
+TENSORS = "tensor_"  # what the names of their arrays begin with
 META = ("body", "model", "unit", "period", "tone", "speed")
 FITTING = {"body": str, "model": str, "unit": str, "period": float, "tone": float, "scene": str}
 
@@ -273,9 +310,18 @@ def _checked(view: View) -> View:
             raise ValueError(f"'{name}' is not finite")
     if not (n and s and f and view.period > 0 and view.unit in UNITS):
         raise ValueError("it is empty, or its period or unit are none")
+    if (kept := view.tensors) is not None:
+        _check_numbers(kept.frames, f, "frames")
+        _check_numbers(kept.nodes, n, "nodes")
+        _check_numbers(kept.tets, len(kept.nodes), "tets")
     if view.tets.ndim != 2 or (len(view.tets) and view.tets.shape[1] not in (4, 10)):
         raise ValueError(f"'tets' is of shape {view.tets.shape}")
     return view
+
+
+def _check_numbers(numbers: Ints, most: int, name: str) -> None:
+    if numbers.dtype.kind not in "iu" or not (0 <= numbers.min() <= numbers.max() < most):
+        raise ValueError(f"'{TENSORS}{name}' has numbers beyond {most}")
 
 
 def _trace(arrays: Mapping[str, Any], name: str) -> Trace | None:
@@ -283,6 +329,20 @@ def _trace(arrays: Mapping[str, Any], name: str) -> Trace | None:
     if f"{name}_places" not in arrays:
         return None
     return Trace(**{key: arrays[f"{name}_{key}"] for key in keys})
+
+
+def _tensors(arrays: Mapping[str, Any]) -> Tensors | None:
+    keys = [key.name for key in fields(Tensors)]
+    if f"{TENSORS}{keys[0]}" not in arrays:
+        return None
+    found = Tensors(**{key: arrays[f"{TENSORS}{key}"] for key in keys})
+    many, q = len(found.frames), len(found.nodes)
+    shapes = {"strain": (many, q, 6), "stress": (many, q, 6), "tets": (len(found.tets), 10)}
+    for name, shape in shapes.items():
+        array = getattr(found, name)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise ValueError(f"'{TENSORS}{name}' is of shape {array.shape}, or not finite")
+    return found
 
 
 def _upper(facets: Ints) -> tuple[Ints, Ints]:

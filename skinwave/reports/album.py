@@ -16,7 +16,7 @@ import numpy as np
 from meshes import reading
 from simple_model import Response, published
 from simple_model.choices import choose
-from simple_model.quantities import QUANTITIES
+from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave import record
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
@@ -28,13 +28,21 @@ from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.pictures.motion import Waves, waves
-from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
+from skinwave.pictures.views import (
+    View,
+    body_view,
+    fastest_line,
+    kernel_view,
+    load,
+    save,
+    shaded,
+)
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Scene, body_name, check_motion, with_body
+from skinwave.scene import BODIES, Scene, body_name, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
-from skinwave.studies import paper15
+from skinwave.studies import description, paper15
 from skinwave.verify.suite import suite
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
@@ -113,7 +121,6 @@ def make(
     ValueError
         If a model refuses the scene.
     """
-    check_motion(scene, "a report")
     shown = shown_scenes(scene, beside)
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs = []
@@ -162,6 +169,19 @@ def answers(
             yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
 
 
+def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
+    """Views by the quantity that their scenes' probes read, and what is left out: of another one
+    than the displacement of the surface the point kernel, which has none.
+    """
+    if all(scene.reading.asked is DISPLACEMENT for _, scene in found):
+        return [view for view, _ in found], []
+    bodies = [(view, scene) for view, scene in found if len(view.tets)]
+    if not bodies:
+        raise ValueError(f"{description.without_kernel(found[0][1])}; give the scene a body")
+    said = [description.without_kernel(scene) for view, scene in found if not len(view.tets)]
+    return [shaded(view, scene) for view, scene in bodies], said
+
+
 def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
     def named(phase: str, fraction: float) -> None:
         progress(f"{body}: {phase}", fraction)
@@ -180,7 +200,7 @@ def _plan(
     trust: dict[str, Any] = {"command": command, "model": required.model}
     drawn = [run.response.values for run in runs if run.scene == scene]
     if drawn and scene.body.of_kind.discretise:
-        planned = _planned_answer(scene, required, solver).displacement
+        planned = _planned_answer(scene, required, solver).values
         size = float(np.linalg.norm(planned)) or 1.0
         trust["misfit"] = float(np.linalg.norm(drawn[0] - planned)) / size
     trust["cases"] = _verified(progress)

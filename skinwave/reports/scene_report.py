@@ -11,9 +11,9 @@ from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
 from skinwave.files import distinct_names, folder_name
-from skinwave.numbers import FAINTEST, decibel, significant
-from skinwave.pictures.figures import answered, label
-from skinwave.pictures.levels import sensation_levels, strongest_probe
+from skinwave.numbers import significant
+from skinwave.pictures.figures import label
+from skinwave.pictures.levels import strongest_probe
 from skinwave.pictures.maps import Raster, sampler
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
@@ -25,13 +25,12 @@ from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 from skinwave.studies import description, summary, tables
 from skinwave.studies.changes import Drawn, beside_kernels, shown
-from skinwave.studies.claims import evaluate
+from skinwave.studies.claims import claimed, evaluate
 from skinwave.studies.dispersion_page import page_parts
 from skinwave.studies.driven_modes import driven_modes
+from skinwave.studies.lines_table import lines_table
 from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
-TABLED = 12  # lines in the table of lines
-ROUND_OFF = 1e-9  # of the strongest line
 ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be assessed
 
 
@@ -68,10 +67,11 @@ def write_report(
         document.warnings_banner(
             (name, run.response.effort) for name, run in zip(names, album.runs, strict=True)
         ),
+        *map(document.paragraph, description.other_quantity(album.scene)),
         _asked(album),
         document.section("What was modelled, and what was left out", *_modelled(album)),
         document.section("What comes out", *views),
-        document.section("What the probes see", *drawn, *map(_lines, groups.values())),
+        document.section("What the probes see", *drawn, *map(lines_table, groups.values())),
         *_guided(album, gallery),
         document.section("How far the models agree", *_comparison(album)),
         document.section("Effort", _effort(album)),
@@ -154,6 +154,7 @@ def _asked_rows(scene: Scene) -> list[list[str]]:
         ["body", description.extent(body) + description.above(body)],
         ["duration", f"{tacton.duration:g} s"],
         ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
+        ["they read", scene.reading.words],
     ]  # fmt: skip
 
 
@@ -171,70 +172,6 @@ def _modelled(album: Album) -> list[str]:
     )
     warned = [document.paragraph(f"Warning: {text}.") for text in planned["warnings"]]
     return [*parts, document.paragraph(heading), document.table(["", "", "reason"], rows), *warned]
-
-
-def _lines(runs: Sequence[Run]) -> str:
-    """Lines of each model at the probe that moves most, the strongest of any first."""
-    probe = strongest_probe(runs)
-    said = document.Markup().join(map(document.paragraph, description.unresolved(runs)))
-    known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
-    if not known and not any(run.unnamed for run in runs):
-        return said or document.paragraph("A constant pressure on a focus at rest has no line.")
-    share = {name: max(_share(run, name, probe) for run in runs) for name in known}
-    names = sorted(share, key=lambda name: -share[name])[:TABLED]
-    sensation = [sensation_levels(run, probe) for run in runs]
-    rows = [
-        [name, f"{runs[0].listed[name]:.2f}"]
-        + [cell for run, levels in zip(runs, sensation, strict=True)
-           for cell in _amplitude(run, name, probe, levels)]
-        for name in names
-    ]  # fmt: skip
-    rows += _unnamed_rows(runs, probe)
-    header = ["line", "frequency, Hz"]
-    for run in runs:
-        header += [f"{answered(run)}, {run.response.record.shown} peak"]
-        header += ["dB re threshold"] if run.is_skin else []
-    x, y = 1e3 * runs[0].response.probes[probe]
-    heading = document.Markup("<h3>Lines at ({:g}, {:g}) mm</h3>").format(x, y)
-    return heading + document.table(header, rows) + said
-
-
-def _share(run: Run, name: str, probe: int) -> float:
-    """A line's amplitude over that of the strongest."""
-    strongest = max(float(x[probe]) for x in run.table.amplitudes.values())
-    return float(run.table.amplitudes[name][probe]) / strongest if strongest else 0.0
-
-
-def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
-    """A line's amplitude and, of skin, its level above threshold; 0 if it is round-off."""
-    if _share(run, name, probe) < ROUND_OFF:
-        return ["0", ""] if run.is_skin else ["0"]
-    size = _size(run, float(run.table.amplitudes[name][probe]))
-    return [size, _level(levels.get(name))] if run.is_skin else [size]
-
-
-def _unnamed_rows(runs: Sequence[Run], probe: int) -> list[list[str]]:
-    """A row for each peak that is no single line of the load, those of all runs together."""
-    found = {(peak.kind, round(peak.frequency, 1)) for run in runs for peak in run.unnamed[:TABLED]}
-    rows = []
-    for kind, frequency in sorted(found):
-        row = [kind, f"{frequency:.1f}"]
-        for run in runs:
-            sizes = [_size(run, float(peak.amplitudes[probe])) for peak in run.unnamed[:TABLED]
-                     if (peak.kind, round(peak.frequency, 1)) == (kind, frequency)]  # fmt: skip
-            row += [*(sizes[:1] or [""]), *([""] if run.is_skin else [])]
-        rows.append(row)
-    return rows
-
-
-def _size(run: Run, amplitude: float) -> str:
-    return significant(run.response.record.per_unit * amplitude)
-
-
-def _level(level: float | None) -> str:
-    if level is None:
-        return ""
-    return f"{round(level):+d}" if level >= FAINTEST else decibel(level)
 
 
 def _guided(album: Album, gallery: Gallery) -> list[str]:
@@ -258,7 +195,7 @@ def _comparison(album: Album) -> list[str]:
     parts: list[str] = []
     if any(len(runs) > 1 for runs in groups.values()):
         parts.append(tables.agreement_table(groups))
-    long = [run for run in album.runs if run.scene.tacton.duration >= ASSESSED]
+    long = [r for r in claimed(album.runs) if r.scene.tacton.duration >= ASSESSED]
     if assessed_claims := evaluate(long):
         parts.append(document.paragraph("Claims of Lim, Seifi and Park, evaluated on these runs:"))
         parts.append(tables.claims_table(assessed_claims))

@@ -63,6 +63,11 @@ def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
     return assessed_claims
 
 
+def claimed(runs: Iterable[Run]) -> list[Run]:
+    """Runs that claims are about: of the point kernel, and of the displacement of a surface."""
+    return [run for run in runs if run.is_motion or not run.response.record.of_body]
+
+
 def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
     """Every assessed claim per body and model."""
     rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in assessed_claims)

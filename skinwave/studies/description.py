@@ -10,7 +10,7 @@ from skinwave.bodies.mounting import FRAME
 from skinwave.models import named
 from skinwave.pictures.figures import answered
 from skinwave.run import Run
-from skinwave.scene import Body
+from skinwave.scene import Body, Scene
 
 NAMED = 4  # lines that a sentence names
 SPOTS = {
@@ -183,7 +183,7 @@ def _sheet(runs: list[Run]) -> str:
         if runs[0].scene.body.air
         else "Left out: the air that moves along, a fifth to a third of the mass of office paper"
     )
-    if not model.is_nonlinear:
+    if not model.is_nonlinear and all(run.is_motion for run in runs):
         depth = runs[0].scene.body.depth
         sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / depth
         text += (
@@ -192,3 +192,22 @@ def _sheet(runs: list[Run]) -> str:
             "modes lie higher"
         )
     return f"{text}. Neither size nor support of the sheet that was measured is published."
+
+
+def without_kernel(scene: Scene) -> str:
+    """A sentence that the point kernel has no such quantity."""
+    return f"the point kernel has no {scene.reading.words}, and predicts a pressure alone"
+
+
+def other_quantity(scene: Scene) -> list[str]:
+    """Sentences for a page of a scene whose probes read something else than the displacement of
+    the surface.
+    """
+    if scene.reading.is_plain:
+        return []
+    return [
+        f"Probes read {scene.reading.words}, in {scene.reading.asked.shown}; "
+        f"{without_kernel(scene)}: its columns are in Pa, and that of the quantity in lines.csv is "
+        "empty. Pictures of the surface show its motion; claims and sensation levels, which are of "
+        "displacement, are left out of bodies."
+    ]

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from skinwave import document
 from skinwave.document import Markup, paragraph
+from skinwave.measurements.alignment import opposite_sign
 from skinwave.measurements.significance import radius
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label, measured
@@ -182,10 +183,8 @@ def remarks(found: MeasuredComparison) -> list[str]:
 
 def _opposite(column: Column) -> list[str]:
     """A sentence where the other sign of the measurement fits as well."""
-    return [
-        f"With its sign turned the measurement fits the {label(column.run.column)} as well or "
-        "better, at another delay: check which direction was taken as positive."
-    ] * column.may_be_turned
+    said = opposite_sign(f"the {label(column.run.column)}", has_delay=True)
+    return [f"{said[0].upper()}{said[1:]}."] * column.may_be_turned
 
 
 def _changes(found: MeasuredComparison) -> list[str]:

@@ -14,7 +14,7 @@ from skinwave.measurements.measurement import Measurement
 from skinwave.models.prepared import Prepared, answer
 from skinwave.pictures.surfaces import MeasuredPlaces
 from skinwave.run import Run
-from skinwave.scene import Scene
+from skinwave.scene import Scene, check_motion
 from skinwave.studies.measured_lines import lines_to_compare
 from skinwave.studies.measured_study import MeasuredComparison, main_column
 
@@ -39,6 +39,7 @@ def at_measured(scene: Scene, measurement: Measurement) -> Scene:
         )
     if scene.reading.is_on_surface and scene.reading.asked.is_normal:
         scene = replace(scene, quantity=DISPLACEMENT.name)
+    check_motion(scene, "a comparison with a measurement")
     if np.isfinite(measurement.places).all():
         scene = replace(scene, probes=tuple(map(tuple, measurement.places.tolist())))
     elif len(scene.probes) != len(measurement.places):

@@ -16,11 +16,11 @@ from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.processes import helper
 from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Scene, body_name, check_motion, with_body
+from skinwave.scene import BODIES, Body, Scene, body_name, with_body
 from skinwave.simulation import check_options, compute
 from skinwave.studies import measured_page, measured_tables, paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
-from skinwave.studies.claims import evaluate, write_claims
+from skinwave.studies.claims import claimed, evaluate, write_claims
 from skinwave.studies.measured_runs import beside, in_quantity, measured_places
 from skinwave.studies.measured_study import (
     Measured,
@@ -39,14 +39,7 @@ def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str
 
 
 def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
-    """The same for one scene: on its own body or, if it has none, on paper and skin.
-
-    Raises
-    ------
-    ValueError
-        If its probes read something else than the displacement of the surface.
-    """
-    check_motion(scene, "a comparison")
+    """The same for one scene: on its own body or, if it has none, on paper and skin."""
     if scene.body.of_kind.discretise:
         bodies = {body_name(scene.body): scene}
     else:
@@ -96,7 +89,7 @@ def run_study(
         figures["overview"] = aside.submit(study_page.overview_png, drawn)
         runs = [run for group in groups.values() for run in group]
         outcome = StudyOutcome(
-            assessed_claims=evaluate(runs),
+            assessed_claims=evaluate(claimed(runs)),
             warnings=document.worst_warnings(study_page.efforts(runs)),
             runs=len(runs),
             planned=sum(map(len, scenes.values())),
@@ -167,7 +160,9 @@ def _begun_bodies(
 def _prepared(
     scene: Scene, h: float | None, solver: str, progress: Progress | None = None
 ) -> Prepared:
-    return prepare(scene.body, scene.probe_points, progress, h=h, solver=solver)
+    return prepare(
+        scene.body, scene.probe_points, progress, h=h, solver=solver, reading=scene.reading
+    )
 
 
 def _begun_maps(
@@ -181,7 +176,9 @@ def _begun_maps(
     begun = {
         scene.body: aside.submit(element_maps, scene, h, solver)
         for scene in scenes[first_of(scenes)].values()
-        if scene.body.of_kind.discretise and not has_wavenumber_integral(scene)
+        if scene.body.of_kind.discretise
+        and scene.reading.is_plain
+        and not has_wavenumber_integral(scene)
     }
 
     def maps(run: Run) -> Drawn:

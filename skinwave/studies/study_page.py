@@ -20,7 +20,15 @@ from skinwave.scene_file import dumps
 from skinwave.studies import summary, tables
 from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
 from skinwave.studies.claims import AssessedClaim
-from skinwave.studies.description import levels_of, modelled, path_of, tones_of, unresolved
+from skinwave.studies.description import (
+    levels_of,
+    modelled,
+    other_quantity,
+    path_of,
+    tones_of,
+    unresolved,
+)
+from skinwave.studies.lines_table import lines_table
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 
@@ -89,9 +97,9 @@ def page_parts(
         *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
         document.warnings_banner(efforts(runs)),
         _introduction(outcome, groups),
-        *map(document.paragraph, unresolved(runs)),
+        *map(document.paragraph, [*other_quantity(runs[-1].scene), *unresolved(runs)]),
         _kept(folder, "overview", overview, OVERVIEW_CAPTION),
-        document.section("What propagation changes", summary.per_tacton(changes(groups))),
+        *_changes(groups),
         document.section(
             "Which of the paper's claims hold where",
             document.paragraph(LEVELS),
@@ -105,6 +113,15 @@ def page_parts(
     images = _images(drawn_runs, figures, progress)
     pictures = [_kept(folder, n, images[n], caption(n, group)) for n, group in groups.items()]
     return [*parts, document.section("Every Tacton", *pictures)]
+
+
+def _changes(groups: Mapping[str, list[Run]]) -> list[str]:
+    """Effect of propagation; of another quantity than the displacement, for which the point kernel
+    has nothing to compare with, its lines.
+    """
+    if found := changes(groups):
+        return [document.section("What propagation changes", summary.per_tacton(found))]
+    return [document.section("Lines", *map(lines_table, groups.values()))]
 
 
 def tacton_png(name: str, group: list[Run]) -> bytes:

@@ -19,7 +19,7 @@ from simple_model.choices import choose, meant
 from skinwave.distributions import Distribution, called, without_spreads
 from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
-from skinwave.scene_file import content, dumps, loads, parsed, read
+from skinwave.scene_file import content, dumps, from_table, loads, parsed, read, to_table
 from skinwave.scene_keys import SECTIONS, renamed, write_material
 from skinwave.sweeps.saltelli import EDGE, saltelli_shares
 
@@ -187,11 +187,8 @@ def varied(scene: Scene, values: Mapping[str, Any]) -> Scene:
     ValueError
         If that is no scene.
     """
-    complete = tomllib.loads(dumps(scene))
-    found = _case(complete, complete, values)
-    if found.scene is None:
-        raise ValueError(found.error)
-    return found.scene
+    complete = to_table(scene)
+    return from_table(_changed(complete, complete, values))
 
 
 def _sampled(
@@ -256,12 +253,7 @@ def _split(text: str) -> list[str]:
 
 
 def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
-    scene, error, changed = None, "", table
-    for key in sorted(varied, key=lambda key: key != BODY):  # the body first, then what is in it
-        if key == BODY:
-            changed = changed | {BODY: _body(varied[key])}
-        else:
-            changed = _with(changed, complete, key.split("."), varied[key])
+    scene, error, changed = None, "", _changed(table, complete, varied)
     try:
         text = tomli_w.dumps(changed)
         scene = loads(text)
@@ -272,6 +264,16 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     for key, value in varied.items():  # a name for a number, as of a depth, is that number
         keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
     return DesignPoint(varied=varied, keys=keys, text=text, scene=scene, error=error)
+
+
+def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
+    """A copy of a table with other values of its keys; the body first, then what is in it."""
+    for key in sorted(varied, key=lambda key: key != BODY):
+        if key == BODY:
+            table = table | {BODY: _body(varied[key])}
+        else:
+            table = _with(table, complete, key.split("."), varied[key])
+    return table
 
 
 def _body(name: Any) -> Any:

@@ -20,7 +20,7 @@ from scipy import fft, sparse
 from scipy.interpolate import CubicSpline
 
 import fem
-from meshes.tetmesh import Floats, Ints, TetMesh
+from meshes.tetmesh import Floats, Ints
 from simple_model import MovingPressure, Response, sensation_level
 from simple_model.load_spectrum import (
     foci_harmonics,
@@ -31,15 +31,16 @@ from simple_model.load_spectrum import (
 )
 from simple_model.prony import FIT_TOLERANCE
 from simple_model.response import step
-from skinwave.bodies.build import build, operators
+from skinwave.bodies.build import Build, build, operators
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import surface_load
-from skinwave.models.prepared import sample_times
+from skinwave.models.loads import probe_rows, surface_load
+from skinwave.models.prepared import in_motion, sample_times
 from skinwave.models.reduction import (
     BAND,
     ReducedBody,
+    ReducedResponse,
     from_rest,
     read_at,
     reduce_body,
@@ -73,23 +74,23 @@ NOWHERE = 1e-6  # of the largest pressure: where it is less, there is none
 # As in `skinwave.steps`; a body that is cached begins with the third.
 STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.15, "reduce": 0.7, "read the surface": 0.05}
 SHEET_CELLS = 40  # along the shorter side of a large sheet, at most
-KEPT = 2  # reductions, tables and meshes each: some 20 MB a reduction
+KEPT = 2  # reductions, tables and meshes each: some 20 to 40 MB a reduction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reduced:
     """A body reduced to the pressure along one path: displacement `read` (q, r) of the places
-    `within` (SIDE^2,) the area, and displacement `rows` (n, 3, r) of the `nodes` (n,) of its mesh
-    that are seen as `shape`.
+    `within` (SIDE^2,) the area, and the `basis` (3 n, r) of all nodes of `made`, of which the
+    `nodes` (n,) are seen as `shape`.
     """
 
     body: ReducedBody
     read: Floats
     within: NDArray[np.bool_]
-    mesh: TetMesh
+    made: Build
     shape: Shape
     nodes: Ints
-    rows: NDArray[np.float32]
+    basis: NDArray[np.float32]
 
 
 class BodyResponses:
@@ -104,7 +105,6 @@ class BodyResponses:
         """The response in a scene of one probe, with the motion of the whole body if `moving`;
         raises what `simulate` does.
         """
-        _readable(scene)
         if is_tabulated(scene.body):
             gaussian_only(scene.pressure)
             height = scene.pressure.height
@@ -143,22 +143,6 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
     said = sentences(scene, response, h=default_size(scene.body))
     effort = replace(response.effort, warnings=said)
     return replace(answer, response=replace(response, effort=effort))
-
-
-def _readable(scene: Scene) -> None:
-    """Refuse other quantities than the displacement of the surface where there is no wavenumber
-    integral: the reduced body at hand has only that.
-
-    Raises
-    ------
-    ValueError
-        If the scene asks for one.
-    """
-    if not (scene.reading.is_plain or is_tabulated(scene.body)):
-        raise ValueError(
-            f"{scene.reading.words} of a {scene.body.kind} is not computed here; take a slab, the "
-            "displacement of the surface, or skinwave run"
-        )
 
 
 def gaussian_only(pressure: MovingPressure) -> None:
@@ -297,25 +281,26 @@ def reduced_to_path(
     read = fem.probe_operator(made.mesh, inwards[within]) @ model.basis
     shape, nodes = skin_of(made, body)
     return Reduced(
-        body=reduced, read=read, within=within, mesh=made.mesh, shape=shape, nodes=nodes,
-        rows=model.basis.reshape(-1, 3, len(model.K))[nodes].astype(np.float32),
+        body=reduced, read=read, within=within, made=made, shape=shape, nodes=nodes,
+        basis=model.basis.astype(np.float32),
     )  # fmt: skip
 
 
-def _probe(body: Reduced, at: Floats) -> Floats:
-    """Displacement (p, r) of points (p, 2) of the top into the body."""
-    dofs = (3 * body.nodes[:, None] + np.arange(3)).ravel()
-    rows = body.rows.reshape(len(dofs), -1)
-    return np.asarray(fem.probe_operator(body.mesh, at)[:, dofs] @ rows)
+def _at_probe(body: Reduced, scene: Scene, motion: ReducedResponse) -> Response:
+    """The quantity that a scene's probe reads, from rest."""
+    times, asked = sample_times(scene), scene.reading.asked
+    rows, solids = probe_rows(scene.body, body.made, scene.probe_points, scene.reading)
+    components = in_motion(read_at(motion, rows @ body.basis), asked, solids)
+    return Response(
+        model="fem", times=times, probes=scene.probe_points, quantity=asked.name,
+        values=asked.waveforms(from_rest(components, times), 1), effort=body.body.effort,
+    )  # fmt: skip
 
 
 def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
-    """Motion from rest of a scene's probe, and RMS motion of the area."""
-    times, motion = sample_times(scene), respond(body.body, scene.pressure)
-    response = Response(
-        model="fem", times=times, probes=scene.probe_points, effort=body.body.effort,
-        values=from_rest(read_at(motion, _probe(body, scene.probe_points)), times),
-    )  # fmt: skip
+    """Quantity of a scene's probe from rest, and RMS motion of the area."""
+    motion = respond(body.body, scene.pressure)
+    response = _at_probe(body, scene, motion)
     if scene.tacton.rhythm:
         motion = respond(body.body, _steady(scene.pressure))
     f = motion.frequencies
@@ -324,6 +309,6 @@ def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:
     area[:, body.within] = heard.lines @ body.read.T
     seen = None
     if moving:
-        upwards = heard.lines @ body.rows[:, 2].T
+        upwards = heard.lines @ body.basis[3 * body.nodes + 2].T
         seen = moving_of(body.shape, scene.pressure, heard.frequencies, upwards)
     return answer_of(scene, response, motion_map(scene, heard.frequencies, area), seen)

@@ -1,0 +1,211 @@
+"""Displacement and strain at points of a thin sheet, from the middle plane of its mesh.
+
+A sheet is meshed by a thicker one of the same bending stiffness, so that only its middle plane has
+the sheet's motion. By Kirchhoff's kinematics, at a height z above that plane,
+
+    u_a(z) = u_a - z w,a,   E_ab(z) = (u_a,b + u_b,a + u_i,a u_i,b) / 2 - z w,ab,
+
+and E_zz = -nu / (1 - nu) (E_xx + E_yy) in plane stress, without transverse shear. E is the strain
+of Green and Lagrange. Linear bending has no in-plane motion of the middle plane: what the thicker
+mesh has of it is far too much, as its membrane is too soft. Slopes and curvatures are those
+of polynomials that fit the derivatives at the quadrature points about a point, as in `stress`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from fem.elements import shape_functions, triangle_rule
+from fem.finite_strain import Membrane, Part, membrane_part
+from fem.stress import LOCAL, fitted_polynomial
+from meshes import TetMesh
+from meshes.tetmesh import Floats, Ints
+
+PAIRS = ((0, 0), (1, 1), (0, 1))  # xx, yy, xy
+ON_EDGE = 1e-9  # barycentric: how far outside all triangles a point still counts as on the sheet
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SheetReading:
+    """Operators of p points of a sheet on the n nodes of its mesh.
+
+    `value` (p, n) of a nodal field, its `slopes` (2, p, n) and `curvatures` (p, n) xx, yy and xy;
+    and `fit` (p, e q), the values at the points by those at the quadrature points of the `part`.
+    """
+
+    part: Part
+    value: sparse.csr_array
+    slopes: tuple[sparse.csr_array, ...]
+    curvatures: tuple[sparse.csr_array, ...]
+    fit: sparse.csr_array
+
+
+def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> SheetReading:
+    """Operators that read a sheet's middle plane.
+
+    Parameters
+    ----------
+    mesh : TetMesh, of the sheet
+    membrane : Membrane, in its middle plane
+    points : (p, 2) float, metre
+
+    Returns
+    -------
+    SheetReading
+
+    Raises
+    ------
+    ValueError
+        If a point is off the sheet.
+    """
+    points = np.atleast_2d(np.asarray(points, np.float64))
+    part = membrane_part(mesh, membrane)
+    owner, inner = _located(mesh.points[:, :2], part.nodes, points)
+    N = shape_functions(inner, part.nodes.shape[1])
+    rows = np.repeat(np.arange(len(points)), N.shape[1])
+    shape = (len(points), len(mesh.points))
+    value = sparse.csr_array((N.ravel(), (rows, part.nodes[owner].ravel())), shape=shape)
+    fit, along_x, along_y = _fits(mesh.points[:, :2], part, owner, points)
+    D = part.D[0::2], part.D[1::2]
+    mixed = (along_y @ D[0] + along_x @ D[1]) / 2
+    return SheetReading(
+        part=part, value=value, slopes=(fit @ D[0], fit @ D[1]),
+        curvatures=(along_x @ D[0], along_y @ D[1], mixed), fit=fit,
+    )  # fmt: skip
+
+
+def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_array:
+    """Displacement operator (3 p, 3 n) of bending, at heights (p,) in metre above the middle
+    plane, which has no in-plane motion in it.
+    """
+    z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
+    x, y = (-(z @ slope) for slope in reading.slopes)
+    bent = [[nothing, nothing, part] for part in (x, y, reading.value)]
+    return _by_point(bent)
+
+
+def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> sparse.csr_array:
+    """Strain operator (6 p, 3 n) in 1/m of bending.
+
+    Parameters
+    ----------
+    reading : SheetReading
+    heights : (p,) float, metre, above the middle plane
+    poisson : of the sheet
+
+    Returns
+    -------
+    (6 p, 3 n) sparse; components xx, yy, zz, xy, xz, yz fastest
+    """
+    z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
+    bent = _by_point([[nothing, nothing, -(z @ part)] for part in reading.curvatures])
+    each = sparse.eye_array(len(heights))
+    return (sparse.kron(each, from_plane(poisson), format="csr") @ bent).tocsr()
+
+
+def from_plane(poisson: float) -> Floats:
+    """Matrix (6, 3): strain xx, yy, zz, xy, xz, yz by xx, yy and xy in plane stress."""
+    across = -poisson / (1 - poisson)
+    found = np.zeros((6, 3))
+    found[[0, 1, 3], [0, 1, 2]] = 1.0
+    found[2, :2] = across
+    return found
+
+
+def quadratic_strain_at(reading: SheetReading, u: Floats) -> Floats:
+    """Quadratic part u_i,a u_i,b / 2 (p, 3) of the strains xx, yy and xy of the middle plane, at a
+    displacement u (3 n,) in metre.
+    """
+    D = reading.part.D
+    slopes = (D @ u.reshape(-1, 3)).reshape(-1, 2, 3)
+    return reading.fit @ np.stack(
+        [(slopes[:, a] * slopes[:, b]).sum(axis=1) / 2 for a, b in PAIRS], axis=1
+    )
+
+
+def modal_slopes(reading: SheetReading, basis: Floats) -> Floats:
+    """Slopes (e q, 2, m) at the quadrature points of the normal displacement of basis vectors
+    (3 n, m).
+    """
+    w = basis.reshape(-1, 3, basis.shape[1])[:, 2]
+    return np.asarray((reading.part.D @ w).reshape(-1, 2, basis.shape[1]))
+
+
+def modal_quadratic_strain(reading: SheetReading, basis: Floats) -> Floats:
+    """Matrices Q (p, 3, m, m) of w,a w,b / 2 = z^T Q z / 2 at the points, for xx, yy and xy, of a
+    normal displacement w in coordinates z of a basis (3 n, m).
+    """
+    slopes = modal_slopes(reading, basis)
+    found = np.empty((reading.fit.shape[0], 3, *(slopes.shape[2:] * 2)))
+    for p in range(len(found)):
+        row = reading.fit[[p]].tocoo()
+        near, weights = slopes[row.col], row.data[:, None, None]
+        for c, (a, b) in enumerate(PAIRS):
+            product = np.einsum("qm,qn->mn", (weights * near)[:, a], near[:, b])
+            found[p, c] = (product + product.T) / 2
+    return found
+
+
+def in_plane_rows(reading: SheetReading) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Displacement (2 p, 3 n), and strain xx, yy and xy (3 p, 3 n) of the middle plane alone."""
+    nothing, N = sparse.csr_array(reading.value.shape), reading.value
+    x, y = reading.slopes
+    moved = _by_point([[N, nothing, nothing], [nothing, N, nothing]])
+    strained = _by_point([[x, nothing, nothing], [nothing, y, nothing], [y / 2, x / 2, nothing]])
+    return moved, strained
+
+
+def _by_point(blocks: list[list[sparse.csr_array]]) -> sparse.csr_array:
+    """Operator (c p, 3 n), components of a point next to each other, from blocks (p, n) by its
+    components and by those of the displacement.
+    """
+    rows, (p, n) = len(blocks), blocks[0][0].shape
+    whole = sparse.block_array(blocks, format="csr")
+    by_point = np.arange(rows * p).reshape(rows, p).T.ravel()
+    by_node = np.arange(3 * n).reshape(3, n).T.ravel()
+    return whole[by_point][:, by_node].tocsr()
+
+
+def _located(places: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Floats]:
+    """Triangle (p,) of each point, and its barycentric coordinates (p, 3)."""
+    corners = places[triangles[:, :3]]
+    edges = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
+    inverse = np.linalg.inv(edges)
+    owner, inner = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    for p, point in enumerate(points):
+        local = np.einsum("eij,ej->ei", inverse, point - corners[:, 0])
+        coordinates = np.column_stack([1 - local.sum(axis=1), local])
+        owner[p] = coordinates.min(axis=1).argmax()
+        inner[p] = coordinates[owner[p]]
+        if inner[p].min() < -ON_EDGE:
+            x, y = 1e3 * point
+            raise ValueError(f"point ({x:g}, {y:g}) mm is off the sheet; move it inside")
+    return owner, inner
+
+
+def _fits(
+    places: Floats, part: Part, owner: Ints, points: Floats
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
+    """Value (p, e q) at each point, and its derivatives along x and y, of the polynomial that fits
+    values at the quadrature points of the triangles about it.
+    """
+    barycentric, _ = triangle_rule(2)
+    N = shape_functions(barycentric, part.nodes.shape[1])
+    samples = np.einsum("qa,eai->eqi", N, places[part.nodes])
+    many, corners = samples.shape[1], part.nodes[:, :3]
+    rows, columns, found = [], [], []
+    for p, point in enumerate(points):
+        core = np.isin(corners, corners[owner[p]]).any(axis=1)
+        patch = np.flatnonzero(np.isin(corners, corners[core]).any(axis=1))
+        size = np.ptp(places[corners[patch]], axis=1).mean()
+        away = ((samples[patch] - point) / size).reshape(-1, 2)
+        fit, _ = fitted_polynomial(away, np.exp(-LOCAL / 2 * (away**2).sum(axis=1)))
+        found.append(fit[:3] / np.array([[1.0], [size], [size]]))
+        columns.append((many * patch[:, None] + np.arange(many)).ravel())
+        rows.append(np.full(len(columns[-1]), p))
+    shape, at = (len(points), many * len(corners)), (np.concatenate(rows), np.concatenate(columns))
+    values = np.concatenate(found, axis=1)
+    fit, along_x, along_y = (sparse.csr_array((each, at), shape=shape) for each in values)
+    return fit, along_x, along_y

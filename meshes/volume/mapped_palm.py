@@ -1,0 +1,156 @@
+"""Palm as a mapped structured mesh: a grid of boxes wrapped into its rounded outline and rim.
+
+Needs no mesher, is the same in every run, and its elements follow the top and the base. In the
+plan, concentric rectangles become rectangles whose corners get rounder outwards; in the section of
+the rim likewise; then the nodes of the boundary move onto the level set, which adds the relief, and
+take those inside along by transfinite interpolation (Gordon and Hall, Int J Numer Methods Eng
+7:461, 1973).
+"""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshes.shapes.kuhn import kuhn_tets
+from meshes.shapes.palm import Palm, gradient, level_set, rise
+from meshes.tetmesh import Floats, MeshError, TetMesh, corner_volumes
+from meshes.volume.palm_mesh import curved_palm
+from meshes.volume.quality import angles_between_faces
+from meshes.volume.tetrahedralise import SHARPEST
+
+INWARDS = 2.0  # power of the distance from the middle with which corners get sharper inwards
+RIM = 2.0  # thicknesses of half a palm from its outline inwards, in which boxes follow the rim
+LEAST = 0.3  # cosine between the normals of a palm with and without mounds
+STEPS = 8  # of Newton's method, onto mounds that lie as high as the palm is thick
+OFF = 1e-3  # of the thickness: how far a node of the boundary may miss the level set
+
+
+def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
+    """Ten-node tetrahedra of a palm whose boundary nodes lie on its true surface.
+
+    Parameters
+    ----------
+    palm : Palm
+    x, y, z : (n,) float, metre, increasing grid lines of the box around the palm without its
+        relief: from -breadth/2 to breadth/2, -length/2 to length/2 and -thickness to 0
+
+    Returns
+    -------
+    TetMesh with the facet sets of `palm_mesh`
+
+    Raises
+    ------
+    MeshError
+        If there are too many cells, or a relief that is too steep for them.
+    """
+    cells = (len(x) - 1, len(y) - 1, len(z) - 1)
+    tets = kuhn_tets(cells)
+    box = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
+    points = _onto_level_set(palm, _wrapped(palm, box)).reshape(-1, 3)
+    sharpest = _sharpest(points, tets)
+    off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
+    if sharpest < SHARPEST or off > OFF * palm.thickness:
+        raise MeshError(
+            f"a mapped mesh of this palm has a dihedral angle of {sharpest:.2g} degrees, the least "
+            f"that is accepted is {SHARPEST:g}, and misses its surface by {1e3 * off:.2g} mm; take "
+            "a lower relief or `palm_mesh`"
+        )
+    return curved_palm(palm, TetMesh(points=points, tets=tets))
+
+
+def _sharpest(points: Floats, tets: NDArray[np.int_]) -> float:
+    """Least dihedral angle in degrees; 0 if a tetrahedron is inverted."""
+    if corner_volumes(points, tets).min() <= 0:
+        return 0.0
+    return float(angles_between_faces(points, tets).min())
+
+
+def _wrapped(palm: Palm, box: Floats) -> Floats:
+    """Points (..., 3) of the box where they lie in a palm without mounds, bent to its cup."""
+    half = np.array([palm.breadth, palm.length]) / 2
+    across, middle = palm.thickness / 2, box[..., 2] + palm.thickness / 2
+    # Where a point lies between the middle (0) and the outline (1), of concentric rectangles.
+    level = np.abs(box[..., :2] / half).max(axis=-1)
+    width = min(half.min(), RIM * across)
+    beyond = width - (1 - level) * half.min()  # the inner edge of the rim
+    inner, height = _rounded(np.maximum(beyond, 0), middle, (width, across), palm.edge_radius)
+    in_rim = beyond > 0
+    moved = np.where(in_rim, 1 - (width - inner) / half.min(), level)
+    height = np.where(in_rim, height, middle)
+    plan = box[..., :2] * (moved / np.maximum(level, 1e-300))[..., None]
+    plan = np.stack(_rounded(plan[..., 0], plan[..., 1], half, palm.corner_radius), axis=-1)
+    return np.concatenate([plan, (height - across + rise(palm, plan))[..., None]], axis=-1)
+
+
+def _rounded(
+    x: Floats, y: Floats, half: tuple[float, float] | Floats, radius: float
+) -> tuple[Floats, Floats]:
+    """Points of a rectangle within one with round corners: of each concentric rectangle t times as
+    large, the sides and the quarter circles of t^2 times the radius are divided alike.
+    """
+    a, b = half
+    level = np.maximum(np.maximum(np.abs(x) / a, np.abs(y) / b), 1e-300)
+    on_x = np.abs(x) / a >= np.abs(y) / b  # points of the sides at constant x
+    r = radius * level**INWARDS
+    side = level * np.where(on_x, b, a)
+    straight = side - r
+    way = np.abs(np.where(on_x, y, x)) / side * (straight + np.pi / 4 * r)
+    angle = np.maximum(way - straight, 0) / np.maximum(r, 1e-300)
+    out = level * np.where(on_x, a, b) - r * (1 - np.cos(angle))
+    along = np.where(way <= straight, way, straight + r * np.sin(angle))
+    found = np.where(on_x, out, along), np.where(on_x, along, out)
+    return np.copysign(found[0], x), np.copysign(found[1], y)
+
+
+def _onto_level_set(palm: Palm, grid: Floats) -> Floats:
+    """Grid (i, j, k, 3) with the nodes of its boundary on the level set, and the others after
+    them.
+    """
+    outer = _on_boundary(tuple(n - 1 for n in grid.shape[:3]))
+    moved = np.zeros_like(grid)
+    moved[outer] = _raised(palm, grid[outer]) - grid[outer]
+    return grid + _transfinite(moved)
+
+
+def _raised(palm: Palm, points: Floats) -> Floats:
+    """Points (n, 3) of a palm without mounds, moved onto its surface along the normals that they
+    have there: along those of the mounds they would gather in the dips between them.
+    """
+    bare = replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
+    normals = gradient(bare, points)
+    for _ in range(STEPS):
+        steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
+        points = (
+            points - (level_set(palm, points) / np.maximum(steepness, LEAST))[:, None] * normals
+        )
+    return points
+
+
+def _on_boundary(cells: tuple[int, ...]) -> NDArray[np.bool_]:
+    outer = np.ones([n + 1 for n in cells], bool)
+    outer[1:-1, 1:-1, 1:-1] = False
+    return outer
+
+
+def _transfinite(values: Floats) -> Floats:
+    """Transfinite interpolation of values (i, j, k, ...) from the six sides of a grid: the Boolean
+    sum of the linear interpolations along each axis.
+    """
+    total = np.zeros_like(values)
+    for count in (1, 2, 3):
+        for axes in combinations(range(3), count):
+            part = values
+            for axis in axes:
+                part = _between_ends(part, axis)
+            total += (-1) ** (count + 1) * part
+    return total
+
+
+def _between_ends(values: Floats, axis: int) -> Floats:
+    """Linear interpolation along an axis between its ends."""
+    n = values.shape[axis]
+    share = np.linspace(0, 1, n).reshape([n if a == axis else 1 for a in range(values.ndim)])
+    first, last = (np.take(values, [end], axis=axis) for end in (0, n - 1))
+    return np.asarray((1 - share) * first + share * last)

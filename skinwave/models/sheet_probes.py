@@ -1,0 +1,134 @@
+"""Quantities at the probes of a thin sheet, from the middle plane of its mesh.
+
+Stress is that of Piola and Kirchhoff, the second, of the strain of Green and Lagrange: along the
+axes of the sheet, which turn with it, and at strains as small as those of paper Cauchy's there.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy import sparse
+
+import fem
+from fem.reduced_nonlinear import in_plane_matrices
+from fem.sheet_reading import (
+    SheetReading,
+    displacement_rows,
+    from_plane,
+    in_plane_rows,
+    modal_quadratic_strain,
+    quadratic_strain_at,
+    sheet_reading,
+    strain_rows,
+)
+from meshes import middle_plane
+from meshes.tetmesh import Floats
+from simple_model.material import Material
+from simple_model.quantities import STRAIN
+from skinwave.bodies.body import Body
+from skinwave.bodies.build import Build
+from skinwave.scene import Reading
+
+Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components (p c,)
+
+
+def sheet_rows(
+    body: Body, build: Build, probes: Floats, reading: Reading
+) -> tuple[sparse.csr_array, tuple[Material, ...]]:
+    """Rows of `probe_rows` for a sheet that bends, but for its normal motion.
+
+    Parameters
+    ----------
+    body : Body, a flat sheet
+    build : its mesh
+    probes : (p, 2) float, metre
+    reading : Reading
+
+    Returns
+    -------
+    (p c, 3 n) sparse, and the material at each probe
+    """
+    seen, asked = _seen(body, build, probes), reading.asked
+    below = np.broadcast_to(reading.depths or 0.0, len(probes))
+    heights, solid = body.depth / 2 - below, body.solid
+    linear = displacement_rows(seen, heights)
+    if asked.field == STRAIN:
+        linear = strain_rows(seen, heights, solid.poisson)
+    rows = sparse.kron(sparse.eye_array(len(probes)), asked.rows(solid), format="csr")
+    return (rows @ linear).tocsr(), (solid,) * len(probes)
+
+
+def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
+    """Function of the displacement (3 n,) of all nodes of a sheet that bends and stretches.
+
+    Parameters
+    ----------
+    body, build, probes, reading : as of `sheet_rows`
+
+    Returns
+    -------
+    function to components (p c,)
+    """
+    if reading.asked.is_normal:
+        normal = fem.probe_operator(build.mesh, probes)
+        return lambda u: normal @ u
+    (rows, _), seen = sheet_rows(body, build, probes, reading), _seen(body, build, probes)
+    moved, strained = in_plane_rows(seen)
+    own = reading.asked.rows(body.solid)
+    if reading.asked.field != STRAIN:
+        return lambda u: rows @ u + ((moved @ u).reshape(-1, 2) @ own[:, :2].T).ravel()
+    plane = own @ from_plane(body.solid.poisson)
+
+    def read(u: Floats) -> Floats:
+        stretched = (strained @ u).reshape(-1, 3) + quadratic_strain_at(seen, u)
+        return np.asarray(rows @ u + (stretched @ plane.T).ravel())
+
+    return read
+
+
+def modal_reader(
+    body: Body,
+    build: Build,
+    modes: fem.StretchingModes,
+    operators: fem.Operators,
+    probes: Floats,
+    reading: Reading,
+    solver: str,
+) -> Reader:
+    """Function of the coordinates (r,) of bending modes, with the in-plane motion that follows.
+
+    Parameters
+    ----------
+    body, build, probes, reading : as of `sheet_rows`
+    modes : StretchingModes, of the sheet
+    operators : those of the sheet, whose constraints in its plane are taken
+    solver : of `fem.factorise`
+
+    Returns
+    -------
+    function to components (p c,)
+    """
+    asked = reading.asked
+    if asked.is_normal:
+        normal = fem.probe_operator(build.mesh, probes) @ modes.basis
+        return lambda z: normal @ z
+    (rows, _), seen = sheet_rows(body, build, probes, reading), _seen(body, build, probes)
+    moved, strained = in_plane_rows(seen)
+    by_strain = asked.field == STRAIN
+    Q = in_plane_matrices(
+        seen, modes.basis, strained if by_strain else moved, operators, solver=solver
+    ).reshape(len(probes), 3 if by_strain else 2, *(2 * modes.basis.shape[1:]))
+    own = asked.rows(body.solid)[:, :2]
+    if by_strain:
+        Q = Q + modal_quadratic_strain(seen, modes.basis)
+        own = asked.rows(body.solid) @ from_plane(body.solid.poisson)
+    linear = rows @ modes.basis
+    Q = np.einsum("ca,pamn->pcmn", own, Q).reshape(-1, *Q.shape[2:])
+    return lambda z: linear @ z + (Q @ z) @ z / 2
+
+
+def _seen(body: Body, build: Build, probes: Floats) -> SheetReading:
+    membrane = fem.Membrane(
+        triangles=middle_plane(build.mesh), thickness=body.depth, material=body.solid
+    )
+    return sheet_reading(build.mesh, membrane, probes)

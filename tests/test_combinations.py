@@ -1,0 +1,87 @@
+"""Damping and relaxing stiffness as combinations of K and M."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+from fem.boundary import Support
+from fem.load_and_probe import facet_points
+
+PALM = fem.PRESETS["palm"]
+LOSSY = replace(PALM, loss_factor=0.2)
+
+
+def block(material):
+    """On springs below, with dashpots at its sides, of one material; and the same as two alike."""
+    mesh = meshes.block((0.03, 0.03, 0.015), 0.0075)
+    below = np.linspace(0, 2e7, len(facet_points(mesh, "bottom")))
+    rest = Support(facets=mesh.facets["bottom"], stiffness=below, absorbed=0 * below)
+    given = {"fixed": {}, "absorbing": "sides", "support": rest}
+    halves = replace(mesh, region=np.arange(len(mesh.tets)) % 2)
+    return (
+        mesh,
+        fem.assemble(mesh, material, **given),
+        fem.assemble(halves, {0: material, 1: material}, **given),
+    )
+
+
+def same(one, other):
+    return abs(one - other).max() < 1e-10 * abs(other).max()
+
+
+@pytest.mark.parametrize("material", [PALM, LOSSY, fem.PRESETS["palm-zener"]])
+def test_they_are_the_matrices_that_are_assembled_part_by_part(material):
+    """K of two materials alike has macroelements of its own where it is projected."""
+    material = replace(material, poisson=0.45)
+    _, one, parts = block(material)
+    assert one.laws
+    assert parts.laws is None
+    assert one.laws.damping.rest.nnz
+    for name in "KCMR":
+        assert same(getattr(one, name), getattr(parts, name))
+    assert [b.time for b in one.branches] == [b.time for b in parts.branches]
+    assert all(same(a.K, b.K) for a, b in zip(one.branches, parts.branches, strict=True))
+
+
+@pytest.mark.parametrize("material", [PALM, LOSSY, fem.PRESETS["palm-zener"]])
+def test_moments_without_products_are_those_with_them(material):
+    mesh, ops, _ = block(material)
+    S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
+    F = fem.load_operator(mesh) @ np.random.default_rng(0).random((len(facet_points(mesh)), 3))
+    found, plain = (
+        fem.reduce(each, S, 500.0, 1e-6, loads=F) for each in (ops, replace(ops, laws=None))
+    )
+    assert found.moments == plain.moments
+    one, other = (
+        fem.transfer(model, model.basis.T @ F, [10.0, 250.0, 500.0]) for model in (found, plain)
+    )
+    np.testing.assert_allclose(one, other, atol=1e-8 * np.abs(other).max())
+    basis = found.basis[ops.free]
+    for name in "KCR":
+        np.testing.assert_allclose(
+            basis.T @ (getattr(ops, name) @ basis), getattr(found, name),
+            atol=1e-9 * np.abs(getattr(found, name)).max(),
+        )  # fmt: skip
+    np.testing.assert_allclose(basis.T @ (ops.M @ basis), np.eye(len(found.K)), atol=1e-10)
+    for full, small in zip(ops.branches, found.branches, strict=True):
+        np.testing.assert_allclose(
+            basis.T @ (full.K @ basis), small.K, atol=1e-9 * np.abs(small.K).max()
+        )
+
+
+def test_combinations_of_replaced_matrices_are_not_used():
+    mesh, ops, _ = block(PALM)
+    stiffer = replace(ops, K=2 * ops.K)
+    damped = replace(ops, C=ops.C + 1e-3 * abs(ops.C).max() / abs(ops.M).max() * ops.M)
+    assert ops.laws.hold(ops.K, ops.C, ops.M, ops.branches)
+    S = fem.probe_operator(mesh, [[0.0, 0.0]])
+    for changed in (stiffer, damped):
+        assert not ops.laws.hold(changed.K, changed.C, changed.M, changed.branches)
+        found, plain = (fem.reduce(o, S, 300.0) for o in (changed, replace(changed, laws=None)))
+        np.testing.assert_allclose(
+            fem.transfer(found, found.outputs.T, [200.0]),
+            fem.transfer(plain, plain.outputs.T, [200.0]), rtol=1e-6,
+        )  # fmt: skip
