@@ -37,7 +37,7 @@ def air_mass(x: LineBasis, y: LineBasis, density: float) -> Floats:
     -------
     (x y, x y) kg/m2, the index of y the faster
     """
-    highest = max(2 * len(line.legendre) / line.length for line in (x, y))
+    highest = max(2 * line.legendre[..., 0].size / line.length for line in (x, y))
     nearest, farthest = NEAREST / highest, FARTHEST * max(x.length, y.length)
     distances = np.exp(np.arange(np.log(nearest), np.log(farthest), STEP))
     weights = 2 / np.sqrt(np.pi) * STEP * distances
@@ -48,7 +48,7 @@ def air_mass(x: LineBasis, y: LineBasis, density: float) -> Floats:
     mass = products.transpose(0, 2, 1, 3).reshape(n, n)
     # What the rule has below its first node: half of a step is in its weight.
     below = 2 / np.sqrt(np.pi) * nearest * (1 / (np.exp(STEP) - 1)) * STEP
-    mass[np.diag_indices(n)] += below
+    mass += below * np.kron(x.mass, y.mass)
     return np.asarray(2 * density * mass)
 
 
@@ -58,12 +58,36 @@ def smoothed(line: LineBasis, t: float) -> Floats:
     # Products of the transforms have no part beyond twice the line's length.
     spacing = np.pi / (1 + DECAYED * tau)
     kappa = (np.arange(int(np.ceil(DECAYED / tau / spacing)) + 1) + 0.5) * spacing
-    n = np.arange(len(line.legendre))
-    bessel = spherical_jn(n[:, None], kappa) * np.sqrt(2 * n + 1)[:, None]
-    sign = np.where(n // 2 % 2, -1.0, 1.0)
     weight = 2 / np.pi * spacing * np.exp(-((kappa * tau) ** 2))
-    total = np.zeros((line.size, line.size))
-    for part in (slice(0, None, 2), slice(1, None, 2)):  # real and imaginary transforms
-        transform = (line.legendre[part] * sign[part, None]).T @ bessel[part]
-        total += (transform * weight) @ transform.T
-    return total
+    return np.asarray(
+        sum((part * weight) @ part.T for part in _transforms(line, np.asarray(kappa, np.float64)))
+    )
+
+
+def _transforms(line: LineBasis, kappa: Floats) -> tuple[Floats, Floats]:
+    """Real and imaginary parts (i, k) of the Fourier transforms at wavenumbers 2 kappa / a (k,),
+    over sqrt(a) of the line's length a.
+    """
+    real, imaginary = np.zeros((2, line.size, len(kappa)))
+    parts, middles = np.diff(line.breaks) / line.length, (line.breaks[1:] + line.breaks[:-1]) / 2
+    used = [1 + int(np.flatnonzero(piece.any(axis=1)).max(initial=0)) for piece in line.legendre]
+    known: dict[tuple[float, int], Floats] = {}  # pieces are alike
+    for coefficients, part, middle, n in zip(line.legendre, parts, middles, used, strict=True):
+        key = round(float(part), 9), n
+        if key not in known:
+            known[key] = _legendre_transforms(n, part, kappa)
+        # (-i)^n is real for even n, imaginary for odd n.
+        even, odd = (coefficients[k:n:2].T @ known[key][k::2] for k in (0, 1))
+        turn = 2 * middle / line.length * kappa
+        real += even * np.cos(turn) - odd * np.sin(turn)
+        imaginary -= even * np.sin(turn) + odd * np.cos(turn)
+    return real, imaginary
+
+
+def _legendre_transforms(count: int, part: float, kappa: Floats) -> Floats:
+    """Fourier transforms (n, k) of the first orthonormal Legendre polynomials of a part of a line
+    about its middle, over the factor -i of odd ones.
+    """
+    n = np.arange(count)
+    sign = np.where(n // 2 % 2, -1.0, 1.0) * np.sqrt((2 * n + 1) * part)
+    return np.asarray(sign[:, None] * spherical_jn(n[:, None], part * kappa))

@@ -6,31 +6,33 @@ Plates (1969), eqs. 9.4 and 10.1; orthotropic: Timoshenko and Woinowsky-Krieger,
     2 U = iint D11 w_xx^2 + 2 D12 w_xx w_yy + D22 w_yy^2 + 4 D66 w_xy^2 + Tx w_x^2 + Ty w_y^2 dA
     2 T = w^2 iint m w^2 dA + w^2 rho/pi iint iint w(x) w(y) / |x - y| dA dA
 
-X_i and Y_j are orthonormal combinations of Legendre polynomials that meet the supports of the
-edges; what a free edge asks follows from the energies. Where a plate is the same on both sides of
-its middle, even and odd modes are found apart. The second term of T is the air on both sides of a
-plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
+X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; what a
+free edge asks follows from the energies. A clip holds a square: between its sides the polynomials
+are their own, and products that would move it are left out. Where a plate is the same on both sides
+of its middle, even and odd modes are found apart. The second term of T is the air on both sides of
+a plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy import linalg
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, sparse
 
 from simple_model.compliance import AIR_DENSITY
 from simple_model.material import Complex, Floats
 from simple_model.plate_air import air_mass
-from simple_model.polynomials import LineBasis, line_basis
+from simple_model.polynomials import LineBasis, line_basis, piecewise_basis
 
 SUPPORTS = ("clamped", "simply", "free")
 FINEST = 350.0  # rad/m: beyond it a focal spot of 4.35 mm has a third of its force
 MARGIN = 8  # polynomials beyond those that a wavenumber requires
-# A clip is its middle and a ring of points without deflection, which may turn: as stiff as a disc
-# that is clamped, to 1.5 % in frequency, if the ring is a little larger.
-RING, WIDER = 8, 1.2
+BESIDE = 3  # the same of pieces between the sides of clips
+NEARLY = 0.01  # of a clip's radius: a side of it so near another, or an edge of the plate, is there
+LAYER = 0.1  # of a clip's radius, beside its sides
+SHIFT = 1e-12  # of the mean squared frequency
 MOST_DOFS = 6000  # of one symmetry: some minutes
 
 
@@ -47,7 +49,7 @@ class Plate:
     left, right, front, back : "clamped", "simply" or "free", the edges of least and greatest x, of
         least and greatest y
     clips : ((x, y), ...) metre, where the plate is fixed
-    clip_radius : metre, within which it is, and its slope with it; 0 fixes the deflection alone
+    clip_radius : metre, half a side of the square that is; 0 fixes the deflection of a point alone
     air_density : kg/m3, 0 in vacuum
 
     Raises
@@ -168,15 +170,8 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
     ValueError
         If that takes more than `MOST_DOFS` degrees of freedom.
     """
-    resolved = np.broadcast_to(finest, 2)
-    bases = [
-        line_basis(size, ends, int(np.ceil(k * size / 2)) + MARGIN, split)
-        for k, size, ends, split in zip(
-            resolved, (plate.size_x, plate.size_y),
-            ((plate.left, plate.right), (plate.front, plate.back)),
-            _symmetries(plate), strict=True,
-        )
-    ]  # fmt: skip
+    resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
+    bases = [_line_bases(plate, axis, resolved[axis], mirrored[axis]) for axis in (0, 1)]
     if (dofs := max(x.size * y.size for x, y in product(*bases))) > MOST_DOFS:
         raise ValueError(
             f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm takes {dofs:,} "
@@ -227,17 +222,51 @@ def _symmetries(plate: Plate) -> tuple[bool, bool]:
     )
 
 
+def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple[LineBasis, ...]:
+    """Functions along x or y that resolve a wavenumber in rad/m, on pieces between the sides of
+    clips.
+    """
+    size = (plate.size_x, plate.size_y)[axis]
+    ends = ((plate.left, plate.right), (plate.front, plate.back))[axis]
+    if not (inner := _breaks(plate, axis, size)):
+        return line_basis(size, ends, int(np.ceil(finest * size / 2)) + MARGIN, mirrored)
+    breaks = np.array([-size / 2, *inner, size / 2])
+    degrees = [int(np.ceil(finest * piece / 2)) + BESIDE for piece in np.diff(breaks)]
+    return piecewise_basis(breaks, ends, degrees, mirrored)
+
+
+def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
+    """Sides of the clips along an axis that are within the plate, in metre, and lines beside them:
+    at the corners of a clip the curvature has no bound.
+    """
+    reach = plate.clip_radius
+    sides = [clip[axis] + turn * reach for clip in plate.clips for turn in (-1, 1) if reach]
+    kept = _apart([], sides, size / 2, NEARLY * reach)
+    beside = [at + turn * LAYER * reach for at in kept for turn in (-1, 1)]
+    return sorted(_apart(kept, beside, size / 2, LAYER * reach / 2))
+
+
+def _apart(kept: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
+    """Places and those of others that are farther than a gap from them and from both ends."""
+    found = [-end, *kept, end]
+    for place in sorted(others, key=abs):
+        if abs(place) < end and all(abs(place - each) > gap for each in found):
+            found.append(place)
+    return [place for place in found if abs(place) < end]
+
+
 def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     bending, stretching = _stiffness(plate, x, y)
-    mass = plate.mass_per_area * np.eye(x.size * y.size)
+    mass = np.asarray(plate.mass_per_area * np.kron(x.mass, y.mass), np.float64)
     if plate.air_density:
         mass += air_mass(x, y, plate.air_density)
     K = bending if stretching is None else bending + stretching
     free = _free_of_clips(plate, x, y)
     if free is None:
-        squared, shapes = linalg.eigh(K, mass, check_finite=False, overwrite_b=True)
+        squared, shapes = _modes(K, mass)
     else:
-        squared, shapes = linalg.eigh(free.T @ K @ free, free.T @ mass @ free, check_finite=False)
+        held = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
+        squared, shapes = _modes(*held)
         shapes = free @ shapes
     elastic = np.ones(len(squared))
     if stretching is not None:
@@ -248,40 +277,53 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     )
 
 
+def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
+    """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending.
+
+    Of M x = K x / w^2, as the error of eigenvalues goes with the largest: narrow pieces have
+    frequencies that are 1e7 of the lowest. A rigid plate's, 0, are shifted.
+    """
+    shift = SHIFT * np.trace(K) / np.trace(M)
+    inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)
+    inverse = np.maximum(inverse[::-1], np.finfo(float).eps * inverse[-1])
+    return 1 / inverse - shift, shapes[:, ::-1] / np.sqrt(inverse)
+
+
 def _stiffness(plate: Plate, x: LineBasis, y: LineBasis) -> tuple[Floats, Floats | None]:
     """Stiffness (n, n) in N/m per kg/m2 of bending, and of tension if there is any."""
-    one_x, one_y = np.eye(x.size), np.eye(y.size)
     cross = np.kron(x.mixed, y.mixed.T)
     bending = (
-        np.kron(plate.d11 * x.curvature, one_y)
-        + np.kron(one_x, plate.d22 * y.curvature)
+        np.kron(plate.d11 * x.curvature, y.mass)
+        + np.kron(x.mass, plate.d22 * y.curvature)
         + plate.d12 * (cross + cross.T)
         + np.kron(4 * plate.d66 * x.slope, y.slope)
     )
     if not (plate.tension_x or plate.tension_y):
         return bending, None
     along, across = plate.tension_x * x.slope, plate.tension_y * y.slope
-    return bending, np.kron(along, one_y) + np.kron(one_x, across)
+    return bending, np.kron(along, y.mass) + np.kron(x.mass, across)
 
 
-def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> Floats | None:
-    """Orthonormal basis (n, r) of what leaves the clips at rest; None without clips."""
+def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array | Floats | None:
+    """Basis (n, r) of what leaves the clips at rest; None without clips."""
     if not plate.clips:
         return None
-    points = np.array(list(_fixed_points(plate)))
-    rows = np.einsum("pi,pj->pij", x(points[:, 0]), y(points[:, 1])).reshape(len(points), -1)
+    if plate.clip_radius:
+        return sparse.csr_array(np.eye(x.size * y.size)[:, _outside(plate, x, y)])
+    xs, ys = np.array(plate.clips).T
+    rows = np.einsum("pi,pj->pij", x(xs), y(ys)).reshape(len(xs), -1)
     _, strength, known = linalg.svd(rows, full_matrices=False)
     independent = known[strength > 1e-7 * max(strength[0], np.finfo(float).tiny)]
     everything, _ = linalg.qr(independent.T, mode="full")
     return np.asarray(everything[:, len(independent) :])
 
 
-def _fixed_points(plate: Plate) -> Iterator[Sequence[float]]:
-    """Points (2,) in metre of the middle and the ring of each clip, on the plate or its edge."""
-    half = np.array([plate.size_x, plate.size_y]) / 2
-    turn = 2 * np.pi * np.arange(RING) / RING
-    ring = WIDER * plate.clip_radius * np.column_stack([np.cos(turn), np.sin(turn)])
-    for clip in plate.clips:
-        yield clip
-        if plate.clip_radius:
-            yield from np.clip(clip + ring, -half, half)
+def _outside(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
+    """Products (n,) of functions that are zero on all clips."""
+    found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
+    for along, across in plate.clips:
+        moved = (
+            line.moved_within(at - reach, at + reach) for line, at in ((x, along), (y, across))
+        )
+        found &= ~np.outer(*moved)
+    return found.ravel()

@@ -1,13 +1,18 @@
-"""Orthonormal polynomials on a line that meet the supports of its ends, for Ritz's method.
+"""Polynomials on the pieces of a line that meet the supports of its ends, for Ritz's method.
 
-Combinations of Legendre polynomials P_n(2 x / a), of which n / (a / 2) resolves a wavenumber k.
+On one piece they are orthonormal combinations of Legendre polynomials P_n(2 x / a), of which
+n / (a / 2) resolves a wavenumber k. On several they are continuous with their slope, and each is
+zero on all pieces but one or two, so that what rests on a piece leaves some of them out: Hermite
+functions of the value and of the slope at each break, and bubbles within each piece (Babuska, Szabo
+and Katz, SIAM J Numer Anal 18:515 (1981)).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
 
 from simple_model.trajectory import Floats
 
@@ -17,14 +22,17 @@ FIXED: Mapping[str, tuple[int, ...]] = {"clamped": (0, 1), "simply": (0,), "free
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineBasis:
-    """Orthonormal functions u_i on a line of a `length` in metre, of one symmetry or of none.
+    """Functions u_i on the pieces of a line, of one symmetry or of none.
 
-    `legendre` (n, i): their coefficients in orthonormal Legendre polynomials. Integrals (i, i):
-    `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i'' u_k.
+    `breaks` (e + 1,) in metre from the middle: the ends of its pieces. `legendre` (e, n, i):
+    coefficients of each function in the orthonormal Legendre polynomials of each piece. Integrals
+    (i, i): `mass` of u_i u_k, `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i''
+    u_k.
     """
 
-    length: float
+    breaks: Floats
     legendre: Floats
+    mass: Floats
     slope: Floats
     curvature: Floats
     mixed: Floats
@@ -32,19 +40,37 @@ class LineBasis:
     @property
     def size(self) -> int:
         """How many functions there are."""
-        return self.legendre.shape[1]
+        return self.legendre.shape[2]
+
+    @property
+    def length(self) -> float:
+        """Length of the line, metre."""
+        return float(np.ptp(self.breaks))
 
     def __call__(self, x: Floats) -> Floats:
         """Values (p, i) in m^-1/2 at x (p,) in metre from the middle."""
-        n = np.arange(len(self.legendre))
-        polynomials = legendre.legvander(2 * np.asarray(x) / self.length, len(n) - 1)
-        return np.asarray(polynomials * np.sqrt((2 * n + 1) / self.length) @ self.legendre)
+        x = np.asarray(x, np.float64)
+        piece = np.searchsorted(self.breaks[1:-1], x)
+        low, size = self.breaks[piece], np.diff(self.breaks)[piece]
+        n = np.arange(self.legendre.shape[1])
+        polynomials = legendre.legvander(2 * (x - low) / size - 1, len(n) - 1)
+        polynomials *= np.sqrt((2 * n + 1) / size[:, None])
+        values = np.empty((len(x), self.size))
+        for e, coefficients in enumerate(self.legendre):
+            values[piece == e] = polynomials[piece == e] @ coefficients
+        return values
+
+    def moved_within(self, low: float, high: float) -> NDArray[np.bool_]:
+        """Functions (i,) that are not zero everywhere between two breaks, in metre."""
+        middles = (self.breaks[1:] + self.breaks[:-1]) / 2
+        within = (low < middles) & (middles < high)
+        return np.asarray((self.legendre[within] != 0).any(axis=(0, 1)))
 
 
 def line_basis(
     length: float, ends: Sequence[str], degree: int, split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions of a degree at most that meet the supports of both ends.
+    """Orthonormal functions on one piece that meet the supports of both ends.
 
     Parameters
     ----------
@@ -58,33 +84,129 @@ def line_basis(
     One basis, or that of even and that of odd functions
     """
     n = np.arange(degree + 1)
-    parts = [n[::2], n[1::2]] if split else [n]
-    return tuple(_basis(length, ends, degree, part) for part in parts)
+    breaks = np.array([-length / 2, length / 2])
+    return tuple(
+        _basis(breaks, _bubbles(degree, part, ends)[None])
+        for part in ([n[::2], n[1::2]] if split else [n])
+    )
 
 
-def _basis(length: float, ends: Sequence[str], degree: int, orders: np.ndarray) -> LineBasis:
+def piecewise_basis(
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
+) -> tuple[LineBasis, ...]:
+    """Functions that are continuous with their slope at the breaks of a line.
+
+    Parameters
+    ----------
+    breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
+    ends : two of "clamped", "simply", "free"
+    degrees : (e,) the highest of each piece, 3 or more
+    split : whether even and odd functions are apart, where both ends and all breaks are alike
+
+    Returns
+    -------
+    One basis, or that of even and that of odd functions
+    """
+    breaks = np.asarray(breaks, np.float64)
+    functions = np.stack([*_hermite(breaks, ends, degrees), *_inner(degrees)], axis=2)
+    if not split:
+        return (_basis(breaks, functions),)
+    return tuple(_basis(breaks, part) for part in _symmetric(functions))
+
+
+def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
+    """Basis of functions with coefficients (e, n, i), and their integrals."""
+    d = _derivative(coefficients.shape[1] - 1)
+    per_piece = (2 / np.diff(breaks))[:, None, None]
+    first = per_piece * (d @ coefficients)
+    second = per_piece * (d @ first)
+
+    def integral(u: Floats, v: Floats) -> Floats:
+        return np.asarray(np.einsum("eni,enj->ij", u, v, optimize=True))
+
+    return LineBasis(
+        breaks=breaks, legendre=coefficients, mass=integral(coefficients, coefficients),
+        slope=integral(first, first), curvature=integral(second, second),
+        mixed=integral(second, coefficients),
+    )  # fmt: skip
+
+
+def _hermite(breaks: Floats, ends: Sequence[str], degrees: Sequence[int]) -> Iterator[Floats]:
+    """Coefficients (e, n) of a function of each value and each slope at a break that is not fixed,
+    orthogonal to the bubbles.
+    """
+    sizes, last = np.diff(breaks), len(breaks) - 1
+    of_piece = [_end_functions(*each) for each in zip(degrees, sizes, strict=True)]
+    for k in range(last + 1):
+        end = ends[0] if k == 0 else ends[1] if k == last else "free"
+        for derivative in sorted({0, 1} - set(FIXED[end])):
+            found = np.zeros((last, max(degrees) + 1))
+            for piece, side in ((k - 1, 1), (k, 0)):
+                if 0 <= piece < last:
+                    found[piece, : degrees[piece] + 1] = of_piece[piece][2 * side + derivative]
+            yield found / np.linalg.norm(found)
+
+
+def _end_functions(degree: int, size: float) -> Floats:
+    """Coefficients (4, n) of the smallest polynomials of value 1 at the low end of a piece, of
+    slope 1 there, and of these at the high end; the other three are 0.
+    """
+    n = np.arange(degree + 1)
+    rows = np.array([_at_end(n, derivative, side) for side in (-1, 1) for derivative in (0, 1)])
+    scale = np.tile([np.sqrt(1 / size), np.sqrt(1 / size) * 2 / size], 2)
+    strength = np.linalg.norm(rows, axis=1)
+    return np.asarray(np.linalg.pinv(rows / strength[:, None]) / strength / scale).T
+
+
+def _inner(degrees: Sequence[int]) -> Iterator[Floats]:
+    """Coefficients (e, n) of the bubbles of each piece: those without value and slope at its ends,
+    orthonormal, each even or odd about its middle.
+    """
+    for piece, degree in enumerate(degrees):
+        n = np.arange(degree + 1)
+        for orders in (n[::2], n[1::2]):
+            for bubble in _bubbles(max(degrees), orders, ("clamped", "clamped")).T:
+                found = np.zeros((len(degrees), max(degrees) + 1))
+                found[piece] = bubble
+                yield found
+
+
+def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
+    """Even and odd combinations (e, n, i) of functions (e, n, k), each of whose mirror images is
+    one of them or its negative.
+    """
+    sign = np.where(np.arange(functions.shape[1]) % 2, -1.0, 1.0)
+    mirrored = functions[::-1] * sign[:, None]
+    overlap = np.einsum("eni,enj->ij", mirrored, functions, optimize=True)
+    image = np.argmax(np.abs(overlap), axis=0)
+    first = np.flatnonzero(image >= np.arange(len(image)))
+    both = [(functions + mirrored)[..., first], (functions - mirrored)[..., first]]
+    even, odd = (part[..., np.abs(part).max(axis=(0, 1)) > 1e-6] for part in both)
+    return even, odd
+
+
+def _bubbles(degree: int, orders: NDArray[np.int_], ends: Sequence[str]) -> Floats:
+    """Coefficients (n, i) up to a degree of orthonormal polynomials of some orders that meet the
+    supports of both ends.
+    """
     rows = [
-        _at_end(orders, derivative, side)
+        _unit(_at_end(orders, derivative, side))
         for end, side in zip(ends, (-1, 1), strict=True)
         for derivative in FIXED[end]
     ]
     coefficients = np.zeros((degree + 1, len(orders)))
     coefficients[orders, np.arange(len(orders))] = 1
-    coefficients = coefficients @ _null_space(np.array(rows).reshape(-1, len(orders)))
-    d = _derivative(degree)
-    first = 2 / length * d @ coefficients
-    second = (2 / length) ** 2 * d @ d @ coefficients
-    return LineBasis(
-        length=length, legendre=coefficients, slope=first.T @ first,
-        curvature=second.T @ second, mixed=second.T @ coefficients,
-    )  # fmt: skip
+    return np.asarray(coefficients @ _null_space(np.array(rows).reshape(-1, len(orders))))
 
 
-def _at_end(orders: np.ndarray, derivative: int, side: int) -> Floats:
-    """P_n or P_n' at -1 or 1, scaled alike."""
+def _at_end(orders: NDArray[np.int_], derivative: int, side: int) -> Floats:
+    """sqrt(2 n + 1) P_n or P_n' at -1 or 1."""
     n = orders.astype(float)
     value = np.sqrt(2 * n + 1) * float(side) ** (orders + derivative)
-    row = value * (n * (n + 1) / 2) ** derivative
+    return np.asarray(value * (n * (n + 1) / 2) ** derivative)
+
+
+def _unit(row: Floats) -> Floats:
     return np.asarray(row / np.linalg.norm(row))
 
 

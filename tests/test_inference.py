@@ -15,7 +15,7 @@ from skinwave.cli import main
 from skinwave.inference import assess, design, drive_laws, knowledge, table
 from skinwave.inference.conclusions import conclusions, readings, sheets, together
 from skinwave.inference.knowledge import Share, holds, pattern, region, told, variance_share
-from skinwave.inference.page import drawings, page
+from skinwave.inference.page import drawings, page, reading_table
 from skinwave.inference.scenes import scene_text
 from skinwave.models.plate_modes import plate_of
 from skinwave.scene_file import loads
@@ -55,8 +55,10 @@ def planted(count=400, seed=0):
             "vibration_over_thickness": rng.random(), "second_harmonic_db": -20.0,
             "M1_holds": int(candidate["drive"] in ("clipped", "compressed")), "M1_value": -40.0,
             "M2_holds": 1, "M2_value": 0.0, "M3_holds": int(rng.random() < 0.5), "M3_value": -30.0,
-            "M4_holds": int(rival < 0), "M4_value": rival, "M5_holds": int(rival < -20),
-            "M5_value": rival, "rival_db": [rival, rival - 1, rival - 2, rival - 3, rival - 8],
+            "M4_holds": int(rival < 0), "M4_value": rival, "M5_holds": int(rival < -19),
+            "M5_value": rival - 1, "multiple_db": [rival - 1] * 4 + [rival - 9],
+            "multiple_by_path_db": [rival - 9, rival - 5, rival - 1], "rival_of_mean_db": rival - 2,
+            "rival_db": [rival, rival - 1, rival - 2, rival - 3, rival - 8],
             "rival_by_path_db": by_path, "rival_line": "f_d", "rival_tacton": "am80-stm30",
             "tactons_highest": 3, "tactons_much_lower": 0,
         })  # fmt: skip
@@ -129,9 +131,23 @@ def test_claims_of_a_candidate_follow_from_its_lines():
     assert found["M2_holds"] == 1
     rivals = assess._rivals([*runs.values()])
     level = found["M4_value"]
-    assert level == found["M5_value"] == pytest.approx(max(rivals["rival_db"]))
+    assert level == pytest.approx(max(rivals["rival_db"]))
     assert level == pytest.approx(max(rivals["rival_by_path_db"]))
-    assert (found["M4_holds"], found["M5_holds"]) == (int(level < 0), int(level < -20))
+    assert found["M4_holds"] == int(level < 0)
+    # M5 is about 2 f_AM, 3 f_AM, ..., f_d, 2 f_d, ... alone; those of this sheet up to 1250 Hz.
+    by_frequency = {}
+    for name, tacton in tactons():
+        if tacton.am_frequency and tacton.trajectory.drawing_frequency:
+            own, d = tacton.am_frequency, tacton.trajectory.drawing_frequency
+            several = [k * own for k in range(2, 16)] + [k * d for k in range(1, 7)]
+            by_frequency[name] = max((at(name, f) / at(name, own)).max()
+                                     for f in several if f < 1250)  # fmt: skip
+    strongest = 20 * np.log10(max(by_frequency.values()))
+    assert found["M5_value"] == pytest.approx(strongest, abs=1e-4)
+    assert max(rivals["multiple_db"]) == pytest.approx(strongest, abs=1e-4)
+    assert max(rivals["multiple_by_path_db"]) == pytest.approx(strongest, abs=1e-4)
+    assert found["M5_holds"] == int(strongest < -20)
+    assert min(rivals["rival_db"]) <= rivals["rival_of_mean_db"] <= level
     worst = runs[rivals["rival_tacton"]]
     ratio = worst.lines[rivals["rival_line"]] / worst.lines["f_AM"]
     assert 20 * np.log10(ratio.max()) == pytest.approx(level)
@@ -150,7 +166,7 @@ def test_claims_of_a_candidate_follow_from_its_lines():
 def without_physics(candidate, release):
     """A row as of a candidate that was computed."""
     row = planted(1)[0] | {"key": design.name(candidate, release), **candidate}
-    return row | {"M5_value": 100 * candidate["loss_factor"], "error": None}
+    return row | {"M4_value": 100 * candidate["loss_factor"], "error": None}
 
 
 def test_tables_go_on_and_the_page_follows_from_the_table(tmp_path, capsys, monkeypatch):
@@ -256,28 +272,50 @@ def test_the_paragraph_says_what_the_table_holds():
     assert "M1 is decided by the drive law" in said
     assert "M2 always holds. " in said
     assert "M5 never holds." in said
+    four = np.logical_and.reduce([holds(rows, f"M{k}") for k in range(1, 5)])
+    lower = [sum(four & (np.array([r["M5_value"] for r in rows]) < bar)) for bar in (-10, -6)]
+    counts = [count or "none" for count in lower]
+    assert f"of all candidates {counts[0]} with 10 dB and {counts[1]} with 6 dB would" in said
+    also = [row["M5_value"] for row in rows if row["M3_holds"]]
+    assert f"or f_d is at {np.median(also):+.1f} dB in the median" in said
+    assert "M3 and M5 in 0 % (0 to" in said
     assert "f_d most often (100 %), on the path of 30 mm in 100 %" in said
     assert "goes most with the loss factor" in said
     assert "To know one thing more, the drive law" in said
     shown = [dict(row) for row in rows]
     for row in shown[:4]:
-        row |= {f"M{k}_holds": 1 for k in range(1, 6)} | {"M5_value": -25.0}
+        row |= {f"M{k}_holds": 1 for k in range(1, 6)} | {"M4_value": -25.0, "M5_value": -45.0}
     assert "Of 400 candidates 4 show all five claims, 1 % (0.27 to 2.5 %)." in conclusions(shown)[0]
     assert together(shown)[-1][1].held == 4
     best = sheets(shown)
     assert len({(row["size"], row["support"]) for row in best}) == 3
-    assert best[0]["M5_value"] == -25.0
-    found = {words: (m4.held, m5.held) for words, m4, m5 in readings(rows)}
-    level = np.array([row["M5_value"] for row in rows])
-    assert found["at all five points, on all paths"] == ((level < 0).sum(), (level < -20).sum())
-    assert found["at all five points, on the path of 10 mm"][0] == (level - 9 < 0).sum()
-    assert found["at any one of the points, on all paths"][0] == (level - 8 < 0).sum()
+    assert best[0]["M4_value"] == -25.0
+
+
+def test_claims_may_be_read_less_strictly():
+    rows = planted()
+    found, level = dict(readings(rows)), np.array([row["M4_value"] for row in rows])
+    np.testing.assert_allclose(found["all lines, at all five points, on all paths"], level)
+    at_any = found["all lines, at any one of the points, on all paths"]
+    np.testing.assert_allclose(at_any, level - 8)
+    np.testing.assert_allclose(found["all lines, in the root mean square over the points"],
+                               level - 2)  # fmt: skip
+    there = np.array([row["M3_holds"] for row in rows], bool)
+    alone = "multiples of f_AM and f_d alone, where M3 holds, at all five points, on all paths"
+    np.testing.assert_allclose(found[alone][there], level[there] - 1)
+    assert np.isinf(found[alone][~there]).all()
+    header, table = reading_table(rows)
+    assert header[1:] == ["highest", "6 dB above", "10 dB above", "20 dB above"]
+    assert table[0][1].startswith(f"{100 * (level < 0).mean():.2g} %")
 
 
 def test_a_search_stays_within_bounds_and_near_the_best():
     rows = planted(60)
     best = table.nearest(rows)
-    order = [(-sum(r[f"M{k}_holds"] for k in (1, 2, 3)), r["M5_value"]) for r in best]
+    order = [
+        (-sum(r[f"M{k}_holds"] for k in (1, 2, 3)), max(r["M4_value"], r["M5_value"] + 20))
+        for r in best
+    ]
     assert order == sorted(order)
     made = table.offspring(rows, 100, 1)
     assert made == table.offspring(rows, 100, 1)

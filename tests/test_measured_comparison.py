@@ -247,6 +247,9 @@ def test_claims_about_both_modulations():
     ]  # fmt: skip
     strong = claims_of(BOTH, plain | {"f_d": 1.05}, 1e-4)
     assert [strong[c][0] for c in ("S4", "M4", "M5")] == [FAILS] * 3
+    # M5 is about the multiples of f_AM and f_d, M4 about all lines.
+    paired = claims_of(BOTH, plain | {"f_d-f_AM": 1.5}, 1e-4)
+    assert [paired[c][0] for c in ("S4", "M4", "M5")] == [FAILS, FAILS, HOLDS]
     close = claims_of(BOTH, plain | {"f_d": 0.99}, 0.02)
     assert close["S4"][0] == UNDECIDED
     pairs = dict.fromkeys(FREQUENCIES, 0.0) | {"f_AM": 1.0}

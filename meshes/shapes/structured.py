@@ -6,7 +6,7 @@ makes neighbouring prisms cut their common side along the same diagonal, so that
 conforms without a search, and has the mirror symmetries of its grid.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import prod
@@ -59,7 +59,14 @@ class Grading:
 
 
 def sheet(
-    width: float, height: float, thickness: float, h: float, *, layers: int = 1, order: int = 2
+    width: float,
+    height: float,
+    thickness: float,
+    h: float,
+    *,
+    layers: int = 1,
+    order: int = 2,
+    planes: Sequence[Sequence[float]] = ((), ()),
 ) -> TetMesh:
     """Flat sheet with its edges in the facet set `clamped`.
 
@@ -69,12 +76,17 @@ def sheet(
     h : float, metre, largest side of a cell in the plane.
     layers : int, elements through the thickness.
     order : 1 or 2, four- or ten-node tetrahedra.
+    planes : two sequences of places in metre along x and along y, which grid lines meet.
 
     Returns
     -------
     TetMesh
     """
-    lines = (_even(width, h), _even(height, h), np.linspace(-thickness, 0.0, layers + 1))
+    x, y = (
+        with_planes(_even(size, h), wanted)
+        for size, wanted in zip((width, height), planes, strict=True)
+    )
+    lines = x, y, np.linspace(-thickness, 0.0, layers + 1)
     return _with_roles(extrude(*lines, order=order), clamped="sides")
 
 

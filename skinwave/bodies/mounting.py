@@ -14,6 +14,8 @@ EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # 
 SUPPORTS = ("clamped", "simply")
 STEEPEST = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
 FEWEST = 3  # columns of nodes in a clip: fewer let the sheet turn about it
+BESIDE = (0.1, 0.25, 0.5)  # of a clip's radius from its sides: lines of a mesh
+NEARLY = 0.01  # of a clip's radius: a side of it so near an edge of the sheet is there
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +26,8 @@ class Mounting:
     ----------
     edges : names of the `EDGES` that are held; in any order
     support : "clamped", or "simply": held edges may turn
-    clips : (x, y) in metre, middles of clips, which let nothing move within `clip_radius`
-    clip_radius : float, metre
+    clips : (x, y) in metre, middles of clips, squares along the sides in which nothing moves
+    clip_radius : float, metre, half a side of these squares
     tension_x, tension_y : float, N/m, uniform, 0 or above
     curl_x, curl_y : float, metre, how much higher than its edges the sheet is in the middle between
         left and right, and between front and back, as a parabola; it is unstressed
@@ -145,6 +147,33 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
             )
 
 
+def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
+    """Places of the sides of clips that are within a sheet, and of lines beside them, as the
+    curvature has no bound at their corners.
+
+    Parameters
+    ----------
+    mounting : Mounting
+    axis : 0 for x, 1 for y
+    size : metre, of the sheet along it
+
+    Returns
+    -------
+    Coordinates in metre, ascending
+    """
+    reach = mounting.clip_radius
+    sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]
+    found: list[float] = []
+    for part in (0.0, *BESIDE):
+        gap = (part / 2 or NEARLY) * reach
+        lines = {side + turn * part * reach for side in sides for turn in (-1, 1)}
+        found += [
+            at for at in sorted(lines, key=abs)
+            if abs(at) < size / 2 - gap and all(abs(at - other) > gap for other in found)
+        ]  # fmt: skip
+    return sorted(found)
+
+
 def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
     """Components (n, 3) of the nodes that supports hold, of a flat sheet or the part of it that
     symmetry leaves.
@@ -171,8 +200,8 @@ def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
 
 
 def _clipped(mesh: TetMesh, clip: Sequence[float], radius: float) -> NDArray[np.bool_]:
-    """Nodes (n,) in a clip: within its radius, and in the `FEWEST` nearest columns."""
-    away = np.hypot(*(mesh.points[:, :2] - clip).T)
+    """Nodes (n,) in a clip: in its square, and in the `FEWEST` nearest columns."""
+    away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])
     reach = np.partition(away[top], FEWEST - 1)[FEWEST - 1]
-    return away <= max(radius, reach) * (1 + 1e-9)
+    return away <= max(radius, reach) * (1 + NEARLY)

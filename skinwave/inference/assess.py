@@ -35,7 +35,9 @@ from skinwave.studies.claims import (
     CLAIMS,
     MUCH_LOWER,
     NEEDED,
+    multiple_levels,
     rival_levels,
+    rivals,
     strongest_rival,
 )
 from skinwave.studies.paper15 import tactons
@@ -48,6 +50,7 @@ TIMES = np.arange(2500) / 2500.0  # s: lines up to 1250 Hz, for 1 s
 CLAIMED = ("M1", "M2", "M3", "M4", "M5")
 # M4's sentence for a paper sheet adds velocity to displacement; S4 is the same of what is read.
 ASSESSED_AS = {"M4": "S4"}
+TINY = float(np.finfo(float).tiny)
 LINEAR = 0.5  # thicknesses: a plate that deflects further stretches
 
 
@@ -149,18 +152,33 @@ def _second_harmonic(run: Run) -> float:
 
 def _rivals(runs: list[Run]) -> dict[str, Any]:
     """Level of the strongest line other than f_AM under AM+STM, dB re f_AM: the largest at each
-    point and on each path, which line under which Tacton, and in how many Tactons it is below M4's
-    and M5's bar at all points.
+    point, on each path and in the root mean square over the points, which line under which Tacton,
+    and in how many Tactons it is below 0 dB at all points; the same of multiples of f_AM and f_d
+    alone, and in how many Tactons these are below M5's bar.
     """
     both = [run for run in runs if (run.is_am, run.is_stm) == BOTH]
-    levels = np.array([rival_levels(run) for run in both])
+    levels, of_multiples = (np.array([of(run) for run in both])
+                            for of in (rival_levels, multiple_levels))  # fmt: skip
     worst = levels.max(axis=1)
     strongest = both[int(np.argmax(worst))]
     sizes = np.array([run.scene.tacton.trajectory.size for run in both])
+
+    def by_path(found: Floats) -> list[float]:
+        return [float(found[sizes == size].max()) for size in np.unique(sizes)]
+
     return {
-        "rival_db": levels.max(axis=0).tolist(),
-        "rival_by_path_db": [float(worst[sizes == size].max()) for size in np.unique(sizes)],
+        "rival_db": levels.max(axis=0).tolist(), "rival_by_path_db": by_path(worst),
+        "multiple_db": of_multiples.max(axis=0).tolist(),
+        "multiple_by_path_db": by_path(of_multiples.max(axis=1)),
+        "rival_of_mean_db": max(map(_rival_of_mean, both)),
         "rival_line": strongest_rival(strongest)[0], "rival_tacton": strongest.tacton,
         "tactons_highest": int((worst < 0).sum()),
-        "tactons_much_lower": int((worst < MUCH_LOWER).sum()),
+        "tactons_much_lower": int((of_multiples.max(axis=1) < MUCH_LOWER).sum()),
     }  # fmt: skip
+
+
+def _rival_of_mean(run: Run) -> float:
+    """Level of the strongest line other than f_AM in the root mean square over the points, dB."""
+    rms = {name: float(np.sqrt(np.mean(run.lines[name] ** 2))) for name in rivals(run)}
+    own = float(np.sqrt(np.mean(run.lines["f_AM"] ** 2)))
+    return 20 * float(np.log10(max(*rms.values(), TINY) / own))

@@ -32,6 +32,7 @@ from skinwave.studies.paper15 import PATHS
 
 SHEETS = 3  # that are shown
 CERTAIN = 0.5  # of a claim's entropy: a parameter that takes this away decides it
+BARS = (-10.0, -6.0)  # dB, of M5
 SIZES = tuple(f"{1e3 * size:g} mm" for size, _ in PATHS if size)
 
 
@@ -85,20 +86,31 @@ def decider(rows: Sequence[Row], mask: Mask) -> Told | None:
     return best if best.bits > 0 else None
 
 
-def readings(rows: Sequence[Row]) -> list[tuple[str, Share, Share]]:
-    """Shares of rows in which M4 and M5 hold if they are read less strictly: words, M4, M5."""
-    by_point = np.array([row["rival_db"] for row in rows])
-    by_path = np.array([row["rival_by_path_db"] for row in rows])
-
-    def both(levels: Floats) -> tuple[Share, Share]:
-        return share(levels < 0), share(levels < MUCH_LOWER)
-
-    found = [("at all five points, on all paths", *both(by_path.max(axis=1)))]
-    found += [(f"at all five points, on the path of {size}", *both(level))
+def readings(rows: Sequence[Row]) -> list[tuple[str, Floats]]:
+    """Levels (r,) in dB re f_AM of the strongest other line if the claims are read less strictly,
+    by words; not finite where M3 fails, of the multiples that it is about.
+    """
+    by_point, by_path = _levels(rows, "rival_db"), _levels(rows, "rival_by_path_db")
+    found = [("all lines, at all five points, on all paths", by_path.max(axis=1))]
+    found += [(f"the same on the path of {size}", level)
               for size, level in zip(SIZES, by_path.T, strict=True)]  # fmt: skip
-    found += [(f"at point {k} alone, on all paths", *both(level))
+    found += [(f"all lines, at point {k} alone, on all paths", level)
               for k, level in enumerate(by_point.T, 1)]  # fmt: skip
-    return [*found, ("at any one of the points, on all paths", *both(by_point.min(axis=1)))]
+    found.append(("all lines, at any one of the points, on all paths", by_point.min(axis=1)))
+    found.append(("all lines, in the root mean square over the points",
+                  np.array([row["rival_of_mean_db"] for row in rows])))  # fmt: skip
+    without = np.where(holds(rows, "M3"), 0.0, np.inf)
+    by_path = _levels(rows, "multiple_by_path_db") + without[:, None]
+    words = "multiples of f_AM and f_d alone, where M3 holds"
+    found.append((f"{words}, at all five points, on all paths", by_path.max(axis=1)))
+    found += [(f"the same on the path of {size}", level)
+              for size, level in zip(SIZES, by_path.T, strict=True)]  # fmt: skip
+    at_any = _levels(rows, "multiple_db").min(axis=1) + without
+    return [*found, (f"{words}, at any one of the points", at_any)]
+
+
+def _levels(rows: Sequence[Row], column: str) -> Floats:
+    return np.array([row[column] for row in rows])
 
 
 def _percent(x: float) -> str:
@@ -112,6 +124,7 @@ def _all_five(fair: Sequence[Row], more: Sequence[Row]) -> str:
     said += f", {in_percent(found)}." if found.held else f" (below {_percent(high)} %)."
     if also.of:
         said += f" A search of {also.of:,} more near the best of them found {also.held or 'none'}."
+    said += _with_other_bars(fair, more)
     best = nearest([*fair, *more])[0]
     shown = [claim for claim in CLAIMED if best[f"{claim}_holds"]]
     return (
@@ -119,12 +132,21 @@ def _all_five(fair: Sequence[Row], more: Sequence[Row]) -> str:
     )
 
 
+def _with_other_bars(fair: Sequence[Row], more: Sequence[Row]) -> str:
+    """How many show all five if "much lower" is less than 20 dB: the paper has no number."""
+    rows = [row for row in (*fair, *more) if all(row[f"{claim}_holds"] for claim in CLAIMED[:4])]
+    at = [(bar, sum(row["M5_value"] < bar for row in rows)) for bar in BARS]
+    counts = " and ".join(f"{count or 'none'} with {-bar:g} dB" for bar, count in at)
+    return f' "Much lower" is {-MUCH_LOWER:g} dB here; of all candidates {counts} would.'
+
+
 def _each(fair: Sequence[Row]) -> str:
     each = [f"{claim} in {in_percent(share(holds(fair, claim)))}" for claim in CLAIMED]
     three = together(fair)[2][1]
+    both = share(holds(fair, "M3") & holds(fair, "M5"))
     return (
         f"{', '.join(each[:-1])} and {each[-1]} of them; M1, M2 and M3 together in "
-        f"{in_percent(three)}."
+        f"{in_percent(three)}, M3 and M5 in {in_percent(both)}."
     )
 
 
@@ -155,7 +177,7 @@ def _where(found: Region) -> str:
 
 
 def _rivals(fair: Sequence[Row]) -> str:
-    levels = np.array([row["M5_value"] for row in fair])
+    levels = np.array([row["M4_value"] for row in fair])
     lines, counts = np.unique([row["rival_line"] for row in fair], return_counts=True)
     paths = np.argmax([row["rival_by_path_db"] for row in fair], axis=1)
     common, largest = int(np.argmax(counts)), int(np.bincount(paths).argmax())
@@ -166,8 +188,19 @@ def _rivals(fair: Sequence[Row]) -> str:
         f"The strongest rival of f_AM is {lines[common]} most often "
         f"({_percent(counts[common] / len(fair))} %), on the path of {SIZES[largest]} in "
         f"{_percent(on_path.value)} %; its level is {median} dB in the median and {least} dB at "
-        f"the least, where M5 asks for {MUCH_LOWER:g} dB, and goes most with the {tells.words} "
-        f"({_percent(variance_share(fair, levels, tells))} % of its variance)."
+        f"the least, where M4 asks for 0 dB, and goes most with the {tells.words} "
+        f"({_percent(variance_share(fair, levels, tells))} % of its variance). {_multiples(fair)}"
+    )
+
+
+def _multiples(fair: Sequence[Row]) -> str:
+    there = [row["M5_value"] for row in fair if row["M3_holds"]]
+    if not there:
+        return "No candidate shows M3."
+    median, least = (decibel(float(x), signed=True) for x in (np.median(there), min(there)))
+    return (
+        f"Where M3 holds, the strongest multiple of f_AM or f_d is at {median} dB in the median "
+        f"and {least} dB at the least, where M5 asks for {MUCH_LOWER:g} dB."
     )
 
 
@@ -221,4 +254,4 @@ def _value(p: Parameter, row: Row) -> str:
 
 
 def _level(row: Row) -> str:
-    return decibel(float(row["M5_value"]), signed=True)
+    return decibel(float(row["M4_value"]), signed=True)

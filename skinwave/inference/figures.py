@@ -61,7 +61,7 @@ def decision_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
     for claim in claims:
         by_key = {t.parameter.key: t.fraction for t in told(rows, holds(rows, claim).astype(int))}
         columns.append([by_key[p.key] for p in PARAMETERS])
-    levels = np.array([row["M5_value"] for row in rows])
+    levels = np.array([row["M4_value"] for row in rows])
     columns.append([variance_share(rows, levels, p) for p in PARAMETERS])
     table = 100 * np.array(columns).T
     with mpl.rc_context(style.rc):
@@ -90,6 +90,8 @@ def rival_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
             ax.step(np.sort(levels), part, where="post", color=colour, label=f"path of {size}")
         worst = np.sort(by_path.max(axis=1))
         ax.step(worst, part, where="post", color="black", lw=2, label="all paths")
+        multiples = np.sort([row["M5_value"] for row in rows])
+        ax.step(multiples, part, where="post", color="black", ls="--", label="multiples alone")
         for limit, words in ((0.0, "M4 asks"), (MUCH_LOWER, "M5 asks")):
             ax.axvline(limit, color="grey", ls=":")
             ax.text(limit, 101, words, ha="center", va="bottom", fontsize="small", color="grey")
@@ -103,7 +105,7 @@ def rival_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
 
 def region_figure(rows: Sequence[Row], style: Style = REPORT) -> Figure:
     """Level of the strongest rival over each parameter: median, and the middle half."""
-    levels = np.array([row["M5_value"] for row in rows])
+    levels = np.array([row["M4_value"] for row in rows])
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(11.0, 9.5), layout="constrained")
         axes = figure.subplots(4, 4, sharey=True).ravel()

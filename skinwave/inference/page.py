@@ -33,16 +33,16 @@ from skinwave.inference.knowledge import (
     value_words,
 )
 from skinwave.pictures.figures import png
-from skinwave.studies.claims import TEXTS
+from skinwave.studies.claims import MUCH_LOWER, TEXTS
 
 TITLE = "Which sheet did they measure?"
 METHOD = (
     "Each candidate is one value of every parameter below. Its sheet is a rectangular, "
-    "orthotropic, stretched thin plate with the air on both sides as in a baffle; modes by Ritz's"
-    " method; the steady displacement or velocity at five points, 5 mm apart, under all 15 "
-    "Tactons; then the claims as skinwave compare assesses them, M4 in the quantity that was "
-    "read. Intervals are those of Clopper and Pearson at 95 %. Information is of numbers in five "
-    "bins, less what chance makes of as many rows."
+    "orthotropic, stretched thin plate with the air on both sides as in a baffle; a clip holds a "
+    "square of 10 mm in a corner; modes by Ritz's method; the steady displacement or velocity at "
+    "five points, 5 mm apart, under all 15 Tactons; then the claims as skinwave compare assesses "
+    "them, M4 in the quantity that was read. Intervals are those of Clopper and Pearson at 95 %. "
+    "Information is of numbers in five bins, less what chance makes of as many rows."
 )
 LEFT_OUT = (
     "Left out: the mean deflection, which stretches a sheet on fixed edges. A clamped disc of "
@@ -54,13 +54,16 @@ LEFT_OUT = (
     "linear sheet adds: of the drive laws only the clipped and the compressed ones have it."
 )
 WHY_NOT = (
-    "Why M5 asks so much of a linear sheet: on the path the load itself has a line at f_d that is"
-    " 1.25, 1.57 and 1.71 times as strong as that at f_AM, for paths of 10, 20 and 30 mm (force "
-    "corrected; weaker by a quarter where the squared pressure is modulated to its full depth). "
-    "The sheet would have to weaken f_d, its sums and differences with f_AM, and 2 f_AM by a "
-    "factor of ten and more at every point and for each f_AM. It does so where its waves are much"
-    " longer than the path, and else by chance between two of its modes."
+    'M4 is about all lines: f_AM is to be the highest. M5 is about "these frequency harmonics", '
+    "the multiples of f_AM and f_d, which are to be much lower: here by 20 dB. A load without a "
+    "mean has no multiple of f_d, so that it shows M5 without M3. Why both ask so much of a linear "
+    "sheet: on the path the load itself has a line at f_d that is 1.25, 1.57 and 1.71 times as "
+    "strong as that at f_AM, for paths of 10, 20 and 30 mm (force corrected; weaker by a quarter "
+    "where the squared pressure is modulated to its full depth). The sheet would have to weaken "
+    "f_d and 2 f_AM by a factor of ten and more at every point and for each f_AM. It does so where "
+    "its waves are much longer than the path, and else by chance between two of its modes."
 )
+LIMITS = (0.0, -6.0, -10.0, MUCH_LOWER)  # dB
 HALF_DRIVE = (
     "A test of all candidates at once is to measure at half the drive: in a linear sheet under a "
     "drive law that is a power of the amplitude no ratio of two lines changes, in one that "
@@ -88,7 +91,8 @@ def drawings(rows: Sequence[Row]) -> list[Drawing]:
         ("shares", "Candidates that show each claim, and several together; how many above each "
          "bar, with the interval of the share.", share_figure(fair)),
         ("rivals", "Level of the strongest line other than f_AM at any of the five points under "
-         "AM+STM: part of the candidates below it.", rival_figure(fair)),
+         "AM+STM: part of the candidates below it. Dashed: that of the multiples of f_AM and f_d "
+         "alone, which a load without a mean has none of.", rival_figure(fair)),
         ("decides", "What each parameter tells: the part of a claim's entropy, and of the variance "
          "of the strongest rival's level, that knowing it takes away. Claims that hold always or "
          "never have none.", decision_figure(fair)),
@@ -146,9 +150,13 @@ def claim_table(fair: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
 
 
 def reading_table(fair: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    """M4 and M5 at fewer points or on fewer paths."""
-    rows = [[words, in_percent(m4), in_percent(m5)] for words, m4, m5 in readings(fair)]
-    return ["f_AM compared with all other lines", "highest (M4)", "20 dB above (M5)"], rows
+    """M4 and M5 of fewer lines, at fewer points or on fewer paths, and with other bars."""
+    rows = [
+        [words, *(in_percent(share(levels < limit)) for limit in LIMITS)]
+        for words, levels in readings(fair)
+    ]
+    header = ["f_AM compared with", "highest", *(f"{-limit:g} dB above" for limit in LIMITS[1:])]
+    return header, rows
 
 
 def region_table(fair: Sequence[Row]) -> tuple[list[str], list[list[str]]]:

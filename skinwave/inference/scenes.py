@@ -77,5 +77,5 @@ def _mounting(candidate: Candidate) -> dict[str, Any]:
 
 
 def _mm(values: Any) -> list[float]:
-    """Lengths in metre as mm, to a thousandth."""
-    return [round(1e3 * float(value), 3) for value in values]
+    """Lengths in metre as mm, to a millionth."""
+    return [round(1e3 * float(value), 6) for value in values]

@@ -19,6 +19,7 @@ from skinwave.effort import Progress, one_thread, silent
 from skinwave.inference.assess import CLAIMED, row
 from skinwave.inference.design import PARAMETERS, Candidate, Parameter, name
 from skinwave.outputs import output_file
+from skinwave.studies.claims import MUCH_LOWER
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.sweep import SweepOutcome
 
@@ -37,7 +38,8 @@ COLUMNS = {
     "vibration_over_thickness": "number", "second_harmonic_db": "number",
     **{f"{claim}_holds": "whole" for claim in CLAIMED},
     **{f"{claim}_value": "number" for claim in CLAIMED},
-    "rival_db": "numbers", "rival_by_path_db": "numbers", "rival_line": "text",
+    "rival_db": "numbers", "rival_by_path_db": "numbers", "multiple_db": "numbers",
+    "multiple_by_path_db": "numbers", "rival_of_mean_db": "number", "rival_line": "text",
     "rival_tacton": "text", "tactons_highest": "whole", "tactons_much_lower": "whole",
 }  # fmt: skip
 Row = Mapping[str, Any]
@@ -144,12 +146,13 @@ def offspring(rows: Sequence[Row], count: int, seed: int) -> list[Candidate]:
 
 
 def nearest(rows: Sequence[Row]) -> list[Row]:
-    """Rows with a response, those first that show the most of M1 to M3, and of these those whose
-    strongest line other than f_AM is the weakest, as M4 and M5 ask.
+    """Rows with a response, those first that show the most of M1 to M3, and of these those that
+    come nearest to what M4 and M5 ask.
     """
 
     def shortfall(row: Row) -> tuple[int, float]:
-        return -sum(row[f"{claim}_holds"] or 0 for claim in CLAIMED[:3]), float(row["M5_value"])
+        beyond = max(row["M4_value"], row["M5_value"] - MUCH_LOWER)
+        return -sum(row[f"{claim}_holds"] or 0 for claim in CLAIMED[:3]), beyond
 
     return sorted((r for r in rows if r["M5_value"] is not None), key=shortfall)
 

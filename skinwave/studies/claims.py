@@ -19,6 +19,7 @@ from skinwave.studies.named_lines import NamedLines
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
 ABSENT = -120.0  # dB
 MUCH_LOWER = -20.0  # dB: a tenth
+NOTHING = -300.0  # dB
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 REACH = 6.0  # Hz from a line within which its spectral peak is looked for
 
@@ -93,7 +94,7 @@ def is_resolved(run: NamedLines, claim: str) -> bool:
     """Whether the lines that a claim is about are resolved; some are about all lines."""
     if claim in NEEDED:
         return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
-    return "f_AM" in run.frequencies and bool(_rivals(run)) and not run.unresolved
+    return "f_AM" in run.frequencies and bool(rivals(run)) and not run.unresolved
 
 
 def _single_line(runs: Sequence[NamedLines]) -> Assessment:
@@ -178,11 +179,11 @@ def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
 
 
 def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
-    value = max(rival_levels(run).max() for run in runs)
-    lower = sum(bool(rival_levels(run).max() < MUCH_LOWER) for run in runs)
+    levels = [multiple_levels(run).max() for run in runs]
+    value, lower = max(levels), sum(bool(level < MUCH_LOWER) for level in levels)
     sentence = (
-        f"the strongest other line is at {decibel(value, signed=True)} dB re f_AM; in {lower} of "
-        f"{len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
+        f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM; in "
+        f"{lower} of {len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
     )
     return value < MUCH_LOWER, value, MUCH_LOWER, sentence
 
@@ -235,7 +236,7 @@ TEXTS = {
     "M2": "Measured, STM alone: lines at the same places for every path with the same f_d.",
     "M3": "Measured, AM+STM: lines at multiples of both f_AM and f_d.",
     "M4": "Measured, AM+STM: f_AM is the highest line, whatever the path.",
-    "M5": "Measured, AM+STM: all other lines are much lower than f_AM.",
+    "M5": "Measured, AM+STM: the multiples of f_AM and f_d are much lower than f_AM.",
 }
 
 
@@ -250,20 +251,28 @@ def _probe_levels(
     return 20 * np.log10(np.maximum(ratios, 1e-15))
 
 
-def _rivals(run: NamedLines) -> list[str]:
-    """Lines that are resolved from f_AM itself."""
+def rivals(run: NamedLines) -> list[str]:
+    """Names of the lines that are resolved from f_AM itself."""
     f_am = run.frequencies["f_AM"]
     return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
 
 
 def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
     """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
-    return _probe_levels(run, _rivals(run), "f_AM", velocity).max(axis=0)
+    return _probe_levels(run, rivals(run), "f_AM", velocity).max(axis=0)
+
+
+def multiple_levels(run: NamedLines) -> Floats:
+    """Level of the strongest multiple of f_AM or of f_d other than f_AM at each probe, dB re f_AM
+    there: "these frequency harmonics", without the sums and differences of both.
+    """
+    names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
+    return _probe_levels(run, names, "f_AM").max(axis=0, initial=NOTHING)
 
 
 def strongest_rival(run: NamedLines) -> tuple[str, float]:
     """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
-    names = _rivals(run)
+    names = rivals(run)
     levels = _probe_levels(run, names, "f_AM")
     line, probe = np.unravel_index(np.argmax(levels), levels.shape)
     return names[line], 1e3 * float(np.hypot(*run.places[probe]))
