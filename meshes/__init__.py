@@ -7,6 +7,7 @@ from meshes.facets import seen_from_above, tag_boundary
 from meshes.files.import_body import body_from_file
 from meshes.files.mesh_files import read, write
 from meshes.files.surface_files import read_surface
+from meshes.shapes.fingertip import Fingertip
 from meshes.shapes.palm import Palm
 from meshes.shapes.structured import (
     Grading,
@@ -26,17 +27,20 @@ from meshes.tetmesh import (
     corner_volumes,
     facet_set,
     half,
+    interface_facets,
     part,
     quadratic,
 )
 from meshes.volume.builtin import builtin
 from meshes.volume.curving import curve_boundary
+from meshes.volume.fingertip_mesh import fingertip_mesh
 from meshes.volume.mapped_palm import mapped_palm
 from meshes.volume.palm_mesh import palm_mesh
 from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
 from meshes.volume.tetrahedralise import graded, tetrahedralise
 
 __all__ = [
+    "Fingertip",
     "Grading",
     "MeshError",
     "Palm",
@@ -53,9 +57,11 @@ __all__ = [
     "extrude",
     "extruded",
     "facet_set",
+    "fingertip_mesh",
     "graded",
     "graded_axis",
     "half",
+    "interface_facets",
     "jacobian_ratios",
     "mapped_palm",
     "middle_plane",

@@ -47,6 +47,7 @@ class TetMesh:
     tets : (m, 4) or (m, 10) int, node numbers in VTK order. Tetrahedra with negative
         volume are turned round; how many is logged.
     region : (m,) int, number of the material of each tetrahedron; all 0 if not given.
+    region_names : region number -> name, of those that have one.
     facets : name -> (k, 3) or (k, 6) int, boundary facets seen from outside.
 
     Raises
@@ -60,6 +61,7 @@ class TetMesh:
     tets: Ints
     region: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     facets: Mapping[str, Ints] = field(default_factory=dict)
+    region_names: Mapping[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         try:
@@ -83,6 +85,7 @@ class TetMesh:
         object.__setattr__(self, "tets", tets)
         object.__setattr__(self, "region", region)
         object.__setattr__(self, "facets", MappingProxyType(facets))
+        object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
 
     @property
     def order(self) -> int:
@@ -134,6 +137,14 @@ def neighbours(tets: Ints) -> Ints:
     beyond = np.full(len(order), -1)
     beyond[one], beyond[other] = other // 4, one // 4
     return beyond.reshape(-1, 4)
+
+
+def interface_facets(mesh: TetMesh) -> Ints:
+    """Facets (k, 3 or 6) between two regions, each once, seen from that of the higher number."""
+    width = 3 if mesh.order == 1 else 6
+    beyond = neighbours(mesh.tets)
+    lower = (beyond >= 0) & (mesh.region[beyond] < mesh.region[:, None])
+    return mesh.tets[:, FACES[:, :width]][lower]
 
 
 def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:
@@ -216,7 +227,9 @@ def part(mesh: TetMesh, inside: NDArray[np.bool_]) -> tuple[TetMesh, Ints]:
         return kept[np.isin(facet_keys(kept, len(nodes)), outer)]
 
     facets = {name: of_it(each) for name, each in mesh.facets.items()}
-    found = TetMesh(points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets)
+    found = replace(
+        mesh, points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets
+    )
     return found, nodes
 
 

@@ -116,6 +116,8 @@ def _materials(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
         parts = [body, *(layers if isinstance(layers, list) else [])]
         found = (part.get("material") for part in parts if isinstance(part, dict))
         yield from (material for material in found if isinstance(material, dict))
+        if isinstance(regions := body.get("regions"), dict):
+            yield from (material for material in regions.values() if isinstance(material, dict))
 
 
 def _read(path: Path) -> ModulusTable:

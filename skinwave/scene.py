@@ -15,6 +15,7 @@ from skinwave.bodies import (
     Body,
     Layer,
     Mounting,
+    Phalanx,
     Placement,
     Relief,
     body_name,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
-    "Body", "Layer", "Mounting", "Placement", "Reading", "Relief", "Scene",
+    "Body", "Layer", "Mounting", "Phalanx", "Placement", "Reading", "Relief", "Scene",
     "body_name", "check_motion", "kind_of", "solid_of", "with_body",
 ]  # fmt: skip
 

@@ -16,7 +16,7 @@ from simple_model.modulus_laws import COLUMNS
 from simple_model.trajectory import Points
 from skinwave.material_file import material_of, values_of, written_table
 from skinwave.plain_text import number_in
-from skinwave.scene import Layer, Mounting, Relief
+from skinwave.scene import Layer, Mounting, Phalanx, Relief
 
 # Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
 # the base of the epidermis, Meissner's corpuscles in the papillae beside them, Pacini's in the deep
@@ -221,8 +221,17 @@ def _layers(key: str, value: Any) -> tuple[Layer, ...]:
     return tuple(Layer(**values) for values in _tables(f"body.{key}", value, LAYER))
 
 
+def _regions(key: str, value: Any) -> tuple[tuple[str, str | Material], ...]:
+    table = as_table(f"body.{key}", value)
+    return tuple((name, _material(f"{key}.{name}", of)) for name, of in table.items())
+
+
 def _relief(key: str, value: Any) -> Relief:
     return Relief(**checked(f"[body.{key}]", as_table(f"body.{key}", value), RELIEF))
+
+
+def _bone(key: str, value: Any) -> Phalanx:
+    return Phalanx(**checked(f"[body.{key}]", as_table(f"body.{key}", value), BONE))
 
 
 def _mounting(key: str, value: Any) -> Mounting:
@@ -321,6 +330,7 @@ MOUNTING = {
     "curl_x_mm": _scaled("curl_x", 1e3),
     "curl_y_mm": _scaled("curl_y", 1e3),
 }
+BONE = {f"{length.name}_mm": _scaled(length.name, 1e3) for length in fields(Phalanx)}
 RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
 LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
@@ -373,9 +383,13 @@ SECTIONS = {
         "sides": _word("sides"),
         "layers": SceneKey("layers", _layers, lambda layers: [written(LAYER, x) for x in layers]),
         "relief": SceneKey("relief", _relief, partial(written, RELIEF)),
+        "bone": SceneKey("bone", _bone, partial(written, BONE)),
         "file": _word("file"),
         "unit": _word("unit"),
         "up": _word("up"),
+        "regions": SceneKey(
+            "regions", _regions, lambda named: {name: write_material(of) for name, of in named}
+        ),
         "air": SceneKey("air", _switch, bool),
         "mounting": SceneKey("mounting", _mounting, partial(written, MOUNTING)),
         "grammage_g_m2": _scaled("grammage", 1e3),

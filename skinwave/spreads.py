@@ -36,11 +36,12 @@ from dataclasses import dataclass, replace
 
 from skinwave.bodies.parts import solid_of
 from skinwave.distributions import Distribution, known_to, parent_of
-from skinwave.scene import Scene
+from skinwave.scene import Body, Scene
 from skinwave.scene_file import from_table, to_table
 
 PRESSURE, FACTOR = "focus.peak_pressure_pa", 2.0
 MODULI, LOSSES = "modulus_scale", "loss_scale"  # of a material, beside its keys; 1 is the preset
+REGION = "regions."  # of a key, before the name of a region
 SCALES = {MODULI: "modulus", LOSSES: "loss"}  # arguments of `Material.scaled`
 PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # of keys by section
 
@@ -113,6 +114,7 @@ def _of_materials(scene: Scene) -> Iterator[Spread]:
     body = scene.body
     named = {"body.material": body.material}
     named |= {f"body.layers.{k}.material": layer.material for k, layer in enumerate(body.layers)}
+    named |= {f"body.regions.{name}": material for name, material in body.regions}
     for key, material in named.items():
         if isinstance(material, str) and (known := OF_PRESETS.get(material)):
             for scale, given in ((MODULI, known.moduli), (LOSSES, known.losses)):
@@ -154,7 +156,19 @@ def _scaled(scene: Scene, key: str, factor: float) -> Scene:
     if place == "material":
         material = solid_of(body.material).scaled(**argument)
         return replace(scene, body=replace(body, material=material))
+    if place.startswith(REGION):
+        return replace(scene, body=_with_region(body, place, argument))
     k = int(place.split(".")[1])
     material = solid_of(body.layers[k].material).scaled(**argument)
     layers = (*body.layers[:k], replace(body.layers[k], material=material), *body.layers[k + 1 :])
     return replace(scene, body=replace(body, layers=layers))
+
+
+def _with_region(body: Body, place: str, factors: dict[str, float]) -> Body:
+    """The body with another material in the region of a key."""
+    name = place.removeprefix(REGION)
+    regions = tuple(
+        (each, solid_of(material).scaled(**factors) if each == name else material)
+        for each, material in body.regions
+    )
+    return replace(body, regions=regions)

@@ -345,13 +345,6 @@ def test_a_hand_without_ends_cannot_be_held_by_them(dome, tmp_path):
             build(replace(hand_in(tmp_path / "body.vtu"), base=base), 0.005)
 
 
-def test_regions_of_a_file_are_refused_as_they_would_not_be_used(dome, tmp_path):
-    region = (dome.points[dome.tets].mean(axis=1)[:, 2] < -0.005).astype(int)
-    with pytest.raises(ValueError, match="has 2 regions, but a body from a file is of one"):
-        built(tmp_path, replace(dome, region=region))
-    built(tmp_path, replace(dome, region=np.full(len(dome.tets), 3)))
-
-
 def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
     body = Body(width=0.03, height=0.03, depth=0.01, base="absorbing", sides="free")
     tacton = Tacton(am_frequency=140, duration=0.2)

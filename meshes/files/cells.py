@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from meshes.tetmesh import EDGES, FACES, Floats, Ints, MeshError, TetMesh
 
-FACETS, REGION = "facets:", "region "
+FACETS, REGION, NAMED = "facets:", "region ", "region:"
 OFF_MIDDLE = 0.25  # of an edge: how far a mid-side node may lie from its middle
 
 
@@ -43,32 +43,51 @@ def values(raw: Any, name: str, kind: str) -> np.ndarray:
     return np.concatenate(found).astype(np.int64)
 
 
-def regions(raw: Any, kind: str) -> Ints:
-    """Region (e,) of each element: an array called so, physical groups, or element sets."""
-    for name in ("region", "material"):
+def regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+    """Region (e,) of each element: an array called so, physical groups, or element sets; and the
+    names of those that have one.
+    """
+    for name in ("region", "material", "medit:ref"):
         if name in raw.cell_data:
-            return values(raw, name, kind)
+            region = values(raw, name, kind)
+            flags = [title for title in raw.cell_data if title.startswith(NAMED)]
+            marked = {title: region[values(raw, title, kind) == 1] for title in flags}
+            return region, {
+                int(of[0]): t.removeprefix(NAMED) for t, of in marked.items() if len(of)
+            }
     if "gmsh:physical" in raw.cell_data:
-        tags, place = np.unique(values(raw, "gmsh:physical", kind), return_inverse=True)
-        ours = {
-            int(tag): int(title.removeprefix(REGION))
-            for title, (tag, dimension) in raw.field_data.items()
-            if dimension == 3 and re.fullmatch(REGION + r"\d+", title)
-        }
-        return np.array([ours.get(tag, tag) for tag in tags.tolist()], np.int64)[place]
+        return physical_groups(raw, kind)
     return element_sets(raw, kind)
 
 
-def element_sets(raw: Any, kind: str) -> Ints:
-    """The number, from 1, of the last set that has each element; 0 if none has."""
+def physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+    """Physical group (e,) of each element, by the number in its title if it was written here, and
+    the names of groups.
+    """
+    tags, place = np.unique(values(raw, "gmsh:physical", kind), return_inverse=True)
+    numbers, names = {}, {}
+    for title, (tag, dimension) in raw.field_data.items():
+        if dimension == 3:
+            ours = re.fullmatch(REGION + r"(\d+)(?: (.+))?", title)
+            number = numbers[int(tag)] = int(ours[1]) if ours else int(tag)
+            if name := ours[2] if ours else title:
+                names[number] = name
+    return np.array([numbers.get(tag, tag) for tag in tags.tolist()], np.int64)[place], names
+
+
+def element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+    """The number, from 1, of the last set that each element is in, or 0; and names of sets."""
     blocks = [i for i, block in enumerate(raw.cells) if block.type == kind]
     regions = [np.zeros(len(raw.cells[i].data), np.int64) for i in blocks]
-    members = [[np.asarray(of[i], np.int64) for i in blocks] for of in raw.cell_sets.values()]
-    filled = [of for of in members if sum(map(len, of))]
-    for number, of in enumerate(filled, start=1):
+    members = {
+        str(name): [np.asarray(of[i], np.int64) for i in blocks]
+        for name, of in raw.cell_sets.items()
+    }
+    filled = {name: of for name, of in members.items() if sum(map(len, of))}
+    for number, of in enumerate(filled.values(), start=1):
         for region, which in zip(regions, of, strict=True):
             region[which] = number
-    return np.concatenate(regions)
+    return np.concatenate(regions), dict(enumerate(filled, start=1))
 
 
 def facet_sets(raw: Any, kind: str) -> dict[str, Ints]:
@@ -149,9 +168,14 @@ def node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
 
 
 def vtu_tags(mesh: TetMesh, names: list[str]) -> dict[str, list[np.ndarray]]:
-    """Cell arrays of a mesh by block: regions, and 1 for the facets of each set."""
+    """Cell arrays of a mesh by block: regions, 1 for the elements of each that has a name, and 1
+    for the facets of each set.
+    """
     sizes = [len(mesh.facets[name]) for name in names]
     tags = {"region": [mesh.region, *(np.full(n, -1) for n in sizes)]}
+    for number, title in mesh.region_names.items():
+        own = (mesh.region == number).astype(np.int8)
+        tags[NAMED + title] = [own, *(np.zeros(n, np.int8) for n in sizes)]
     for name in names:
         flags = [np.full(n, other == name, np.int8) for n, other in zip(sizes, names, strict=True)]
         tags[FACETS + name] = [np.zeros(len(mesh.tets), np.int8), *flags]
@@ -167,7 +191,8 @@ def gmsh_tags(mesh: TetMesh, names: list[str]) -> dict[str, list[np.ndarray]]:
 
 def gmsh_names(mesh: TetMesh, names: list[str]) -> dict[str, np.ndarray]:
     """Number and dimension of each physical group by its name."""
-    regions = {f"{REGION}{r}": np.array([r + 1, 3]) for r in np.unique(mesh.region).tolist()}
+    titles = {r: f"{REGION}{r} {mesh.region_names.get(r, '')}" for r in set(mesh.region.tolist())}
+    regions = {title.strip(): np.array([r + 1, 3]) for r, title in sorted(titles.items())}
     return regions | {name: np.array([i + 1, 2]) for i, name in enumerate(names)}
 
 
@@ -194,7 +219,7 @@ def placed(
     at_points, at_cells = {}, {}
     for name, given in fields.items():
         values = np.asarray(given)
-        if name == "region" or name.startswith((FACETS, "gmsh:")):
+        if name == "region" or name.startswith((FACETS, NAMED, "gmsh:")):
             raise MeshError(f"a field cannot be called '{name}', which the mesh uses; rename it")
         if values.ndim and len(values) == len(mesh.points):
             at_points[name] = values

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,12 @@ import numpy as np
 from meshes.facets import geometry, seen_from_above, tag_boundary
 from meshes.files import mesh_files, surface_files
 from meshes.shapes.structured import Grading
-from meshes.surface.alignment import aligned, clipped, on_planes
+from meshes.surface.alignment import aligned, clipped, cut_to, on_planes
 from meshes.surface.repair import check, repaired
 from meshes.surface.triangulation import Surface, volume
+from meshes.surface.winding import check_inside
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.volume.inner import REST
 from meshes.volume.quality import dihedral_angles, edge_lengths
 from meshes.volume.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
 
@@ -29,6 +32,7 @@ def body_from_file(
     *,
     unit: str = "m",
     up: str = "+z",
+    inner: Sequence[str | os.PathLike[str]] = (),
     clip: Sequence[float] | None = None,
     timeout: float = 120.0,
     say: Say = lambda sentence: None,
@@ -39,7 +43,7 @@ def body_from_file(
     A surface (`.stl .ply .obj .glb .vtp`) is repaired where that takes no guess, turned so that
     `up` is +z, moved so that the middle of its palm is the origin and its top there is z = 0,
     cut to `clip` and filled with tetrahedra of h that grow beyond 30 mm from the middle. A mesh
-    (`.vtu .msh .inp .vtk`) is taken as it is.
+    (`.vtu .msh .inp .vtk .mesh`) is taken as it is.
 
     Parameters
     ----------
@@ -47,6 +51,8 @@ def body_from_file(
     h : float, metre, edge length aimed at in the middle of the palm.
     unit : of the coordinates in the file: m, cm, mm, um or in.
     up : axis of the file that points to the device: +x, -x, ... -z.
+    inner : files of closed surfaces inside that of a surface file, in its frame and unit, such as
+        those of bones, each of which becomes a region by the name of its file
     clip : least and greatest x, least and greatest y, metre from the middle of the palm.
     timeout : float, second, of the mesher.
     say : gets a sentence on each thing that was found or done.
@@ -55,7 +61,8 @@ def body_from_file(
     Returns
     -------
     TetMesh with the facet sets `surface`, `top` (seen from above), `cut` (the planes of the clip)
-    and `bottom`, the rest; a mesh that has one of these names keeps its own
+    and `bottom`, the rest; a mesh that has one of these names keeps its own. Its regions are those
+    of a mesh, or `tissue` and one for each inner surface
 
     Raises
     ------
@@ -66,13 +73,18 @@ def body_from_file(
     """
     progress(f"reading {Path(path).name}", 0.0)
     if Path(path).suffix.lower() in mesh_files.VOLUME_FORMATS:
-        if clip is not None or up != "+z":
-            raise MeshError(f"{path} is a mesh already; only surfaces can be clipped and turned")
+        if clip is not None or up != "+z" or inner:
+            raise MeshError(
+                f"{path} is a mesh already; only surfaces can be clipped, turned, and filled "
+                "around inner ones"
+            )
         mesh = mesh_files.read(path, unit=unit)
         say(f"read {len(mesh.tets):,} tetrahedra of {(4, 10)[mesh.order - 1]} nodes")
         return _described(_with_sides(mesh), say)
     surface = sound_surface(path, unit=unit, up=up, say=say)
+    bones = _inner_surfaces(inner, surface, unit=unit, up=up, say=say)
     surface, shift = aligned(surface)
+    bones = {name: replace(bone, points=bone.points + shift) for name, bone in bones.items()}
     say(
         "moved by ({:.1f}, {:.1f}, {:.1f}) mm, the palm's middle to the origin".format(*1e3 * shift)
     )
@@ -83,11 +95,33 @@ def body_from_file(
             say(sentence)
         check(surface)
         planes = list(clip)
+        bones = {name: part for name, bone in bones.items() if (part := cut_to(bone, clip)[0])}
     progress("filling it with tetrahedra", 0.0)
     check_size(surface, "h", h)
     grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
-    mesh = tetrahedralise(surface, h, sizing=graded(h, grading), timeout=timeout)
+    mesh = tetrahedralise(surface, h, inner=bones, sizing=graded(h, grading), timeout=timeout)
     return _described(_with_sides(mesh, planes, 2 * EPSILON * h), say)
+
+
+def _inner_surfaces(
+    paths: Sequence[str | os.PathLike[str]], outer: Surface, *, unit: str, up: str, say: Say
+) -> dict[str, Surface]:
+    """Surfaces inside another by the names of their files, repaired and checked."""
+    names = [REST, *(Path(path).stem for path in paths)]
+    if twice := [str(path) for path in paths if names.count(Path(path).stem) > 1]:
+        raise MeshError(
+            f"{twice[-1]} would be a second region '{Path(twice[-1]).stem}'; rename the file, "
+            "whose name is that of its region"
+        )
+    found: dict[str, Surface] = {}
+    for path in paths:
+        try:
+            found[Path(path).stem] = sound_surface(path, unit=unit, up=up, say=say)
+        except MeshError as error:
+            raise MeshError(f"{path}: {str(error).removeprefix(f'{path} ')}") from None
+    if found:
+        check_inside(outer, found)
+    return found
 
 
 def sound_surface(
@@ -133,18 +167,16 @@ def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 
         is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))
         sides = {"cut": is_cut, "top": seen & ~is_cut}
     made = tag_boundary(mesh, rest="bottom", **sides)
-    return TetMesh(
-        points=mesh.points,
-        tets=mesh.tets,
-        region=mesh.region,
-        facets={**made.facets, **mesh.facets},
-    )
+    return replace(mesh, facets={**made.facets, **mesh.facets})
 
 
 def _described(mesh: TetMesh, say: Say) -> TetMesh:
-    enclosed = corner_volumes(mesh.points, mesh.tets).sum()
+    volumes = corner_volumes(mesh.points, mesh.tets)
+    for number, name in sorted(mesh.region_names.items()):
+        own = mesh.region == number
+        say(f"region {name}: {own.sum():,} tetrahedra, {1e6 * volumes[own].sum():.3g} cm3")
     say(
-        f"{len(mesh.tets):,} tetrahedra, {1e6 * enclosed:.1f} cm3, edges of "
+        f"{len(mesh.tets):,} tetrahedra, {1e6 * volumes.sum():.1f} cm3, edges of "
         f"{1e3 * np.median(edge_lengths(mesh)):.1f} mm, dihedral angles from "
         f"{dihedral_angles(mesh).min():.1f} degrees"
     )

@@ -27,8 +27,11 @@ def main() -> int:
         return subprocess_call.REFUSED
     names = sorted(mesh.facets)
     facets: dict[str, Any] = {f"facets{k}": mesh.facets[name] for k, name in enumerate(names)}
-    listed = np.array(names, np.str_)
-    np.savez(target, points=mesh.points, tets=mesh.tets, region=mesh.region, names=listed, **facets)
+    np.savez(
+        target, points=mesh.points, tets=mesh.tets, region=mesh.region,
+        names=np.array(names, np.str_), numbers=np.array(list(mesh.region_names), np.int64),
+        titles=np.array(list(mesh.region_names.values()), np.str_), **facets,
+    )  # fmt: skip
     return 0
 
 

@@ -1,8 +1,9 @@
 """Mesh files, read and written with meshio.
 
 A mesh is written with its regions and facet sets, and is read as it was. In `.vtu`, the cell array
-`region` numbers the tetrahedra, and each facet set is a block of triangles for which the cell array
-`facets:<name>` is 1. In `.msh` 2.2 they are physical groups.
+`region` numbers the tetrahedra, `region:<name>` is 1 for those of a region with a name, and each
+facet set is a block of triangles for which the cell array `facets:<name>` is 1. In `.msh` 2.2 they
+are physical groups.
 """
 
 import contextlib
@@ -30,16 +31,19 @@ from meshes.files.cells import (
 )
 from meshes.tetmesh import MeshError, TetMesh
 
-VOLUME_FORMATS = (".vtu", ".msh", ".inp", ".vtk")
+VOLUME_FORMATS = (".vtu", ".msh", ".inp", ".vtk", ".mesh")
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused by gmsh itself
 VTK_CHILD, MESH_CHILD = (Path(__file__).parent / f"{name}_child.py" for name in ("vtk", "mesh"))
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 
 
 def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
-    """The tetrahedra of a `.vtu`, `.msh`, `.inp` or `.vtk` file, with regions and facet sets.
+    """The tetrahedra of a `.vtu`, `.msh`, `.inp`, `.vtk` or `.mesh` (medit) file, with regions and
+    facet sets.
 
-    Regions are the cell array `region`, physical groups, or element sets in their order from 1.
+    Regions are the cell array `region` or `material`, medit's references, physical groups, or
+    element sets in their order from 1. Groups and sets have names, and so has a region whose
+    elements have 1 in a cell array `region:<name>`.
 
     Parameters
     ----------
@@ -65,9 +69,11 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
             raise _unreadable(path, error) from None
         with np.load(target) as found:
             facets = {str(name): found[f"facets{k}"] for k, name in enumerate(found["names"])}
+            titles = dict(zip(found["numbers"].tolist(), found["titles"].tolist(), strict=True))
             return TetMesh(
-                points=found["points"], tets=found["tets"], region=found["region"], facets=facets
-            )
+                points=found["points"], tets=found["tets"], region=found["region"], facets=facets,
+                region_names=titles,
+            )  # fmt: skip
 
 
 def read_here(path: Path, scale: float) -> TetMesh:
@@ -101,10 +107,12 @@ def _mesh(path: Path, raw: Any, scale: float) -> TetMesh:
     used, numbers = np.unique(tets, return_inverse=True)
     new = np.full(len(points), -1)
     new[used] = np.arange(len(used))
+    region, titles = regions(raw, found[0])
     return TetMesh(
         points=points[used] * scale if scale != 1 else points[used],
         tets=numbers.reshape(tets.shape),
-        region=regions(raw, found[0]),
+        region=region,
+        region_names=titles,
         facets=outward(numbers.reshape(tets.shape), {n: new[nodes] for n, nodes in sets.items()}),
     )
 
@@ -197,7 +205,7 @@ def _meshio_read(path: Path) -> Any:
     """Read a file with meshio, which prints, warns, and ends the process on what it cannot read."""
     import meshio
 
-    kind = {".vtu": "vtu", ".msh": "gmsh", ".inp": "abaqus"}[path.suffix.lower()]
+    kind = {".vtu": "vtu", ".msh": "gmsh", ".inp": "abaqus", ".mesh": "medit"}[path.suffix.lower()]
     said = io.StringIO()
     try:
         with (

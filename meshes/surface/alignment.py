@@ -109,32 +109,44 @@ def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]
     MeshError
         If the box is empty or does not contain the origin, or the cut cannot be closed.
     """
-    import pyvista
-
     left, right, front, back = box
     if not (left < 0 < right and front < 0 < back):
         raise MeshError(
             "the patch from ({:g}, {:g}) to ({:g}, {:g}) mm must have the middle of the palm, "
             "(0, 0), inside it".format(*(1e3 * v for v in (left, front, right, back)))
         )
-    faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles])
-    body, cuts = pyvista.PolyData(np.array(surface.points), faces=faces.ravel()), 0
-    for axis, sign, place in ((0, 1, left), (0, -1, right), (1, 1, front), (1, -1, back)):
-        along = sign * (np.asarray(body.points)[:, axis] - place)
-        if along.min() < 0 < along.max():
-            normal, origin = np.zeros(3), np.zeros(3)
-            normal[axis], origin[axis] = sign, place
-            body = body.clip_closed_surface(normal=normal, origin=origin).triangulate()
-            cuts += 1
+    cut, cuts = cut_to(surface, box)
+    assert cut  # has the origin below its top
     if not cuts:
         return surface, []
-    triangles = np.asarray(body.faces).reshape(-1, 4)[:, 1:]
-    cut, _ = repaired(np.asarray(body.points, np.float64), triangles)
     said = [f"cut at {cuts} planes"]
     if (n := n_pieces(cut)) > 1:
         cut = _under_origin(cut)
         said.append(f"dropped {n - 1} pieces that are not joined to the palm within the patch")
     return cut, said
+
+
+def cut_to(surface: Surface, box: Sequence[float]) -> tuple[Surface | None, int]:
+    """Closed part of a closed surface within a box (metre, as for `clipped`), all of its pieces,
+    and how many sides of the box cut it; None if nothing is inside.
+    """
+    import pyvista
+
+    faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles])
+    body, cuts = pyvista.PolyData(np.array(surface.points), faces=faces.ravel()), 0
+    for axis, sign, place in zip((0, 0, 1, 1), (1, -1, 1, -1), box, strict=True):
+        along = sign * (np.asarray(body.points)[:, axis] - place)
+        if along.max() <= 0:
+            return None, cuts
+        if along.min() < 0:
+            normal, origin = np.zeros(3), np.zeros(3)
+            normal[axis], origin[axis] = sign, place
+            body = body.clip_closed_surface(normal=normal, origin=origin).triangulate()
+            cuts += 1
+    if not cuts:
+        return surface, 0
+    triangles = np.asarray(body.faces).reshape(-1, 4)[:, 1:]
+    return repaired(np.asarray(body.points, np.float64), triangles)[0], cuts
 
 
 def on_planes(box: Sequence[float], tolerance: float) -> Predicate:

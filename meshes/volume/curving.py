@@ -69,7 +69,7 @@ def curve_boundary(
     points[mesh.tets[:, 4:]] = ends.mean(axis=2)
     straight = points.copy()
     points[middles] = target(points, middles)
-    points, kept = _keep_jacobians(mesh.tets, straight, points)
+    points, kept = keep_jacobians(mesh.tets, straight, points)
     log.info("curved %d edges, %d stay straight", len(middles) - kept, kept)
     return replace(mesh, points=points)
 
@@ -96,8 +96,18 @@ def _keep_volumes(mesh: TetMesh, points: Floats, corners: Ints) -> Floats:
         points[back], moved[back] = mesh.points[back], False
 
 
-def _keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
-    """Curved edges go back where an element would be distorted; how many did."""
+def keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
+    """Curved edges go back where an element would be distorted.
+
+    Parameters
+    ----------
+    tets : (e, 10) int
+    straight, points : (n, 3) float, metre, nodes of straight and of curved elements
+
+    Returns
+    -------
+    points (n, 3), and how many of them went back
+    """
     went_back = 0
     while True:
         bad = jacobian_ratios(points, tets) < LEAST_RATIO

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volumes
+from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volumes, interface_facets
 from meshes.volume.quality import angles_between_faces
 
 Sizing = Callable[[Floats], Floats]
@@ -38,7 +38,7 @@ def smoothed(
 
     Parameters
     ----------
-    mesh : TetMesh of four-node tetrahedra
+    mesh : TetMesh of four-node tetrahedra; nodes between its regions stay
     sizing : function of points (n, 3) in metre to edge lengths (n,) asked for; None if equal.
     project : function that moves points (n, 3) near the surface onto it, along which its nodes then
         slide, each to the mean of its facets; without it, and on sharp edges, they stay.
@@ -49,7 +49,7 @@ def smoothed(
     """
     points, tets = np.array(mesh.points), mesh.tets
     facets = boundary_facets(tets)
-    outer = np.isin(np.arange(len(points)), facets)
+    outer = np.isin(np.arange(len(points)), [*facets.ravel(), *interface_facets(mesh).ravel()])
     sliding = outer & (_evenness(points, facets) > SHARP) if project else np.zeros_like(outer)
     for _ in range(STEPS):
         moved = _means(points, tets, corner_volumes(points, tets), sizing)

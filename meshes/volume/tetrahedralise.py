@@ -9,9 +9,10 @@ is meshed once per machine.
 
 import logging
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,7 +21,9 @@ from meshes.facets import tag_boundary
 from meshes.shapes.structured import Grading, extrude
 from meshes.surface.repair import check, repaired
 from meshes.surface.triangulation import Surface, area, n_pieces, thinnest, volume
+from meshes.surface.winding import joined
 from meshes.tetmesh import Floats, MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.volume.inner import with_regions
 from meshes.volume.quality import dihedral_angles
 from meshes.volume.smoothing import smoothed
 
@@ -32,6 +35,7 @@ Sizing = Callable[[Floats], Floats]
 
 EPSILON = 0.05  # of h: how far the mesh may lie from the surface
 SMALLEST_EPSILON = 1e-4  # of the diagonal: below, the mesher takes minutes to hours
+MOST_OF_INNER = 0.025  # likewise of what is inside it, whose volume may differ by 2 %
 MOST_OF_THICKNESS = 0.1  # what the envelope may be of the body's thickness, or it swallows it
 MOST_TETRAHEDRA = 1_000_000
 SHARPEST = 5.0  # degrees: least dihedral angle of a mesh that is accepted
@@ -44,16 +48,19 @@ def tetrahedralise(
     surface: Surface,
     h: float,
     *,
+    inner: Mapping[str, Surface] = MappingProxyType({}),
     sizing: Sizing | None = None,
     timeout: float = 120.0,
     epsilon: float | None = None,
 ) -> TetMesh:
-    """Four-node tetrahedra that fill a closed surface.
+    """Four-node tetrahedra that fill a closed surface, with facets in the surfaces inside it.
 
     Parameters
     ----------
     surface : Surface
     h : float, metre, edge length that is aimed at.
+    inner : name of a region and the closed surface around it, inside the other one or cut off with
+        it at one plane, as `check_inside` has it before
     sizing : function of points (n, 3) in metre to edge lengths (n,) in metre that are aimed at;
         `graded` makes one. None for h everywhere.
     timeout : float, second, after which the mesher is stopped.
@@ -62,7 +69,8 @@ def tetrahedralise(
 
     Returns
     -------
-    TetMesh with its facets in the set `surface`
+    TetMesh with its facets in the set `surface`, and with inner surfaces its regions: 0 outside of
+    them, the others from 1, with their names
 
     Raises
     ------
@@ -75,12 +83,18 @@ def tetrahedralise(
     check(surface)
     check_size(surface, "h", h)
     epsilon = _checked_epsilon(surface, h, epsilon)
+    if inner:
+        epsilon = max(
+            min(epsilon, *(MOST_OF_INNER * thinnest(s) for s in inner.values())),
+            SMALLEST_EPSILON * surface.diagonal,
+        )
     if not 0 < timeout < np.inf:
         raise MeshError(f"timeout = {timeout} s must be finite and above 0")
     grid = _size_grid(surface, h, sizing)
+    whole = joined([surface, *inner.values()])
     inputs = {
-        "points": surface.points,
-        "triangles": surface.triangles,
+        "points": whole.points,
+        "triangles": whole.triangles,
         "h": grid["grid_sizes"].max(),  # sizes above it are not reached
         "epsilon": np.array(epsilon / surface.diagonal),
         **grid,
@@ -88,8 +102,9 @@ def tetrahedralise(
     name = cache.key("tetrahedralise 3", *(inputs[part] for part in sorted(inputs)))
     entry = cache.load(name) or {}
     if {"points", "tets"} <= entry.keys():
-        return _accepted(surface, epsilon, entry["points"], entry["tets"])
-    mesh = smoothed(_accepted(surface, epsilon, *_run(inputs, timeout)), sizing)
+        return with_regions(_accepted(surface, epsilon, entry["points"], entry["tets"]), inner)
+    found = with_regions(_accepted(surface, epsilon, *_run(inputs, timeout)), inner)
+    mesh = smoothed(found, sizing)
     cache.store(name, {}, points=mesh.points, tets=mesh.tets)
     return mesh
 

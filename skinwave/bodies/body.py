@@ -16,7 +16,18 @@ from simple_model.dispersion import DispersionCurves
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
-from skinwave.bodies.parts import FLAT, PLAIN, Layer, Placement, Relief, check_material, solid_of
+from skinwave.bodies.parts import (
+    FLAT,
+    PHALANX,
+    PLAIN,
+    Layer,
+    Phalanx,
+    Placement,
+    Relief,
+    check_material,
+    check_regions,
+    solid_of,
+)
 
 BASES = ("clamped", "absorbing", "free")
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
@@ -31,7 +42,7 @@ class Body:
     ----------
     kind : the name of a registered `BodyKind`: "none" (the point kernel needs no body), "sheet"
         (thin, bends), "slab" (thick), "palm" (soft tissue on bone, `depth` below the middle of the
-        palm) or "mesh" (from a file)
+        palm), "finger" (soft tissue around bone), "disc" or "mesh" (from a file)
     material : the name of a preset, or a Material
     width, height, depth : float, metre, along x, y and downwards, at most 2; a slab's depth may
         be inf, a half-space, which only flat-body can compute
@@ -39,6 +50,9 @@ class Body:
         the ends at the wrist and the fingers or the cuts of a file
     layers : from the surface downwards; what is below them is of `material`
     relief : of a palm
+    bone : of a finger
+    regions : name or number of a region of the mesh, and its material, where that is another than
+        `material`, as bone in soft tissue
     file, unit, up : of a mesh, as `meshes.body_from_file` takes them
     placement : how the body lies under the device
     air : bool, whether air moves along on both sides of a sheet, as if in a baffle; or vacuum
@@ -59,9 +73,11 @@ class Body:
     sides: str = "absorbing"
     layers: tuple[Layer, ...] = ()
     relief: Relief = PLAIN
+    bone: Phalanx = PHALANX
     file: str = ""
     unit: str = "m"
     up: str = "+z"
+    regions: tuple[tuple[str, str | Material], ...] = ()
     placement: Placement = FLAT
     air: bool = False
     mounting: Mounting = FRAME
@@ -88,7 +104,9 @@ class Body:
             )
 
         self._check_layers()
-
+        check_regions(self.regions)
+        if self.regions and "regions" not in kind.keys:
+            raise ValueError(f"a body of kind '{self.kind}' has no regions; leave them out")
         if ("file" in kind.keys) != bool(self.file):
             raise ValueError(
                 "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
@@ -182,6 +200,18 @@ class Body:
         return tuple(found)
 
     @property
+    def solids(self) -> tuple[Material, ...]:
+        """All of its materials: of its strata, and of its regions."""
+        strata = (solid for _, solid in self.strata)
+        return (*strata, *(solid_of(material) for _, material in self.regions))
+
+    @property
+    def softest(self) -> Material:
+        """The softest of its material and those of its regions, in which its waves are slowest."""
+        inside = (solid_of(material) for _, material in self.regions)
+        return min((self.solid, *inside), key=lambda solid: solid.shear_speed)
+
+    @property
     def is_held(self) -> bool:
         """Whether it is constrained: clamped at its base or its sides."""
         return "clamped" in (self.base, self.sides)
@@ -257,11 +287,11 @@ def _size(body: Body) -> str:
 
 
 def _rayleigh(body: Body, frequency: float) -> float:
-    """Phase speed in m/s of the Rayleigh wave of a body's material, as if it were deep: in a layer
-    that is thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s
+    """Phase speed in m/s of the Rayleigh wave of a body's softest material, as if it were deep: in
+    a layer that is thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s
     sqrt(mu*/rho)) and mu* = `Material.complex_modulus`.
     """
-    solid = body.solid
+    solid = body.softest
     slowness = 1 / np.sqrt(solid.complex_modulus(2 * np.pi * frequency) / solid.density)
     return float(1 / np.real(slowness)) * solid.rayleigh_speed / solid.shear_speed
 

@@ -11,6 +11,7 @@ from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
 from skinwave.bodies.coat import coarsest_size, coat, meshed_strata
 from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.regions import in_regions
 
 HAND_CELL = 5e-3  # m: within 1.2 % of elements of 3 mm at every probe, at a third of the cost
 FINE_PALM = 2e-3  # m: elements of a palm with thin layers, 300,000 dofs; finer ones on request only
@@ -30,20 +31,22 @@ def hand_size(body: Body) -> float:
 def in_its_layers(
     body: Body, h: float, mesh: TetMesh, rest: Callable[[TetMesh], fem.Support]
 ) -> Discretised:
-    """Hand in its layers, those that its elements do not resolve as a coat.
+    """Hand in its layers, those that its elements do not resolve as a coat, and its regions.
 
     Parameters
     ----------
     body : Body
     h : metre, size of its elements
-    mesh : with its facets
+    mesh : with its facets and regions
     rest : the support of a mesh
 
     Returns
     -------
     Discretised
     """
+    region = mesh.region
     mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
+    mesh, materials = in_regions(body, mesh, materials, region, body.file or f"a {body.kind}")
     return Discretised(mesh=mesh, materials=materials, coat=coat(body, h), support=rest)
 
 
@@ -91,7 +94,7 @@ def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
     """Unrelaxed (fast) shear modulus over the mean thickness, N/m3."""
     _, normals = facet_geometry(mesh, boundary_facets(mesh.tets))
     thickness = corner_volumes(mesh.points, mesh.tets).sum() / np.maximum(normals[..., 2], 0).sum()
-    return float((body.solid.shear_modulus + body.solid.fast_modulus) / thickness)
+    return float((body.softest.shear_modulus + body.softest.fast_modulus) / thickness)
 
 
 def depths(mesh: TetMesh) -> Floats:

@@ -1,12 +1,13 @@
 """Body in a file: a surface that is filled with elements, or a volume mesh."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import fem
 from fem.load_and_probe import facet_normals
-from meshes import MeshError, TetMesh, body_from_file, boundary_facets, quadratic
+from meshes import TetMesh, body_from_file, boundary_facets, quadratic
 from meshes.facets import seen_from_above
 from meshes.tetmesh import Ints
 from skinwave.bodies.body import Body, BodyKind, register
@@ -25,29 +26,20 @@ def discretise(body: Body, h: float) -> Discretised:
     Raises
     ------
     MeshError
-        If the body cannot be meshed, or its file has several regions.
+        If the body cannot be meshed, or its regions are not those of its file.
     """
     mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
-    _check_regions(body.file, mesh)
     cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
     facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
     if not _is_rest(mesh):
         facets["bottom"] = mesh.facets["bottom"]
-    mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets=facets)
+    mesh = replace(mesh, facets=facets)
     return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
 
 
 def _support(body: Body, mesh: TetMesh) -> fem.Support:
     """Support below, by the normals of the facets."""
     return support(body, mesh, facet_normals(mesh, boundary_facets(mesh.tets)), [])
-
-
-def _check_regions(file: str, mesh: TetMesh) -> None:
-    if (count := len(np.unique(mesh.region))) > 1:
-        raise MeshError(
-            f"{file} has {count} regions, but a body from a file is of one material or of layers "
-            "below its top; save it as one region and describe its layers in the scene"
-        )
 
 
 def _is_rest(mesh: TetMesh) -> bool:
@@ -65,7 +57,7 @@ def _corners(facets: Ints) -> set[tuple[int, ...]]:
 MESH = register(
     BodyKind(
         name="mesh",
-        keys=("file", "unit", "up"),
+        keys=("file", "unit", "up", "regions"),
         words=lambda body: f"body from {Path(body.file).name}, {body.up} towards the device",
         discretise=discretise,
         default_size=hand_size,

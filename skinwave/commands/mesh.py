@@ -10,10 +10,15 @@ def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, glb, vtp) or mesh (vtu, "
-        "msh, inp, vtk)",
+        "msh, inp, vtk, mesh)",
     )  # fmt: skip
     parser.add_argument("--unit", default="m", help="of the file: m (default), cm, mm, um or in")
     parser.add_argument("--up", default="+z", help="axis that points to the device (default +z)")
+    parser.add_argument(
+        "--inner", type=Path, action="append", default=[], metavar="FILE",
+        help="closed surface inside it, such as a bone's, a region by the name of its file; again "
+        "for more",
+    )  # fmt: skip
     parser.add_argument(
         "--clip", type=float, nargs=4, metavar=("XMIN", "XMAX", "YMIN", "YMAX"),
         help="keep this patch, mm from the middle of the palm",
@@ -28,6 +33,8 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
+    import numpy as np
+
     from meshes import body_from_file, dihedral_angles, write
     from meshes.files.mesh_files import WRITTEN
     from skinwave.outputs import output_path
@@ -39,13 +46,15 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"{out.parent} is no folder; make it or choose another --out")
     said: list[str] = []
     with (
-        output_path(out, overwrite=options.overwrite, inputs=[options.file]) as aside,
+        output_path(
+            out, overwrite=options.overwrite, inputs=[options.file, *options.inner]
+        ) as aside,
         progress_of(options) as progress,
     ):
         mesh = body_from_file(
             options.file, options.h / 1e3,
-            unit=options.unit, up=options.up, timeout=options.timeout, say=said.append,
-            progress=progress,
+            unit=options.unit, up=options.up, inner=options.inner, timeout=options.timeout,
+            say=said.append, progress=progress,
             clip=None if options.clip is None else [side / 1e3 for side in options.clip],
         )  # fmt: skip
         progress("writing", 0.9)
@@ -56,6 +65,10 @@ def run(options: argparse.Namespace) -> int:
         "points": len(mesh.points),
         "least_dihedral_angle": round(float(dihedral_angles(mesh).min()), 2),
         "facets": {name: len(facets) for name, facets in sorted(mesh.facets.items())},
+        "regions": {
+            mesh.region_names.get(r, str(r)): int((mesh.region == r).sum())
+            for r in np.unique(mesh.region).tolist()
+        },
         "said": said,
     }
     sets = ", ".join(f"{name} {len(facets):,}" for name, facets in sorted(mesh.facets.items()))

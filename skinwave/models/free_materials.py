@@ -61,10 +61,15 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
     Raises
     ------
     ValueError
-        If a key is none that can be free, or its range is none.
+        If a key is none that can be free, its range is none, or the body has regions.
     """
     if not free:
         raise ValueError("free = {} names no key; give one, such as body.material.shear_modulus_pa")
+    if body.regions:
+        raise ValueError(
+            "materials of a body with regions cannot be free, because its matrices are not sorted "
+            "by region; reduce a body for each value"
+        )
     found = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
     for bound in (0.0, 1.0):  # which materials refuse, they refuse here
         with_values(body, found, values_at(found, [bound] * len(found)))

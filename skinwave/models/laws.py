@@ -21,7 +21,7 @@ OCTAVE = 2.0  # below its first frequency, as far as its Prony series continues 
 
 def own_laws(body: Body) -> tuple[Material, ...]:
     """The materials of a body that have a modulus law of their own."""
-    return tuple(solid for _, solid in body.strata if solid.law is not None)
+    return tuple(solid for solid in body.solids if solid.law is not None)
 
 
 def has_own_law(body: Body) -> bool:
@@ -80,7 +80,8 @@ def relaxing(body: Body, tolerance: float) -> Body:
         return material if solid.law is None else solid.relaxing(tolerance)
 
     layers = tuple(replace(layer, material=made(layer.material)) for layer in body.layers)
-    return replace(body, material=made(body.material), layers=layers)
+    regions = tuple((name, made(material)) for name, material in body.regions)
+    return replace(body, material=made(body.material), layers=layers, regions=regions)
 
 
 def without_own_law(model: str, body: Body) -> None:

@@ -96,7 +96,7 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
 
 
 def _scene_damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
-    if not any(solid.loss_factor for _, solid in scene.body.strata):
+    if not any(solid.loss_factor for solid in scene.body.solids):
         return ()  # before the lines are computed
     return damping_misfit(scene, *response_spectrum(scene, tolerance), tolerance)
 
@@ -117,7 +117,7 @@ def damping_misfit(
     -------
     one sentence, or none
     """
-    if not any(solid.loss_factor for _, solid in scene.body.strata):
+    if not any(solid.loss_factor for solid in scene.body.solids):
         return ()
     stretched = tension(scene.body)
     w, share = 2 * np.pi * np.maximum(frequencies, 1e-9), np.ones(len(frequencies))

@@ -135,6 +135,9 @@ def above(body: Body) -> str:
     for thickness, material in ((layer.thickness, layer.material) for layer in body.layers):
         of = material if isinstance(material, str) else _material(material)
         text += f"; above it {1e3 * thickness:g} mm of {of}"
+    for name, material in body.regions:
+        of = material if isinstance(material, str) else _material(material)
+        text += f"; its region {name} of {of}"
     place = body.placement
     if place.is_tilted:
         x, y = np.degrees([place.tilt_x, place.tilt_y])

@@ -15,6 +15,7 @@ from skinwave.verify import (
     elements,
     exact,
     extremes,
+    fingertip,
     nonlinear,
     plates,
     relaxing,
@@ -65,6 +66,7 @@ TOPICS: Mapping[str, Mapping[str, Callable[[], Case]]] = {
         "focus-at-rest-0.4999": partial(statics.focus_at_rest_on_half_space, 0.4999),
         "poisson-ratios": statics.focus_at_rest_on_a_layer,
         "stiffness-contrast": statics.column_of_two_layers,
+        "fingertip-with-bone": fingertip.beside_another_code,
     },
     "Plates and beams": {
         "clamped-sheet": plates.clamped_sheet,

@@ -1,0 +1,146 @@
+"""Fingertip: an elliptic cylinder of soft tissue that ends in half an ellipsoid, with a bone of the
+same kind inside, meshed in shells.
+
+The half ball |x| + |y| + |z| <= n, y >= 0, of a lattice of tetrahedra and the prisms that continue
+its section y = 0 are mapped shell by shell: so many shells within the bone, the others around it,
+each a surface between that of the bone and the skin. Each eighth of the ball is a simplex in Kuhn's
+subdivision (edgewise: Edelsbrunner and Grayson, Discrete Comput Geom 24:707 (2000)).
+"""
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+
+from meshes.shapes.structured import extruded
+from meshes.tetmesh import Floats, Ints, MeshError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fingertip:
+    """Shape of a fingertip below the plane z = 0, its tip towards +y, its middle at the origin.
+
+    Parameters
+    ----------
+    breadth, length, thickness : float, metre, along x, y and z
+    bone_breadth, bone_thickness : float, metre
+    cover : float, metre, of soft tissue between the pad and the bone
+    tip : float, metre, of soft tissue between the tip and the bone
+
+    Raises
+    ------
+    MeshError
+        If a length is not finite and above 0, or the bone is not within the tissue.
+    """
+
+    breadth: float
+    length: float
+    thickness: float
+    bone_breadth: float
+    bone_thickness: float
+    cover: float
+    tip: float
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0 < value < np.inf:
+                raise MeshError(f"{name} = {value} m of a fingertip must be finite and above 0")
+        if self.length <= self.breadth / 2:
+            raise MeshError(
+                f"a fingertip of {1e3 * self.length:g} mm is no longer than its round end, half of "
+                f"{1e3 * self.breadth:g} mm; make it longer"
+            )
+        below = self.thickness - self.cover - self.bone_thickness
+        if not (self.bone_breadth < self.breadth and below > 0 and self.tip < self.breadth / 2):
+            raise MeshError(
+                f"a bone of {1e3 * self.bone_breadth:g} x {1e3 * self.bone_thickness:g} mm under "
+                f"{1e3 * self.cover:g} mm of tissue, {1e3 * self.tip:g} mm from the tip, is not "
+                f"inside a fingertip of {1e3 * self.breadth:g} x {1e3 * self.thickness:g} mm, "
+                "whose round end is half as long as it is broad; make it smaller"
+            )
+
+    @property
+    def section(self) -> float:
+        """Where the cylinder ends and the round end begins, metre along y."""
+        return (self.length - self.breadth) / 2
+
+    @property
+    def semi_axes(self) -> tuple[Floats, Floats]:
+        """Semi-axes (3,) in metre of bone and skin at the round end."""
+        bone = [self.bone_breadth, self.breadth - 2 * self.tip, self.bone_thickness]
+        return np.array(bone) / 2, np.array([self.breadth, self.breadth, self.thickness]) / 2
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Heights in metre of the axes of bone and skin."""
+        return -self.cover - self.bone_thickness / 2, -self.thickness / 2
+
+
+def lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
+    """Points (n, 3) and tetrahedra (e, 4) of half a ball of so many shells, y >= 0, and below it,
+    y < 0, of a cylinder of so many layers on its section.
+    """
+    eighth = _simplex(shells)
+    signs = np.array(list(product((-1, 1), (1,), (-1, 1))))
+    ball = (eighth * signs[:, None, None]).reshape(-1, 4, 3)
+    section = _section(ball)
+    plane, triangles = np.unique(section.reshape(-1, 2), axis=0, return_inverse=True)
+    rod = extruded(plane, triangles.reshape(-1, 3), np.arange(-layers, 1), order=1)
+    corners = np.vstack([ball, np.round(rod.points[rod.tets][..., [0, 2, 1]]).astype(np.int64)])
+    points, tets = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    return points.astype(np.float64), tets.reshape(-1, 4)
+
+
+def _simplex(n: int) -> Ints:
+    """Corners (n^3, 4, 3) of the tetrahedra that x, y, z >= 0, x + y + z <= n is cut into: where
+    a <= b <= c, cubes along their diagonals, of a = x, b = x + y and c = x + y + z.
+    """
+    cubes = np.array(list(product(range(n), repeat=3)))
+    steps = np.cumsum(
+        [[[0] * 3, *np.eye(3, dtype=np.int64)[list(order)]] for order in permutations(range(3))],
+        axis=1,
+    )
+    a, b, c = np.moveaxis((cubes[:, None, None] + steps).reshape(-1, 4, 3), 2, 0)
+    inside = ((a <= b) & (b <= c) & (c <= n)).all(axis=1)
+    return np.stack([a, b - a, c - b], axis=2)[inside]
+
+
+def _section(ball: Ints) -> Ints:
+    """Triangles (k, 3, 2) along x and z of the half ball's section y = 0."""
+    on_it = ball[..., 1] == 0
+    flat = on_it.sum(axis=1) == 3
+    return ball[flat][on_it[flat]].reshape(-1, 3, 3)[..., [0, 2]]
+
+
+def shell_of(lattice: Floats) -> Floats:
+    """Shell (n,) of points of the lattice."""
+    return np.abs(lattice[:, 0]) + np.maximum(lattice[:, 1], 0) + np.abs(lattice[:, 2])
+
+
+def placed(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
+    """Points of a fingertip where those of the lattice are.
+
+    Parameters
+    ----------
+    shape : Fingertip
+    lattice : (n, 3) float, between points of the lattice, too
+    ends : shells that are the surfaces of bone and tissue
+    layers : of the cylinder
+
+    Returns
+    -------
+    (n, 3) float, metre
+    """
+    shell = shell_of(lattice)[:, None]
+    shares = (lattice * [1, 0, 1] + np.maximum(lattice, 0) * [0, 1, 0]) / np.maximum(shell, 1e-300)
+    outward = np.sin(np.pi / 2 * shares)  # evener on a sphere than the shares themselves
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)
+    (bone_axes, skin_axes), (bone_height, height) = shape.semi_axes, shape.heights
+    bone = outward * bone_axes + [0, 0, bone_height]
+    skin = outward * skin_axes + [0, 0, height]
+    inner, outer = ends
+    within = np.minimum(shell / inner, 1)
+    beyond = np.maximum(shell - inner, 0) / (outer - inner)
+    points = within * bone + (1 - within) * [0, 0, bone_height] + beyond * (skin - bone)
+    rod = shape.length - shape.breadth / 2
+    return points + [0, shape.section, 0] + np.minimum(lattice[:, 1:2], 0) * [0, rod / layers, 0]

@@ -1,0 +1,82 @@
+"""Generalised winding number of closed surfaces, and surfaces inside others."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from meshes.surface.repair import check
+from meshes.surface.self_intersection import self_intersections
+from meshes.surface.triangulation import Surface
+from meshes.tetmesh import Floats, MeshError
+
+CHUNK = 2_000_000  # pairs of points and triangles at once
+
+
+def winding_number(surface: Surface, points: Floats) -> Floats:
+    """Winding number (n,) of a closed surface about points (n, 3): 1 inside, 0 outside.
+
+    Solid angles of its triangles (van Oosterom and Strackee, IEEE Trans Biomed Eng 30:125 (1983))
+    over 4 pi, as Jacobson, Kavan and Sorkine-Hornung, ACM Trans Graph 32:33 (2013) add them up.
+    """
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    found = np.zeros(len(points))
+    corners = surface.points[surface.triangles]
+    for some in np.array_split(near, max(1, len(near) * len(corners) // CHUNK)):
+        found[some] = _solid_angles(corners, points[some]) / (4 * np.pi)
+    return found
+
+
+def _solid_angles(corners: Floats, points: Floats) -> Floats:
+    """Sum (n,) of the solid angles of triangles (k, 3, 3) at points (n, 3)."""
+    a, b, c = (corners[:, i] - points[:, None] for i in range(3))
+    la, lb, lc = (np.sqrt(np.einsum("pki,pki->pk", x, x)) for x in (a, b, c))
+    ab, bc, ca = (np.einsum("pki,pki->pk", x, y) for x, y in ((a, b), (b, c), (c, a)))
+    volume = np.einsum("pki,pki->pk", np.cross(a, b), c)
+    return np.asarray(
+        2 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum(axis=1)
+    )
+
+
+def joined(surfaces: list[Surface]) -> Surface:
+    """All triangles of some surfaces as one."""
+    first = np.cumsum([0, *(len(each.points) for each in surfaces)])
+    triangles = [each.triangles + n for each, n in zip(surfaces, first, strict=False)]
+    return Surface(
+        points=np.vstack([each.points for each in surfaces]), triangles=np.vstack(triangles)
+    )
+
+
+def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
+    """Check that closed surfaces are inside another, and that none cross.
+
+    Raises
+    ------
+    MeshError
+        If one is not closed, not inside, or crosses the outer or another.
+    """
+    for name, surface in inner.items():
+        try:
+            check(surface)
+        except MeshError as error:
+            raise MeshError(f"{name}: {error}") from None
+    every = {"the body": outer, **inner}
+    both = joined(list(every.values()))
+    owner = np.repeat(np.arange(len(every)), [len(each.triangles) for each in every.values()])
+    pairs = self_intersections(both)
+    if len(pairs):
+        one, other = (list(every)[owner[k]] for k in pairs[0])
+        place = 1e3 * both.points[both.triangles[pairs[0, 0]]].mean(axis=0)
+        raise MeshError(
+            f"the surfaces of {one} and {other} cross at {len(pairs)} pairs of triangles, first "
+            "near ({:.4g}, {:.4g}, {:.4g}) mm; ".format(*place)
+            + "make the inner one smaller, or move it inside"
+        )
+    for name, surface in inner.items():
+        if not winding_number(outer, surface.points[:1])[0] > 0.5:
+            place = 1e3 * surface.points.mean(axis=0)
+            raise MeshError(
+                f"{name} is not inside the body: its middle is at "
+                "({:.4g}, {:.4g}, {:.4g}) mm; ".format(*place)
+                + "give both files in one frame and one unit"
+            )

@@ -1,0 +1,46 @@
+"""Disc: a cylinder on its base, such as a silicone that stands for skin."""
+
+from meshes.shapes.disc import disc
+from skinwave.bodies.body import Body, BodyKind, register
+from skinwave.bodies.discretised import Discretised, in_layers
+
+
+def check(body: Body) -> None:
+    """Refuse what is not round.
+
+    Raises
+    ------
+    ValueError
+        If width and height differ.
+    """
+    if body.width != body.height:
+        raise ValueError(
+            f"a disc is {1e3 * body.width:g} mm wide along x and {1e3 * body.height:g} mm along y; "
+            "give it one diameter as size_x_mm and size_y_mm"
+        )
+
+
+def discretise(body: Body, h: float) -> Discretised:
+    """Ten-node tetrahedra of at most h in metre, in even rings and layers."""
+    mesh = disc(body.width, body.depth, h)
+    depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+    mesh, materials = in_layers(mesh, body.strata, depths)
+    return Discretised(mesh=mesh, materials=materials)
+
+
+DISC = register(
+    BodyKind(
+        name="disc",
+        presets={
+            "silicone-disc": {
+                "material": "ecoflex", "width": 0.08, "height": 0.08, "depth": 0.02,
+                "sides": "free",
+            }
+        },
+        check=check,
+        words=lambda body: f"disc of {1e3 * body.width:g} x {1e3 * body.depth:g} mm",
+        discretise=discretise,
+        default_size=lambda body: min(body.width / 20, body.depth / 4),
+        is_symmetric=True,
+    )
+)  # fmt: skip

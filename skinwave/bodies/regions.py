@@ -1,0 +1,91 @@
+"""Regions of a mesh with materials of their own, such as bone in soft tissue."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fem.materials import Material
+from meshes import MeshError, TetMesh, corner_volumes
+from meshes.tetmesh import Ints
+from skinwave.bodies.body import Body
+from skinwave.bodies.parts import solid_of
+
+
+def in_regions(
+    body: Body, mesh: TetMesh, materials: Sequence[Material], region: Ints, source: str
+) -> tuple[TetMesh, list[Material]]:
+    """Mesh whose regions are those of its materials.
+
+    Parameters
+    ----------
+    body : Body, whose `regions` name regions of the mesh
+    mesh : TetMesh, with the materials where none of these is
+    materials : by region of the mesh
+    region : (m,) int, region of each element in the sense of `body.regions`
+    source : of the mesh, for messages
+
+    Returns
+    -------
+    TetMesh, and materials by region
+
+    Raises
+    ------
+    MeshError
+        If it has several regions and the body names none, or has none of a name; or if
+        `body.material` is nowhere.
+    """
+    named = replace(mesh, region=region)
+    if not body.regions and len(np.unique(region)) > 1:
+        raise MeshError(
+            f"{source} has regions {described(named)}, and the scene does not say which material "
+            "they are of; name those of another material than the rest in [body.regions]"
+        )
+    now = np.array(mesh.region)
+    for k, (name, _) in enumerate(body.regions):
+        now[region == number_of(name, named, source)] = len(materials) + k
+    own = [solid_of(material) for _, material in body.regions]
+    if (now >= len(materials)).all() and body.solid not in own:
+        raise MeshError(
+            f"[body.regions] names all of {source}, {described(named)}, and none of them is of "
+            "[body] material, that of the rest; give it the material of the softest of them"
+        )
+    return replace(mesh, region=now), [*materials, *own]
+
+
+def number_of(name: str, mesh: TetMesh, source: str) -> int:
+    """Number of a region of a mesh.
+
+    Parameters
+    ----------
+    name : its name, or its number
+    mesh : TetMesh
+    source : of the mesh, for the message
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    MeshError
+        If there is none of that name.
+    """
+    numbers = set(np.unique(mesh.region).tolist())
+    known = {title: number for number, title in mesh.region_names.items() if number in numbers}
+    known = {str(number): number for number in numbers} | known
+    if name not in known:
+        raise MeshError(
+            f"[body.regions] has '{name}', but the regions of {source} are {described(mesh)}; take "
+            "one of them, or mesh the surface of a bone with the body: skinwave mesh --inner"
+        )
+    return known[name]
+
+
+def described(mesh: TetMesh) -> str:
+    """Regions of a mesh by name and number, with their volumes."""
+    volumes = np.bincount(mesh.region, corner_volumes(mesh.points, mesh.tets))
+    return ", ".join(
+        f"{mesh.region_names.get(r, '')} {r} ({1e6 * volumes[r]:.3g} cm3)".strip()
+        for r in np.unique(mesh.region).tolist()
+    )
