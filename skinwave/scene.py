@@ -17,6 +17,7 @@ from skinwave.bodies import (
     Mounting,
     Placement,
     Relief,
+    Sides,
     body_name,
     kind_of,
     solid_of,
@@ -25,7 +26,7 @@ from skinwave.distributions import Distribution
 
 __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
-    "Body", "Layer", "Mounting", "Placement", "Reading", "Relief", "Scene",
+    "Body", "Layer", "Mounting", "Placement", "Reading", "Relief", "Scene", "Sides",
     "body_name", "check_motion", "kind_of", "solid_of", "with_body",
 ]  # fmt: skip
 

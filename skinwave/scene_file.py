@@ -152,6 +152,8 @@ def to_table(scene: Scene) -> dict[str, Any]:
         del table["placement"]
     for key in _keys_of_kinds() - set(body.of_kind.keys):
         table["body"].pop(key, None)
+    if not body.base_stiffness:
+        table["body"].pop("base_stiffness_n_per_m3", None)
     return with_spreads(table, scene.spreads)
 
 

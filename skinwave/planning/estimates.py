@@ -13,6 +13,7 @@ from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
 from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance, is_flat_layer, stack
+from skinwave.bodies.mounting import EDGES
 from skinwave.scene import Body, Scene
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
@@ -95,7 +96,7 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     """
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
-    images = [] if is_laterally_infinite(body) else _mirrored(probes, half)
+    images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
     if images and _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
@@ -173,6 +174,12 @@ def _mirrored(points: Floats, half: Floats) -> list[Floats]:
         for axis in (0, 1)
         for sign in (-1, 1)
     ]
+
+
+def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
+    """The mirror images in those of a body's four sides that do not absorb."""
+    each = zip(EDGES, images, strict=True)  # both are left, right, front and back
+    return [image for name, image in each if body.side(name) != "absorbing"]
 
 
 def _to_edge(scene: Scene, half: Floats) -> float:

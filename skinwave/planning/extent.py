@@ -39,7 +39,7 @@ def symmetry(scene: Scene) -> str:
     return "".join(
         axis
         for axis, x in zip("xy", path_points.T, strict=True)
-        if np.abs(x).max() < 1e-9 and axis in scene.body.mounting.symmetry
+        if np.abs(x).max() < 1e-9 and axis in scene.body.symmetry
     )
 
 
