@@ -243,6 +243,14 @@ def _write_sides(sides: str | Sides) -> str | dict[str, str]:
     return sides if isinstance(sides, str) else sides.by_name
 
 
+def _direction(key: str, value: Any) -> str | tuple[float, ...]:
+    return value if isinstance(value, str) else _numbers(key, value)
+
+
+def _write_direction(direction: str | tuple[float, ...]) -> str | list[float]:
+    return direction if isinstance(direction, str) else list(direction)
+
+
 def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     x, y = _pair(key, value)
     return x / 1e3, y / 1e3
@@ -396,6 +404,13 @@ SECTIONS = {
         "air": SceneKey("air", _switch, bool),
         "mounting": SceneKey("mounting", _mounting, partial(written, MOUNTING)),
         "grammage_g_m2": _scaled("grammage", 1e3),
+    },
+    "load": {
+        "kind": _word("kind"),
+        "direction": SceneKey("direction", _direction, _write_direction),
+        "force_n": _scaled("force"),
+        "width_mm": _scaled("width", 1e3),
+        "gravity_m_per_s2": _scaled("gravity"),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),

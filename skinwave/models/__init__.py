@@ -67,6 +67,7 @@ class Model:
     seconds, memory : predicted for a first response where a plan does not measure, s and bytes
     colour : str, of figures
     reads : whether it has the quantity that a scene asks for, at the depths of its probes
+    takes : whether it takes the load of a scene
     quantity : name of the one that it has whatever a scene asks for, as the point kernel has; or ""
     needs_body : bool
     is_reduced : bool, whether bodies are reduced once for all Tactons
@@ -90,6 +91,7 @@ class Model:
     colour: str = "#56B4E9"
     label: str = ""
     reads: "Callable[[Scene], bool]" = lambda scene: scene.reading.is_plain
+    takes: "Callable[[Scene], bool]" = lambda scene: scene.load.is_plain
     quantity: str = ""
     needs_body: bool = True
     is_reduced: bool = False
@@ -120,7 +122,7 @@ def register(model: Model) -> Model:
 
 
 def check_reading(model: Model, scene: "Scene") -> None:
-    """Refuse a scene whose quantity or depth a model does not have.
+    """Refuse a scene whose quantity, depth or load a model does not have.
 
     Raises
     ------
@@ -131,6 +133,11 @@ def check_reading(model: Model, scene: "Scene") -> None:
         raise ValueError(
             f"{model.name} has no {scene.reading.words}; use --model fem, or ask for the "
             "displacement at the surface"
+        )
+    if not model.takes(scene):
+        raise ValueError(
+            f"{model.name} does not take {scene.load.words} with {scene.reading.words}; use "
+            "--model fem, or leave out [load]"
         )
 
 

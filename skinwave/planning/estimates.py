@@ -38,7 +38,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if pressure.profile != "gaussian":  # of the same width; only to find which lines matter
+        if pressure.gaussian_width is None:  # of the same width; only to find which lines matter
             pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(
@@ -80,7 +80,7 @@ def is_laterally_infinite(body: Body) -> bool:
 
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
-    return is_flat_layer(scene.body) and scene.pressure.profile == "gaussian"
+    return is_flat_layer(scene.body) and scene.pressure.gaussian_width is not None
 
 
 def reflection_and_transient(scene: Scene) -> tuple[float, float]:
@@ -97,7 +97,8 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
     images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
-    if images and _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
+    width = scene.pressure.gaussian_width or spot_width(scene.pressure.height)
+    if images and _to_edge(scene, half) < 2 * width:
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
     seen = np.vstack([probes, *images])
@@ -147,7 +148,8 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     -------
     float, 0..1; 1, for unknown, of a body with too little loss for that
     """
-    body, width = scene.body, spot_width(scene.pressure.height)
+    body = scene.body
+    width = scene.pressure.gaussian_width or spot_width(scene.pressure.height)
     path = _along(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0

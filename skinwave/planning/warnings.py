@@ -41,7 +41,7 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
         *over_tolerance(
             f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"
         ),
-        *under_resolved(h, spot_width(scene.pressure.height)),
+        *under_resolved(h, scene.pressure.gaussian_width or spot_width(scene.pressure.height)),
     )
 
 

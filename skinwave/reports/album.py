@@ -31,7 +31,7 @@ from skinwave.pictures.motion import Waves, waves
 from skinwave.pictures.views import View, body_view, fastest_line, kernel_view, load, save
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Scene, body_name, check_motion, with_body
+from skinwave.scene import BODIES, Scene, body_name, check_load, check_motion, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
 from skinwave.studies import paper15
@@ -70,6 +70,7 @@ def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
     ValueError
         If a body beside it is unknown, or the path or probes do not fit on it.
     """
+    check_load(scene, "a film or report")
     bodies: dict[str, Scene] = {}
     if scene.body.of_kind.discretise:
         bodies[body_name(scene.body)] = scene
