@@ -80,7 +80,9 @@ def complete(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides
         return sides
     given = sides.by_name
     if beyond := [name for name in given if name not in known]:
-        has = f"its sides are {' and '.join(known)}" if known else "its sides are all alike"
+        has = f"its sides are {' and '.join(known)}" if known else (
+            "whose sides are all alike; a sheet has edges in its mounting"
+        )
         raise ValueError(f"a {kind} has no side '{beyond[0]}' of its own, {has}; leave it out")
     found = dict.fromkeys(known, USUAL) | given
     alike = set(found.values())
@@ -123,7 +125,18 @@ def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> 
 
 
 def bed(mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
-    """Winkler foundation: springs in all directions below facets (k, a), so many N/m3 each."""
+    """Winkler foundation: springs in all directions.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    facets : (k, a) int, boundary facets
+    stiffness : N/m3, traction per displacement
+
+    Returns
+    -------
+    Support
+    """
     k = np.full(len(facet_points(mesh, facets)), stiffness)
     return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
 
