@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from simple_model.compliance import Compliance
+from simple_model.focus import gaussian_width
 from simple_model.load_spectrum import (
     foci_harmonics,
     harmonics,
@@ -317,7 +318,7 @@ def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpli
 
 def _check(pressure: MovingPressure) -> None:
     check_lines(pressure)
-    if pressure.gaussian_width is None:
+    if gaussian_width(pressure.height, pressure.profile) is None:
         raise ValueError(
             f"focus '{pressure.profile_name}' has no flat-body solution; use 'gaussian'"
         )
@@ -325,8 +326,9 @@ def _check(pressure: MovingPressure) -> None:
 
 def _width(pressure: MovingPressure) -> float:
     """Standard deviation in metre of the focal spot, which `_check` has found to be Gaussian."""
-    assert pressure.gaussian_width is not None
-    return pressure.gaussian_width
+    width = gaussian_width(pressure.height, pressure.profile)
+    assert width is not None
+    return width
 
 
 def _offsets(pressure: MovingPressure, probes: ArrayLike) -> Floats:

@@ -20,7 +20,6 @@ from simple_model.focus import (
     ContactSpot,
     FocalSpot,
     along_axis,
-    gaussian_width,
     moved_spot,
     relative_intensity,
 )
@@ -108,11 +107,6 @@ class MovingPressure:
     def profile_name(self) -> str:
         """Name of the focal spot, "own" if it has none."""
         return self.profile if isinstance(self.profile, str) else "own"
-
-    @property
-    def gaussian_width(self) -> float | None:
-        """Standard deviation in metre of the focal spot; None unless it is Gaussian."""
-        return gaussian_width(self.height, self.profile)
 
     def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s.

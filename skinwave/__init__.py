@@ -16,6 +16,8 @@ from typing import Any  # noqa: E402
 _HOMES = {
     "BODIES": "scene",
     "Body": "scene",
+    "Load": "scene",
+    "Sides": "scene",
     "Scene": "scene",
     "read": "scene_file",
     "loads": "scene_file",

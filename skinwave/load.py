@@ -75,8 +75,9 @@ class Load:
 
     @property
     def words(self) -> str:
-        """Its kind, and gravity, in a few words."""
-        return self.of_kind.words + (" and gravity" if self.gravity else "")
+        """Its kind, its direction and gravity, in a few words."""
+        gravity = f" and gravity of {self.gravity:g} m/s2" if self.gravity else ""
+        return f"{self.of_kind.words(self)}{gravity}"
 
     def pressures(self, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
         """Its components (c,), each a moving scalar load."""
@@ -95,7 +96,8 @@ class LoadKind:
 
     Parameters
     ----------
-    name, words : str, in a scene; in sentences
+    name : str, in a scene
+    words : a load in a few words, in sentences
     defaults : attributes of `Load` that it has beside gravity, and their values if not given
     check : raises a ValueError, with the reason, for a load that it is not
     acting : the Tacton's pressure -> the scalar load that moves
@@ -103,7 +105,7 @@ class LoadKind:
     """
 
     name: str
-    words: str
+    words: Callable[[Load], str]
     defaults: dict[str, Any]
     tractions: Callable[[Load, Floats], Floats]
     check: Callable[[Load], object] = lambda load: None
@@ -201,16 +203,32 @@ def _check_contact(load: Load) -> None:
     _check_direction(load, 3)
 
 
-register(LoadKind(name="pressure", words="pressure", defaults={}, tractions=_pushing))
+def _shear_in_words(load: Load) -> str:
+    way = "the path" if load.direction == ALONG_PATH else _shown(load.direction)
+    return f"a shear traction along {way}"
+
+
+def _contact_in_words(load: Load) -> str:
+    return (
+        f"a force of {load.force:g} N along {_shown(load.direction)} over a contact of "
+        f"{1e3 * load.width:g} mm"
+    )
+
+
+def _shown(direction: Any) -> str:
+    return f"({', '.join(f'{x:g}' for x in direction)})"
+
+
+register(LoadKind(name="pressure", words=lambda load: "pressure", defaults={}, tractions=_pushing))
 register(
     LoadKind(
-        name="shear", words="a shear traction", defaults={"direction": (1.0, 0.0)},
+        name="shear", words=_shear_in_words, defaults={"direction": (1.0, 0.0)},
         tractions=_dragging, check=_check_shear, pressures=_along,
     )
 )  # fmt: skip
 register(
     LoadKind(
-        name="point_force", words="the force of a small contact",
+        name="point_force", words=_contact_in_words,
         defaults={"direction": (0.0, 0.0, -1.0), "force": 0.0, "width": 2e-3},
         tractions=_of_contact, check=_check_contact, acting=_contact,
     )

@@ -80,8 +80,10 @@ def complete(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides
         return sides
     given = sides.by_name
     if beyond := [name for name in given if name not in known]:
-        has = f"its sides are {' and '.join(known)}" if known else (
-            "whose sides are all alike; a sheet has edges in its mounting"
+        has = (
+            f"its sides are {' and '.join(known)}"
+            if known
+            else ("whose sides are all alike; a sheet has edges in its mounting")
         )
         raise ValueError(f"a {kind} has no side '{beyond[0]}' of its own, {has}; leave it out")
     found = dict.fromkeys(known, USUAL) | given

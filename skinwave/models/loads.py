@@ -112,7 +112,18 @@ def sag(
 
 
 def with_sag(components: Floats, sag: Floats | float, asked: Quantity) -> Floats:
-    """Components (t, p c) with those under gravity (p c,), of which rates have none."""
+    """Components with those under gravity, of which rates have none.
+
+    Parameters
+    ----------
+    components : (t, p c) float
+    sag : (p c,) float, under gravity
+    asked : Quantity, that they are of
+
+    Returns
+    -------
+    (t, p c) float
+    """
     return components if asked.rate else components + sag
 
 

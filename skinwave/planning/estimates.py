@@ -6,9 +6,9 @@ from math import isfinite
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Trajectory
+from simple_model import MovingPressure, Trajectory
 from simple_model.flat_body import flat_body, steady_lines, steady_state
-from simple_model.focus import spot_width
+from simple_model.focus import gaussian_width, spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
 from simple_model.wavenumber_integral import point_response
@@ -38,7 +38,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if pressure.gaussian_width is None:  # of the same width; only to find which lines matter
+        if _width(pressure) is None:  # of the same width; only to find which lines matter
             pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(
@@ -80,7 +80,16 @@ def is_laterally_infinite(body: Body) -> bool:
 
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
-    return is_flat_layer(scene.body) and scene.pressure.gaussian_width is not None
+    return is_flat_layer(scene.body) and _width(scene.pressure) is not None
+
+
+def spot_scale(pressure: MovingPressure) -> float:
+    """Standard deviation in metre of the Gaussian that is, or is as wide as, the focal spot."""
+    return _width(pressure) or spot_width(pressure.height)
+
+
+def _width(pressure: MovingPressure) -> float | None:
+    return gaussian_width(pressure.height, pressure.profile)
 
 
 def reflection_and_transient(scene: Scene) -> tuple[float, float]:
@@ -97,7 +106,7 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
     images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
-    width = scene.pressure.gaussian_width or spot_width(scene.pressure.height)
+    width = spot_scale(scene.pressure)
     if images and _to_edge(scene, half) < 2 * width:
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
@@ -149,7 +158,7 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     float, 0..1; 1, for unknown, of a body with too little loss for that
     """
     body = scene.body
-    width = scene.pressure.gaussian_width or spot_width(scene.pressure.height)
+    width = spot_scale(scene.pressure)
     path = _along(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from simple_model.focus import gaussian_width
 from simple_model.sampling import resolving_step
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
@@ -275,7 +276,7 @@ def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
     if not FLAT_BODY.takes(scene):
         return f"the wavenumber integral has no {scene.reading.words} under {scene.load.words}"
-    if scene.pressure.gaussian_width is None:
+    if gaussian_width(scene.pressure.height, scene.pressure.profile) is None:
         return (
             f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.profile_name}'"
         )
