@@ -9,9 +9,15 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from meshes import vtk_grid
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -87,6 +93,23 @@ class TetMesh:
     def n_dofs(self) -> int:
         """Three displacement components per node."""
         return 3 * len(self.points)
+
+    def to_pyvista(self) -> "pv.UnstructuredGrid":
+        """The mesh as a grid of pyvista, in metre: linear or quadratic tetrahedra, `region` as cell
+        data, and each facet set as field data, such as "facets:top".
+        """
+        return vtk_grid.to_grid(self.points, self.tets, self.region, self.facets)
+
+    @classmethod
+    def from_pyvista(cls, grid: "pv.UnstructuredGrid") -> "TetMesh":
+        """The mesh of a grid of tetrahedra of 4 nodes, or of 10, in metre.
+
+        Raises
+        ------
+        MeshError, ValueError
+            If it has other cells, or no element can be built on them.
+        """
+        return cls(**vtk_grid.of_grid(grid))
 
 
 def corner_volumes(points: Floats, tets: Ints) -> Floats:

@@ -1,14 +1,32 @@
 """Response of the probes, as every model returns it, and its spectral lines."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
+from simple_model import conversion, drawing, motion_rates, response_page
+from simple_model.line_names import line_names
+from simple_model.pressure import MovingPressure
+from simple_model.quantities import (
+    ACCELERATION,
+    DISPLACEMENT,
+    PRESSURE,
+    STRAIN,
+    VELOCITY,
+    Quantity,
+    quantity,
+)
+from simple_model.spectra import Lines, Spectrum
 from simple_model.trajectory import Floats
 from simple_model.windows import kaiser, named
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 # Side lobes of the Kaiser window below -140 dB resolve lines as weak as that from strong ones.
 LINE_BETA, LINE_BINS = 19.0, 2.5  # it resolves lines that are so many bins apart
@@ -67,6 +85,7 @@ class Response:
         kernel has no body to displace: its response is the stimulation it predicts, a pressure
     effort : Effort
     expected_error : float, relative to the waveforms, as estimated beforehand; nan if unknown
+    load : MovingPressure whose `lines` it has; None if unknown
 
     The arrays are copied, and the copies cannot be written to.
 
@@ -84,6 +103,7 @@ class Response:
     quantity: str = DISPLACEMENT.name
     effort: Effort = field(default_factory=Effort)
     expected_error: float = np.nan
+    load: MovingPressure | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("times", "probes", "values"):
@@ -118,6 +138,104 @@ class Response:
         if self.record not in (DISPLACEMENT, PRESSURE):
             raise ValueError(f"this response is of {self.quantity}; take its `values`")
         return self.values
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity (t, p) in m/s into the body, of a displacement or velocity; a ValueError of
+        anything else. A displacement is differentiated as its spline of degree 9, with an error of
+        1e-8 of lines below a tenth of the sampling rate and 1e-4 below a quarter; within 20
+        samples of its ends of 1e-3 and more.
+        """
+        return motion_rates.derivative(self, VELOCITY)
+
+    @property
+    def acceleration(self) -> Floats:
+        """Acceleration (t, p) in m/s2 into the body, likewise, of a velocity, too."""
+        return motion_rates.derivative(self, ACCELERATION)
+
+    @property
+    def strain(self) -> Floats:
+        """Strain (t, p) of a response that is of one; a ValueError of anything else, of which no
+        strain is known.
+        """
+        if self.record.field != STRAIN or self.unit != "1":
+            raise ValueError(
+                f"this response is of {self.record.words}, from which no strain follows; simulate "
+                'the scene with quantity = "strain_xx" or another strain'
+            )
+        return self.values
+
+    @property
+    def lines(self) -> Lines:
+        """Resolved lines of its load by name, with complex amplitudes (f, p).
+
+        Raises
+        ------
+        ValueError
+            If its load is unknown.
+        """
+        if self.load is None:
+            raise ValueError(
+                "the load of this response is unknown, and so are its lines; take "
+                "simple_model.phasors(response, frequencies)"
+            )
+        found = line_names(self.load)
+        f = found.frequencies
+        kept = f < 0.5 / step(self.times)
+        kept[kept] = are_resolved(self, f[kept], strengths=found.strengths[kept])
+        names = tuple(name for name, keep in zip(found.names, kept, strict=True) if keep)
+        return Lines(
+            names=names, frequencies=f[kept], amplitudes=phasors(self, f[kept]),
+            probes=self.probes, quantity=self.quantity,
+        )  # fmt: skip
+
+    def spectrum(self, window: str = "hann") -> Spectrum:
+        """Amplitude spectrum at every probe, as the function `spectrum` has it."""
+        frequencies, amplitudes = spectrum(self, window)
+        return Spectrum(
+            frequencies=frequencies, amplitudes=amplitudes, probes=self.probes,
+            quantity=self.quantity,
+        )  # fmt: skip
+
+    def plot(self, probes: Sequence[int] | None = None, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw the waveforms of all probes, or of those of some numbers, and return the axes."""
+        chosen = slice(None) if probes is None else list(probes)
+        ax = drawing.new_axes(ax)
+        values = self.record.per_unit * self.values[:, chosen]
+        drawing.curves(ax, 1e3 * self.times, values, self.probes[chosen])
+        ax.margins(x=0)
+        ax.set_xlabel("time, ms")
+        ax.set_ylabel(f"{self.record.words}, {self.record.shown}")
+        return ax
+
+    def to_xarray(self) -> "xr.DataArray":
+        """The values as an array with dimensions time and probe, times in s and x, y in metre of
+        the probes as coordinates, units as attributes.
+        """
+        return conversion.to_xarray(self)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The values as a table, rows by time_s and columns by x_m and y_m of the probes, the unit
+        in its `attrs`.
+        """
+        return conversion.to_pandas(self)
+
+    @classmethod
+    def from_xarray(cls, array: "xr.DataArray") -> "Response":
+        """The response of such an array; its effort and load are not in it."""
+        return _converted(**conversion.of_xarray(array))
+
+    @classmethod
+    def from_pandas(cls, table: "pd.DataFrame") -> "Response":
+        """The response of such a table; its effort and load are not in it."""
+        return _converted(**conversion.of_pandas(table))
+
+    def _repr_html_(self) -> str:
+        return response_page.html(self)
+
+
+def _converted(warnings: tuple[str, ...], **fields: Any) -> Response:
+    return Response(effort=Effort(warnings=warnings), **fields)
 
 
 def _check_shapes(times: Floats, probes: Floats, values: Floats) -> None:

@@ -11,7 +11,20 @@ from skinwave.safe_path import leave_out_working_folder
 leave_out_working_folder()
 
 from importlib import import_module  # noqa: E402
-from typing import Any  # noqa: E402
+from typing import TYPE_CHECKING, Any  # noqa: E402
+
+if TYPE_CHECKING:  # what readers of types and editors see of the names below
+    from skinwave.citations import cite
+    from skinwave.comparison import Agreement, compare
+    from skinwave.effort import SkinwaveWarning
+    from skinwave.fields import Field, field
+    from skinwave.parametric import ParametricBody, prepare
+    from skinwave.pictures.styles import paper
+    from skinwave.planning.plan import Plan, plan
+    from skinwave.scene import BODIES, Body, Scene
+    from skinwave.scene_file import dumps, loads, read
+    from skinwave.simulation import simulate
+    from skinwave.sweeps.in_python import SweepTable, sweep
 
 _HOMES = {
     "BODIES": "scene",
@@ -32,8 +45,16 @@ _HOMES = {
     "plan": "planning.plan",
     "ParametricBody": "parametric",
     "prepare": "parametric",
+    "cite": "citations",
+    "paper": "pictures.styles",
+    "sweep": "sweeps.in_python",
+    "SweepTable": "sweeps.in_python",
 }
-__all__ = sorted(_HOMES)
+__all__ = [
+    "BODIES", "Agreement", "Body", "Field", "ParametricBody", "Plan", "Scene", "SkinwaveWarning",
+    "SweepTable", "cite", "compare", "dumps", "field", "loads", "paper", "plan", "prepare", "read",
+    "simulate", "sweep",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -8,6 +8,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from meshes.tetmesh import Floats
 from simple_model import Response, phasors
 from simple_model.response import SETTLE, step
+from skinwave import notebook
 
 ROUND_OFF = 1e-6  # of the largest RMS motion: a line as weak as that is none
 AUDIBLE = -20.0  # dB re a line's largest probe: below it a phase says nothing
@@ -32,6 +33,7 @@ class Agreement:
         unwrapped outwards from there; not a number where either is 20 dB below its largest
     spread_reference, spread_candidate : {-6: metre, -20: metre}, distance of the outermost
         probe whose RMS motion is within so many dB of the strongest probe's, from that probe
+    frequencies : (f,) float, Hz, of the lines; probes : (p, 2) float, metre
     """
 
     relative_l2: Floats
@@ -42,6 +44,11 @@ class Agreement:
     phase_delay: Floats
     spread_reference: dict[int, float]
     spread_candidate: dict[int, float]
+    frequencies: Floats
+    probes: Floats
+
+    def _repr_html_(self) -> str:
+        return notebook.agreement_page(self)
 
 
 def compare(
@@ -86,6 +93,8 @@ def compare(
         phase_delay=phase_delays(a, b, np.array(frequencies), reference.probes),
         spread_reference=spread(reference),
         spread_candidate=spread(candidate),
+        frequencies=np.array(frequencies, np.float64),
+        probes=reference.probes,
     )
 
 

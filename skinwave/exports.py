@@ -76,7 +76,7 @@ def write_field(folder: Path, view: View, count: int = FIELD_FRAMES) -> Path:
         names.append(f"{stem}_{k:03d}.{ending}")
         _grid(view, int(frame)).save(folder / names[-1])
     path = folder / f"{stem}.pvd"
-    path.write_text(_collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
+    path.write_text(collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
     return path
 
 
@@ -98,7 +98,7 @@ def _grid(view: View, frame: int) -> Any:
     return grid
 
 
-def _collection(names: Sequence[str], times: Sequence[float]) -> str:
+def collection(names: Sequence[str], times: Sequence[float]) -> str:
     """ParaView collection: the file that belongs to each time in s."""
     rows = "".join(
         f'<DataSet timestep="{t:.9g}" group="" part="0" file="{name}"/>\n'

@@ -2,6 +2,8 @@
 
 import warnings
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +14,15 @@ from simple_model import Effort, Response
 from simple_model.quantities import DISPLACEMENT
 from skinwave.effort import Progress, SkinwaveWarning
 from skinwave.models.reduction import from_rest, oscillating, read_at
+from skinwave.pictures import field_plot
 from skinwave.pictures.motion import Waves, check_values, probe_response, waves
 from skinwave.planning.assessment import told
 from skinwave.scene import Scene
+
+if TYPE_CHECKING:
+    import pyvista as pv
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,6 +36,53 @@ class Field:
     displacement: Floats
     effort: Effort
     expected_error: float = np.nan
+
+    @property
+    def strongest(self) -> float:
+        """The one of its times, s, when a node is displaced most."""
+        return float(self.times[np.argmax((self.displacement**2).sum(axis=2).max(axis=1))])
+
+    def frame(self, time: float | None = None) -> int:
+        """Number of the time that is nearest to one in s, the `strongest` if none is given.
+
+        Raises
+        ------
+        ValueError
+            If it is before the first or after the last.
+        """
+        return field_plot.frame(self.times, self.strongest if time is None else time)
+
+    def to_pyvista(self, time: float | None = None) -> "pv.UnstructuredGrid":
+        """The mesh at rest as a grid of pyvista, in metre, with its `displacement` (n, 3) in metre
+        at the time nearest to one in s, or when it is largest; `time_s` in its field data.
+        """
+        grid, k = self.mesh.to_pyvista(), self.frame(time)
+        grid.point_data["displacement"] = self.displacement[k]
+        grid.field_data["time_s"] = self.times[k : k + 1]
+        return grid
+
+    def plot(self, time: float | None = None, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw the displacement into the body of the upper surface, seen from above, at the time
+        nearest to one in s, or when it is largest; colours are those of all times.
+        """
+        return field_plot.draw(self, self.frame(time), ax)
+
+    def animate(self, frames: int = 40, *, ax: "Axes | None" = None) -> "FuncAnimation":
+        """The same as a film of so many of its times, evenly spaced; `.save("film.gif")` writes it,
+        `.to_jshtml()` shows it in a notebook.
+        """
+        return field_plot.animation(self, frames, ax)
+
+    def save(self, path: str | Path, frames: int | None = None, *, overwrite: bool = False) -> Path:
+        """Write a ParaView collection, `path` ending in .pvd, and a .vtu file beside it of each of
+        so many times, evenly spaced, or of all; the path.
+
+        Raises
+        ------
+        ValueError
+            If it ends otherwise, or there is such a file, which is not to be overwritten.
+        """
+        return field_plot.save(self, Path(path), frames, overwrite=overwrite)
 
 
 def field(

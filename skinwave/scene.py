@@ -1,7 +1,7 @@
 """A scene: what is commanded, what it acts on, where it is probed. Physics only, one TOML file."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,10 @@ from skinwave.bodies import (
 )
 from skinwave.distributions import Distribution
 from skinwave.load import PRESSURE, Load
+from skinwave.pictures import scene_plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
@@ -201,6 +205,13 @@ class Scene:
     def reading(self) -> Reading:
         """Quantity of the probes, and their depths."""
         return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
+
+    def plot(self, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw body, path, foci at the start and probes from above, and return the axes."""
+        return scene_plot.draw(self, ax)
+
+    def _repr_html_(self) -> str:
+        return scene_plot.page(self)
 
 
 def check_motion(scene: Scene, command: str) -> None:

@@ -4,6 +4,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import fem
 from simple_model import Response
@@ -11,9 +12,11 @@ from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models import MapFunction, Request, check_reading, named
 from skinwave.models.laws import check_laws
-from skinwave.models.prepared import answer, sample_times
+from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
 from skinwave.planning.warnings import beyond_linear
+from skinwave.progress_bar import reported
+from skinwave.sample_grid import from_first, sample_grid
 from skinwave.scene import Scene
 
 
@@ -21,8 +24,9 @@ def simulate(
     scene: Scene,
     model: str = "auto",
     tolerance: float = 0.05,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     *,
+    times: ArrayLike | None = None,
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
@@ -45,7 +49,9 @@ def simulate(
         its equilibrium under the mean pressure; "fem-nonlinear-transient", the same with all dofs;
         or "auto": the choice of `plan`, which is linear
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
-    progress : called with the name of the phase and the fraction done
+    progress : True for a bar; or called with the name of the phase and the fraction done
+    times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;
+        10 kHz over all of it if not given. Lines above half their rate are left out
     h : float, metre, element size; planned if not given, and with it the extent of the body, as it
         is for "auto"
     dt : float, s, time step of "fem-transient" and the nonlinear models
@@ -64,7 +70,10 @@ def simulate(
     Diverged
         If a nonlinear model does not converge, or a response violates the energy balance.
     """
-    found = answered(scene, model, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped)
+    with reported(progress) as report:
+        found = answered(
+            scene, model, tolerance, report, times=times, h=h, dt=dt, solver=solver, mapped=mapped
+        )
     for sentence in found.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return found
@@ -76,6 +85,7 @@ def answered(
     tolerance: float = 0.05,
     progress: Progress | None = None,
     *,
+    times: ArrayLike | None = None,
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
@@ -85,14 +95,19 @@ def answered(
 
     Parameters
     ----------
-    scene, model, tolerance, progress, h, dt, solver, mapped : as for `simulate`, with its errors
+    scene, model, tolerance, progress, times, h, dt, solver, mapped : as for `simulate`, with its
+        errors
 
     Returns
     -------
     Response
     """
+    sample_grid(scene, times)  # which refuses times before any work
     required = required_plan(scene, model, tolerance, progress, h=h, dt=dt, solver=solver)
-    return follow(scene, required, tolerance, progress, h=h, dt=dt, solver=solver, mapped=mapped)
+    return follow(
+        scene, required, tolerance, progress,
+        times=times, h=h, dt=dt, solver=solver, mapped=mapped,
+    )  # fmt: skip
 
 
 def required_plan(
@@ -131,6 +146,7 @@ def follow(
     tolerance: float = 0.05,
     progress: Progress | None = None,
     *,
+    times: ArrayLike | None = None,
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
@@ -141,22 +157,24 @@ def follow(
     Parameters
     ----------
     required : Plan
-    scene, tolerance, progress, h, dt, solver, mapped : those of the plan, as for `simulate`, with
-        its errors
+    scene, tolerance, progress, times, h, dt, solver, mapped : those of the plan, as for
+        `simulate`, with its errors
 
     Returns
     -------
     Response
     """
     if required.prepared and named(required.model).is_reduced:
-        found = answer(required.prepared, scene, progress)
+        grid, first = sample_grid(scene, times)
+        found = from_first(answer(required.prepared, scene, progress, times=grid), first)
     else:
         found = compute(
             replace(scene, body=required.body), required.model, tolerance, progress,
-            h=required.h or h, dt=dt, solver=solver, mapped=mapped,
+            times=times, h=required.h or h, dt=dt, solver=solver, mapped=mapped,
         )  # fmt: skip
     told = (*required.warnings, *beyond_linear(scene, found))
-    return warned(replace(found, expected_error=required.error), told)
+    found = replace(found, expected_error=required.error, load=scene.pressure)
+    return warned(found, told)
 
 
 def compute(
@@ -165,6 +183,7 @@ def compute(
     tolerance: float = 0.05,
     progress: Progress | None = None,
     *,
+    times: ArrayLike | None = None,
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
@@ -174,7 +193,8 @@ def compute(
 
     Parameters
     ----------
-    scene, model, tolerance, progress, h, dt, solver, mapped : as for `simulate`, without "auto"
+    scene, model, tolerance, progress, times, h, dt, solver, mapped : as for `simulate`, without
+        "auto"
 
     Returns
     -------
@@ -193,11 +213,12 @@ def compute(
     check_reading(known, scene)
     if known.needs_body:
         check_laws(scene.body, scene.pressure)
+    grid, first = sample_grid(scene, times)
     request = Request(
-        times=sample_times(scene), tolerance=tolerance, report=progress or silent,
+        times=grid, tolerance=tolerance, report=progress or silent,
         h=h, dt=dt, solver=solver, mapped=mapped,
     )  # fmt: skip
-    found = known.solve(scene, request)
+    found = replace(from_first(known.solve(scene, request), first), load=scene.pressure)
     if found.effort.versions:
         return found
     return replace(found, effort=replace(found.effort, versions=versions()))

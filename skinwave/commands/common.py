@@ -5,16 +5,18 @@ import json
 import re
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skinwave.models import names
-from skinwave.plain_text import printable, say
+from skinwave.plain_text import say
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from simple_model import Response
     from skinwave.effort import Progress
     from skinwave.planning.plan import Plan
@@ -42,6 +44,30 @@ def add_reporting(parser: argparse.ArgumentParser) -> None:
 def add_scene(parser: argparse.ArgumentParser) -> None:
     """The scene file."""
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+
+
+def add_width(parser: argparse.ArgumentParser) -> None:
+    """The width of figures."""
+    parser.add_argument(
+        "--width", type=float, metavar="INCH",
+        help="of every figure, for print, with letters of 8 points: 3.5 or 7 for a journal",
+    )  # fmt: skip
+
+
+def add_show(parser: argparse.ArgumentParser) -> None:
+    """Windows of the desktop."""
+    parser.add_argument("--show", action="store_true", help="open what was drawn in a window, too")
+
+
+def show(options: argparse.Namespace, figures: "Callable[[], Mapping[str, Figure]]") -> None:
+    """Open windows, if these are asked for; a warning where none can be opened."""
+    if options.show:
+        from skinwave.window import MISSING, has_windows, open_windows
+
+        if has_windows():
+            open_windows(figures())
+        else:
+            warn([MISSING])
 
 
 def add_mesh(parser: argparse.ArgumentParser) -> None:
@@ -136,32 +162,7 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
     if options.quiet or options.json:
         yield lambda phase, fraction: None
         return
-    from skinwave.steps import follower
+    from skinwave.progress_bar import bar
 
-    follow = follower()
-    if not sys.stderr.isatty():
-        phases: list[str] = []
-
-        def log(phase: str, fraction: float) -> None:
-            name = follow(phase, fraction).name
-            if name not in phases[-1:]:
-                phases.append(name)
-                say(name, sys.stderr)
-
-        yield log
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description:<36}", markup=False), BarColumn(), TimeElapsedColumn())
-    left = TextColumn("{task.fields[left]}", markup=False)
-    with Progress(*columns, left, console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=1.0, left="")
-
-        def show(phase: str, fraction: float) -> None:
-            step = follow(phase, fraction)
-            bar.update(
-                task, description=printable(step.name, ""), completed=step.done, left=step.time_left
-            )
-
-        yield show
+    with bar() as shown:
+        yield shown

@@ -3,7 +3,15 @@
 import argparse
 import json
 
-from skinwave.commands.common import add_mesh, add_model, add_reporting, add_scene, required_plan
+from skinwave.commands.common import (
+    add_mesh,
+    add_model,
+    add_reporting,
+    add_scene,
+    add_show,
+    required_plan,
+    show,
+)
 from skinwave.plain_text import say
 
 
@@ -12,6 +20,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_model(parser)
     add_mesh(parser)
+    add_show(parser)
     add_reporting(parser)
 
 
@@ -19,6 +28,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from dataclasses import asdict, replace
 
+    from skinwave.pictures.scene_plot import scene_figure
     from skinwave.planning.budget import mesh_row
     from skinwave.scene_file import read
 
@@ -33,4 +43,5 @@ def run(options: argparse.Namespace) -> int:
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
     for row in required.rows:
         say(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
+    show(options, lambda: {scene.name: scene_figure(scene)})
     return 0

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, summarise
+from skinwave.commands.common import add_reporting, add_show, add_width, show, summarise
 
 FORMATS = ("png", "svg", "pdf")
 PRESETS = ("speed",)
@@ -25,6 +25,8 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="png")
     parser.add_argument("--style", default="report", help="report, talk or print")
+    add_width(parser)
+    add_show(parser)
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="default: DIR/figures")
     parser.add_argument("--overwrite", action="store_true", help="replace figures in that folder")
     parser.add_argument("--quiet", action="store_true", help="no summary")
@@ -49,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         varied,
     )
 
-    chosen = style(options.style)
+    chosen = style(options.style, options.width)
     rows = finished(dataset.read(options.folder))
     keys = varied(rows)
     x = options.x or (SPEED if options.preset == "speed" else next(iter(keys), None))
@@ -82,4 +84,5 @@ def run(options: argparse.Namespace) -> int:
         dataset.enter(options.folder, name)
     said = "\n".join(f"wrote {path}" for path in paths)
     summarise(options, {"figures": [str(path) for path in paths], "runs": len(rows)}, said)
+    show(options, lambda: figures)
     return 0

@@ -4,7 +4,15 @@ import argparse
 import shlex
 from pathlib import Path
 
-from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise, warn
+from skinwave.commands.common import (
+    add_mesh,
+    add_output,
+    add_width,
+    metre,
+    progress_of,
+    summarise,
+    warn,
+)
 
 STYLES, FORMATS = ("report", "talk", "print"), ("png", "svg", "pdf")
 
@@ -24,6 +32,11 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
         help="on these bodies, too: paper-sheet, skin-slab or palm, with commas between",
     )  # fmt: skip
+    add_width(parser)
+    parser.add_argument(
+        "--only", type=lambda text: text.split(","), default=[], metavar="COLUMNS",
+        help="only these, as point-kernel,skin-slab",
+    )  # fmt: skip
     add_mesh(parser)
     add_output(parser)
 
@@ -36,6 +49,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.reports.scene_report import write_report
     from skinwave.scene_file import read
 
+    chosen = style(options.style, options.width)
     source, made = options.source, options.source.is_dir()
     scene = None if made else read(source)
     out = options.out or (source / "report" if made else Path(f"{source.stem}-report"))
@@ -57,8 +71,8 @@ def run(options: argparse.Namespace) -> int:
             )  # fmt: skip
             warn(said)
         write_report(
-            folder if scene is not None else source, folder, style(options.style), progress,
-            formats=options.format,
+            folder if scene is not None else source, folder, chosen, progress,
+            formats=options.format, columns=options.only,
         )  # fmt: skip
         record.write(folder, record.of_command(options), scene=scene)
         size = (folder / "index.html").stat().st_size
@@ -70,6 +84,8 @@ def run(options: argparse.Namespace) -> int:
 def _drawn(options: argparse.Namespace) -> list[str]:
     """The options by which it is drawn, where they are not the defaults."""
     words = [] if options.style == "report" else ["--style", options.style]
+    words += ["--width", f"{options.width:g}"] if options.width else []
+    words += ["--only", ",".join(options.only)] if options.only else []
     return words + [word for kind in options.format if kind != "png" for word in ("--format", kind)]
 
 

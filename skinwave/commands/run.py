@@ -10,9 +10,11 @@ from skinwave.commands.common import (
     add_model,
     add_output,
     add_scene,
+    add_show,
     metre,
     progress_of,
     required_plan,
+    show,
     summarise,
     told,
     warn,
@@ -35,6 +37,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="samples of the scene's uncertain numbers, for bands and percentiles",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the samples")
+    add_show(parser)
     add_output(parser)
 
 
@@ -42,6 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
+    from skinwave.pictures.figures import tacton_figure
     from skinwave.run import Run
     from skinwave.scene import body_name
     from skinwave.scene_file import read
@@ -77,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
         **told(response),
     }
     summarise(options, summary, f"{response.model}: wrote {out}/index.html")
+    show(options, lambda: {scene.name: tacton_figure(scene.name, [run])})
     return 0
 
 

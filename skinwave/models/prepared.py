@@ -233,7 +233,13 @@ def _mirrored(probes: Floats, symmetry: str) -> Floats:
     return kept
 
 
-def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -> Response:
+def answer(
+    prepared: Prepared,
+    scene: Scene,
+    progress: Progress | None = None,
+    *,
+    times: Floats | None = None,
+) -> Response:
     """Online stage: response of a reduced body to a scene's Tacton from rest, as the steady state
     of every line of the load and the free vibration of its start.
 
@@ -242,6 +248,7 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
     prepared : Prepared, for the body and the probes of the scene
     scene : Scene
     progress : called with the name of the phase and the fraction done
+    times : (t,) float, s, equally spaced from 0; `sample_times` if not given
 
     Returns
     -------
@@ -252,7 +259,8 @@ def answer(prepared: Prepared, scene: Scene, progress: Progress | None = None) -
     Diverged
         If the energy balance is violated.
     """
-    clock, times, asked = Clock(), sample_times(scene), prepared.reading.asked
+    clock, asked = Clock(), prepared.reading.asked
+    times = sample_times(scene) if times is None else times
     if progress:
         progress("lines", 0.0)
     with clock("lines"):

@@ -16,7 +16,7 @@ from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.numbers import significant
-from skinwave.pictures.styles import LABELS, STYLES, Style
+from skinwave.pictures.styles import LABELS, NARROW, STYLES, TEXT, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
@@ -28,9 +28,13 @@ COLOURS = {
 }
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
-# Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
-TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 REPORT = STYLES["report"]
+# Titles of the columns of a Tacton's figure.
+WHOLE = (
+    "waveform about its mean, over the model's largest",
+    "spectrum, dB re the model's largest line",
+)
+WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
 IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
@@ -71,23 +75,28 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
 
 
 def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
-    probes = runs[0].response.probes
-    figure = Figure(figsize=style.size(10.5, 1.6 * len(probes) + 1.3))
+    probes, narrow = runs[0].response.probes, style.is_narrow
+    size = style.size(10.5, 1.6 * len(probes) + 1.3)
+    figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
     for p, (x, y) in enumerate(probes):
         _waveforms(axes[p, 0], runs, p)
-        _spectra(axes[p, 1], runs, p, named=p == 0)
+        _spectra(axes[p, 1], runs, p, named=p == 0 and not narrow)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
-    axes[0, 0].set_title(
-        f"{title}\nwaveform about its mean, over the model's largest",
-        fontsize="medium", parse_math=False,
-    )  # fmt: skip
-    axes[0, 1].set_title("spectrum, dB re the model's largest line", fontsize="medium")
+    said = WRAPPED if narrow else WHOLE
+    axes[0, 0].set_title(f"{title}\n{said[0]}", fontsize="medium", parse_math=False)
+    axes[0, 1].set_title(said[1], fontsize="medium")
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
     _legend(figure, runs, scales=True)
     # Fixed margins: a computed layout takes twice as long.
     inch = style.zoom / figure.get_figheight()
+    if narrow:
+        for ax in axes[:, 1]:
+            ax.set_yticks(np.arange(FLOOR, 1, 40))
+        top = 0.75 + 0.2 * len(figure.legends[0].get_texts())
+        figure.subplots_adjust(0.2, 0.55 * inch, 0.97, 1 - top * inch, wspace=0.32, hspace=0.13)
+        return figure
     top = 0.8 + 0.2 * (len(runs) > IN_A_ROW)
     figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
     return figure
@@ -167,6 +176,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         labels.append(f"open: {', '.join(kinds)}")
     where: Any = "outside upper center" if figure.get_layout_engine() else "upper center"
     ncols = len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2)
+    ncols = 1 if figure.get_figwidth() < NARROW else ncols
     figure.legend(handles, labels, loc=where, ncols=ncols, frameon=False)
 
 

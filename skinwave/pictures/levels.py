@@ -13,7 +13,7 @@ from simple_model import sensation_level, threshold
 from simple_model.quantities import DISPLACEMENT
 from simple_model.threshold import BAND, HIGHEST, LOWEST
 from skinwave.pictures.figures import answered, colour, marker
-from skinwave.pictures.styles import Style
+from skinwave.pictures.styles import NARROW, Style
 from skinwave.run import Run
 
 LOWEST_LEVEL = -30.0  # dB re threshold, below which lines are left out
@@ -27,13 +27,19 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     """
     runs = [run for run in runs if run.response.record.of_body]
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(5.2 * max(len(runs), 1), 4.4), layout="constrained")
-        axes = figure.subplots(1, max(len(runs), 1), sharex=True, sharey=True, squeeze=False)[0]
+        count, narrow = max(len(runs), 1), style.is_narrow
+        size = (style.size(1, 1)[0], 3.0 * count) if narrow else style.size(5.2 * count, 4.4)
+        figure = Figure(figsize=size, layout="constrained")
+        grid = (count, 1) if narrow else (1, count)
+        axes = figure.subplots(*grid, sharex=True, sharey=True, squeeze=False).ravel()
         for ax, run in zip(axes, runs, strict=False):
             _draw(ax, run, probe)
         x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
         asked = runs[0].response.record if runs else DISPLACEMENT
-        axes[0].set_ylabel(f"{asked.words} at ({x:g}, {y:g}) mm, {asked.shown} peak")
+        for ax in axes if narrow else axes[:1]:
+            ax.set_ylabel(
+                f"{asked.words}{chr(10) if narrow else ' '}at ({x:g}, {y:g}) mm, {asked.shown} peak"
+            )
     return figure
 
 
@@ -69,7 +75,8 @@ def _draw(ax: Axes, run: Run, probe: int) -> None:
     for kind in dict.fromkeys(peak.kind for peak in run.unnamed):
         peaks = [(x.frequency, per * x.amplitudes[probe]) for x in run.unnamed if x.kind == kind]
         ax.plot(*np.transpose(peaks), ls="none", mfc="none", label=kind, **style)
-    for name in _named(run, shown):
+    apart = APART * (2 if ax.figure.get_figwidth() < NARROW else 1)  # type: ignore[union-attr]
+    for name in _named(run, shown, apart):
         ax.annotate(
             written(name), (run.listed[name], per * run.table.amplitudes[name][probe]), rotation=90,
             xytext=(0, 7), textcoords="offset points", ha="center", va="bottom", fontsize="small",
@@ -100,12 +107,12 @@ def _shown(run: Run, probe: int) -> list[str]:
     return sorted(run.listed, key=lambda name: -run.table.amplitudes[name][probe])
 
 
-def _named(run: Run, shown: Sequence[str]) -> list[str]:
+def _named(run: Run, shown: Sequence[str], apart: float) -> list[str]:
     """The highest lines whose names have room."""
     chosen: list[str] = []
     for name in shown:
         near = (abs(np.log(run.listed[name] / run.listed[other])) for other in chosen)
-        if len(chosen) < MOST_NAMED and all(distance > APART for distance in near):
+        if len(chosen) < MOST_NAMED and all(distance > apart for distance in near):
             chosen.append(name)
     return chosen
 

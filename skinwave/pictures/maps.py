@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
 from skinwave.pictures.figures import inked, label, sized
-from skinwave.pictures.styles import Style
+from skinwave.pictures.styles import NARROW, Style
 from skinwave.pictures.views import Trace, View, path_points, spread_radius, starting_time
 from skinwave.scene import Scene
 
@@ -127,10 +127,13 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
     """The surface of each model, over its own largest motion, when the last of them moves most and
     after equal parts of a turn of the focus or, if it rests, of a period of the strongest tone.
     """
+    count = min(count, 2) if style.is_narrow else count
     raster, frames = common_raster(views), _shown_frames(views[-1], count)
     side = 0.8 * MAP
     with mpl.rc_context(style.rc):
         size = style.size(side * count + 2.0, side * len(views) + 1.0)
+        if style.is_narrow:
+            size = size[0], 0.4 * size[0] * len(views) + 0.9
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(views), count, sharex=True, sharey=True, squeeze=False)
         for row, view in zip(axes, views, strict=True):
@@ -179,10 +182,14 @@ def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, An
 
 def waves_figure(views: Sequence[View], style: Style) -> Figure:
     """Motion over place and time: outwards from the path after the start, and along the path."""
-    traced = [("ray", "distance from the path, mm")]
-    traced += [("track", "place along the path, mm")] if views[0].track else []
+    narrow = style.is_narrow
+    traced = [("ray", "distance, mm" if narrow else "distance from the path, mm")]
+    along = [("track", "along the path, mm" if narrow else "place along the path, mm")]
+    traced += along if views[0].track else []
     with mpl.rc_context(style.rc):
         size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
+        if narrow:
+            size = size[0], 2.1 * len(traced) + 0.3
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(traced), len(views), squeeze=False)
         for row, (name, x_label) in zip(axes, traced, strict=True):
@@ -205,6 +212,14 @@ def peak_text(view: View) -> str:
 
 def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Sequence[Axes]]:
     """Maps side by side, in mm, with so much room in inch for what stands below them."""
+    if style.is_narrow:
+        width = style.size(1, 1)[0]
+        figure = Figure(figsize=(width, 0.75 * width * count + 0.4 + below), layout="constrained")
+        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        for ax in axes:
+            ax.set_ylabel("y, mm")
+        axes[-1].set_xlabel("x, mm")
+        return figure, axes
     figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for ax in axes:
@@ -280,11 +295,13 @@ def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
     ax.set_xlim(limits[0])
     ax.set_ylim(limits[1])
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="upper right", fontsize="small", framealpha=0.9, labelcolor="black",
-                  facecolor="white")  # fmt: skip
+        narrow = ax.figure.get_figwidth() < NARROW  # type: ignore[union-attr]
+        ax.legend(loc="upper right", fontsize="x-small" if narrow else "small", framealpha=0.9,
+                  labelcolor="black", facecolor="white")  # fmt: skip
 
 
 def _legend(figure: Figure, entries: dict[str, dict[str, Any]]) -> None:
     handles = [Line2D([], [], **style) for style in entries.values()]
-    figure.legend(handles, list(entries), loc="outside lower center", ncols=len(entries),
-                  frameon=False)  # fmt: skip
+    narrow = figure.get_figwidth() < NARROW
+    figure.legend(handles, list(entries), loc="outside lower center",
+                  ncols=1 if narrow else len(entries), frameon=False)  # fmt: skip

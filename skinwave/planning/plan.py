@@ -6,6 +6,7 @@ import numpy as np
 
 from simple_model.focus import gaussian_width
 from simple_model.sampling import resolving_step
+from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
 from skinwave.models import Model, check_reading, named
@@ -52,6 +53,9 @@ class Plan:
     rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
+
+    def _repr_html_(self) -> str:
+        return notebook.plan_page(self)
 
 
 def plan(

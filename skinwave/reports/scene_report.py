@@ -1,6 +1,7 @@
 """The report of a scene: one page that needs no network, built from a folder of results alone."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from skinwave.pictures.maps import Raster, sampler
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
 from skinwave.reports.album import Album, open_album
+from skinwave.reports.chosen import only
 from skinwave.reports.gallery import Gallery, pictures, run_figures, tactons
 from skinwave.run import Run
 from skinwave.scene import Scene
@@ -34,18 +36,25 @@ ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be ass
 
 
 def write_report(
-    results: Path, out: Path, style: Style, progress: Progress, *, formats: Sequence[str] = ("png",)
+    results: Path,
+    out: Path,
+    style: Style,
+    progress: Progress,
+    *,
+    formats: Sequence[str] = ("png",),
+    columns: Sequence[str] = (),
 ) -> None:
-    """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder.
+    """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder,
+    or from some columns of them.
 
     No model of a body is run.
 
     Raises
     ------
     ValueError
-        If the folder holds no result.
+        If the folder holds no result, or no such column.
     """
-    album = open_album(results)
+    album = only(open_album(results), columns)
     (out / "pictures").mkdir()
     gallery = Gallery(folder=out / "pictures", style=style, formats=formats)
     views = pictures(album, gallery, progress)
@@ -85,7 +94,8 @@ def _first_screen(album: Album, gallery: Gallery) -> list[str]:
     if first is None:
         return []
     name = first.kernel.tacton * (len(groups) > 1)
-    return summary.top(first, lambda f, text: gallery.figure("propagation", f, text), name)
+    draw = partial(gallery.figure, "propagation")
+    return summary.top(first, draw, name, gallery.style)
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:

@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from skinwave.document import Markup, paragraph, table
 from skinwave.numbers import decibel, significant
-from skinwave.pictures.figures import label, sized
+from skinwave.pictures.figures import REPORT, label, sized
+from skinwave.pictures.styles import Style
 from skinwave.pictures.surfaces import SURFACES, surfaces_figure
 from skinwave.propagation import Component, Propagation, Reach, added_lines
 from skinwave.run import Run
@@ -23,19 +24,22 @@ ABOUT_MAPS = (
 NAMED = 3  # lines that a sentence names
 
 
-def top(shown: Shown, draw: Callable[[Figure, str], str], name: str = "") -> list[str]:
+def top(
+    shown: Shown, draw: Callable[[Figure, str], str], name: str = "", style: Style = REPORT
+) -> list[str]:
     """Parts of a page: what a reader of ten seconds reads of the Tacton that is shown first.
 
     Parameters
     ----------
     draw : makes a part of the page of a figure and its caption
     name : of the Tacton, on a page of several
+    style : of the figure
     """
     parts: list[str] = [paragraph(text) for text in sentences(shown)]
     if name:
         parts[0] = paragraph(f"{name}, one of the Tactons below: {sentences(shown)[0]}")
     if shown.surfaces and shown.changes[shown.body.column].strongest:
-        parts.append(draw(surfaces_figure(shown.kernel.scene, shown.surfaces), SURFACES))
+        parts.append(draw(surfaces_figure(shown.kernel.scene, shown.surfaces, style), SURFACES))
     bodies = small_table(list(shown.changes.values()), shown.kernel.tacton)
     return [*parts, bodies, beside_published(shown.kernel, shown.published)]
 

@@ -169,7 +169,11 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint
     table = parsed(content(path), path.parent)
     if base.body.file:
         table["body"]["file"] = base.body.file
-    complete = tomllib.loads(dumps(base))
+    return cases_of(table, tomllib.loads(dumps(base)), combined)
+
+
+def cases_of(table: Any, complete: Any, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
+    """The same for the table of a scene file, and that with all keys that it leaves out."""
     found = {case.text: case for case in (_case(table, complete, each) for each in combined)}
     _refuse_words(list(found.values()))
     return list(found.values())

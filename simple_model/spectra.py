@@ -1,0 +1,114 @@
+"""Amplitude spectrum and lines of a response, as records that draw themselves."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simple_model.choices import choose
+from simple_model.drawing import curves, new_axes
+from simple_model.quantities import Quantity, quantity
+from simple_model.trajectory import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DEEPEST = 1e-4  # of the largest amplitude, -80 dB: shown
+ROOM = 0.03  # of the highest frequency, between names
+LOUD = 1e-3  # of it, from which on frequencies are shown
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Spectrum:
+    """Amplitude spectrum: `frequencies` (f,) in Hz and `amplitudes` (f, p) in the unit of the
+    `quantity` at `probes` (p, 2) in metre.
+    """
+
+    frequencies: Floats
+    amplitudes: Floats
+    probes: Floats
+    quantity: str
+
+    @property
+    def record(self) -> Quantity:
+        """The record of its quantity."""
+        return quantity(self.quantity)
+
+    def plot(self, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw the spectrum at every probe, amplitudes to -80 dB of the largest on a logarithmic
+        axis, up to the highest frequency that has -60 dB.
+        """
+        ax = new_axes(ax)
+        shown = self.record.per_unit * self.amplitudes
+        largest = float(shown.max(initial=0.0)) or 1.0
+        curves(ax, self.frequencies, np.maximum(shown, 1e-3 * DEEPEST * largest), self.probes)
+        loud = self.frequencies[(shown > LOUD * largest).any(axis=1)]
+        ax.set_yscale("log")
+        ax.set_xlim(0, 1.1 * max(float(loud.max(initial=0.0)), 100.0))
+        ax.set_ylim(DEEPEST * largest, 3 * largest)
+        ax.set_xlabel("frequency, Hz")
+        ax.set_ylabel(f"amplitude, {self.record.shown}")
+        return ax
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lines:
+    """Resolved lines of a load in a response.
+
+    Parameters
+    ----------
+    names : (f,) str, such as "f_AM" or "2f_d-f_AM"
+    frequencies : (f,) float, Hz
+    amplitudes : (f, p) complex, a of Re a exp(2 pi i f t), in the unit of the quantity
+    probes : (p, 2) float, metre
+    quantity : name of one of `quantities.QUANTITIES`
+    """
+
+    names: tuple[str, ...]
+    frequencies: Floats
+    amplitudes: NDArray[np.complex128]
+    probes: Floats
+    quantity: str
+
+    @property
+    def record(self) -> Quantity:
+        """The record of its quantity."""
+        return quantity(self.quantity)
+
+    def __getitem__(self, name: str) -> NDArray[np.complex128]:
+        """Amplitudes (p,) of the line of a name; raises a ValueError if it is none of them."""
+        return np.asarray(self.amplitudes[self.names.index(choose("line", name, self.names))])
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def plot(self, *, ax: "Axes | None" = None) -> "Axes":
+        """Draw the moduli at every probe, each line with its name."""
+        ax = new_axes(ax)
+        size = self.record.per_unit * np.abs(self.amplitudes)
+        largest = float(size.max(initial=0.0)) or 1.0
+        curves(ax, self.frequencies, size, self.probes, ls="none", marker="o", ms=4)
+        heights = size.max(axis=1, initial=0.0)
+        loud = np.flatnonzero(heights > LOUD * largest)
+        for k in loud[_with_room(self.frequencies[loud], heights[loud])]:
+            ax.annotate(
+                self.names[k], (self.frequencies[k], heights[k]), xytext=(0, 5),
+                textcoords="offset points", rotation=90, ha="center", fontsize="x-small",
+                parse_math=False,
+            )  # fmt: skip
+        ax.set_yscale("log")
+        ax.set_ylim(LOUD / 3 * largest, 10 * largest)
+        ax.set_xlim(0, 1.1 * max(float(self.frequencies[loud].max(initial=0.0)), 100.0))
+        ax.set_xlabel("frequency, Hz")
+        ax.set_ylabel(f"amplitude, {self.record.shown}")
+        return ax
+
+
+def _with_room(frequencies: Floats, heights: Floats) -> list[int]:
+    """Numbers of lines whose names have room: none is near a stronger one."""
+    apart, chosen = ROOM * float(frequencies.max(initial=0.0)), list[int]()
+    for k in np.argsort(-heights, kind="stable").tolist():
+        if all(abs(frequencies[k] - frequencies[other]) > apart for other in chosen):
+            chosen.append(k)
+    return chosen

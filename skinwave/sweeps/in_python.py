@@ -1,0 +1,178 @@
+"""Sweeps of a scene in Python: the table that the command line writes, as an object."""
+
+import tempfile
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simple_model import drawing
+from simple_model.choices import choose
+from simple_model.conversion import library
+from skinwave.effort import Progress
+from skinwave.numbers import significant
+from skinwave.progress_bar import reported
+from skinwave.scene import Scene
+from skinwave.scene_file import dumps
+from skinwave.sweeps import dataset
+from skinwave.sweeps import sweep as runner
+from skinwave.sweeps.variation import Variation, cases_of, combinations, parse
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+SHOWN = 20  # rows in a small table
+RESULTS = ("peak_um", "rms_um", "level_db", "expected_error")  # shown beside what is varied
+
+Values = Sequence[float | str] | str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SweepTable:
+    """Table of a sweep: `rows` in the order of the design, each by the names of its columns, with a
+    list in it for what is told at every probe; the keys that were `varied`; and the error of each
+    run that has none.
+    """
+
+    rows: tuple[Mapping[str, Any], ...]
+    varied: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns."""
+        return tuple(dict.fromkeys(name for row in self.rows for name in row))
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Error of each run that has no response."""
+        return tuple(row["error"] for row in self.rows if row["status"] != "done")
+
+    def __getitem__(self, column: str) -> list[Any]:
+        """The entries of a column, one a run; raises a ValueError if there is none of that name."""
+        choose("column", column, self.columns)
+        return [row.get(column) for row in self.rows]
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The table with a row for each run; lists are entries, units end the names of columns."""
+        return library("pandas").DataFrame([dict(row) for row in self.rows])
+
+    def plot(
+        self, column: str = "peak_um", x: str = "", by: str = "", *, ax: "Axes | None" = None
+    ) -> "Axes":
+        """Draw a column over a key, with a curve for each value of another; those that were varied
+        if they are not given. Of what is told at every probe the largest, or that of "peak_um[2]".
+        """
+        from skinwave.sweeps.sweep_figures import axis_label, curves, finished
+
+        choose("column", column.partition("[")[0], self.columns)
+        x = x or self.varied[0]
+        others = [key for key in self.varied if key != x]
+        ax = drawing.new_axes(ax)
+        curves(ax, finished(self.rows), column, x, by or (others[0] if others else None))
+        ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
+        return ax
+
+    def _repr_html_(self) -> str:
+        names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
+        rows = [[_cell(row.get(name)) for name in names] for row in self.rows[:SHOWN]]
+        image = b""
+        if len(self.failed) < len(self):
+            image = drawing.picture(lambda figure: self.plot(ax=figure.subplots()), 4.5, 3.0)
+        errors = tuple(dict.fromkeys(self.failed))
+        return drawing.page(
+            f"Sweep of {len(self)} runs", image, [drawing.table(rows, names)], errors
+        )
+
+
+def sweep(
+    scene: Scene,
+    vary: Mapping[str, Values],
+    *,
+    design: str = "factorial",
+    samples: int | None = None,
+    seed: int = 0,
+    model: str = "auto",
+    tolerance: float = 0.05,
+    h: float | None = None,
+    solver: str = "auto",
+    folder: str | Path | None = None,
+    scheduler: str = "threads",
+    workers: int | None = None,
+    progress: Progress | bool | None = None,
+) -> SweepTable:
+    """Simulate a scene with other values of keys of its file, each body reduced once.
+
+    A run that fails is a row with its error.
+
+    Parameters
+    ----------
+    scene : Scene
+    vary : by key, such as "tacton.speed_m_per_s": values, or text as `--vary` of the command takes
+        it, "1:12:12" or "normal(25e3,0.3)"
+    design : "factorial", every value with every other; "zip", first with first; "lhs" or "sobol"
+    samples : int, runs of "lhs", rows of each matrix of "sobol"
+    seed : int, of the samples
+    model, tolerance, h, solver : of every run, as for `skinwave.simulate`
+    folder : where rows are kept and a sweep that was ended goes on; nowhere if not given
+    scheduler : "threads", "processes" (of a script with a main guard), or the address of a Dask
+        scheduler
+    workers : int, runs at a time on this machine; all cores if not given
+    progress : True for a bar; or called with the name of the phase and the fraction done
+
+    Returns
+    -------
+    SweepTable
+
+    Raises
+    ------
+    ValueError
+        If a key or a value is none of a scene, or the extra "sweep" is not installed.
+    """
+    variations = [_variation(key, values) for key, values in vary.items()]
+    combined = combinations(variations, design, samples, seed)
+    table = tomllib.loads(dumps(scene))
+    wanted = cases_of(table, table, combined)
+    options = runner.ModelOptions(model=model, tolerance=tolerance, h=h, solver=solver)
+    with _kept(folder) as kept, reported(progress) as report:
+        found = runner.sweep(wanted, kept, options, report, scheduler=scheduler, workers=workers)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        names = {case.name(version("skinwave"), options) for case in wanted}
+        rows = [row for row in dataset.read(kept) if row[dataset.KEY] in names]
+    return SweepTable(rows=tuple(rows), varied=tuple(v.key for v in variations))
+
+
+def _variation(key: str, values: Values) -> Variation:
+    if isinstance(values, str):
+        return parse(f"{key}={values}")
+    checked = parse(f"{key}=0")  # which refuses an unknown key
+    return Variation(key=checked.key, values=tuple(_plain(value) for value in values))
+
+
+def _plain(value: Any) -> Any:
+    """A value as a file has it, of numpy's kinds, too."""
+    return value.item() if hasattr(value, "item") else value
+
+
+@contextmanager
+def _kept(folder: str | Path | None) -> Iterator[Path]:
+    if folder is not None:
+        yield Path(folder)
+        return
+    with tempfile.TemporaryDirectory() as own:
+        yield Path(own) / "sweep"
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, list):
+        value = max((x for x in value if x is not None), default=None)
+    if isinstance(value, float):
+        return significant(value)
+    return "" if value is None else str(value)
