@@ -178,12 +178,11 @@ def test_a_hard_bed_is_rigid_and_a_soft_one_none(stiffness, base):
 
 def test_dispersion_on_springs_has_the_poles_of_the_wavenumber_integral():
     layers = elastic(4e-3, 6e-3)
-    f = np.array([150.0, 300.0])
-    modes = dispersion_curves(layers, f, most=3).modes
-    found = [(hz, k) for mode in modes for hz, k in zip(f, mode.wavenumbers, strict=True)]
-    found = [(hz, k) for hz, k in found if np.isfinite(k)]
-    assert {hz for hz, _ in found} == set(f)
-    for hz, k in found:
+    f = np.linspace(150.0, 155.0, 6)
+    mode = dispersion_curves(layers, f, most=1).modes[0]
+    along = np.gradient(mode.wavenumbers.real, 2 * np.pi * f)[1:-1]
+    np.testing.assert_allclose(mode.group_speed[1:-1], 1 / along, rtol=1e-3)
+    for hz, k in zip(f, mode.wavenumbers, strict=True):
         w, beside = np.array([[2 * np.pi * hz]], complex), np.array([1e-6, 2e-6, 0.5])
         near, twice, far = surface_compliance(layers, k * (1 + beside), w)[0]
         assert near / twice == pytest.approx(2, rel=1e-3)
