@@ -125,10 +125,21 @@ def _load(values: dict[str, Any], focus: dict[str, Any]) -> Load:
 
 def _with_spreads(scene: Scene, spreads: dict[str, Distribution]) -> Scene:
     complete = to_table(scene)
+    spreads = dict(_of_shear(complete, *each) for each in spreads.items())
     for key in spreads:
         if parent_of(complete, key)[0] is None:
             raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
     return replace(scene, spreads=tuple(sorted(spreads.items())))
+
+
+def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[str, Distribution]:
+    """The distribution of a shear modulus for that of a Young's modulus, at its Poisson's ratio."""
+    path, _, name = key.rpartition(".")
+    shear = f"{path}.shear_modulus_pa"
+    if name != "young_modulus_pa" or (table := parent_of(complete, shear)[0]) is None:
+        return key, given
+    share = 1.0 if given.is_relative else 1 / (2 * (1 + table["poisson"]))
+    return shear, replace(given, width=tuple(share * x for x in given.width))
 
 
 def dumps(scene: Scene) -> str:

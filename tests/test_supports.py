@@ -66,6 +66,20 @@ def test_youngs_modulus_is_varied_and_free_like_the_shear_modulus():
     assert with_values(scene.body, [key], {young: 60e3}).solid.young == pytest.approx(60e3)
 
 
+@pytest.mark.parametrize(
+    ("given", "width"),
+    [("spread = 0.3", (0.3,)), ("standard_error = 5e3", (2e3,)), ("low = 50e3, high = 100e3",
+     (20e3, 40e3))],
+)  # fmt: skip
+def test_a_spread_of_youngs_modulus_is_one_of_the_shear_modulus(given, width):
+    """E / 2 (1 + nu), 0.4 of it."""
+    scene = loads(YOUNG.replace("75e3", f"{{ value = 75e3, {given} }}"))
+    ((key, found),) = scene.spreads
+    assert key == "body.material.shear_modulus_pa"
+    np.testing.assert_allclose(found.width, width)
+    assert loads(dumps(scene)) == scene
+
+
 def test_sides_are_named_one_by_one_and_alike_they_are_one_word():
     scene = loads('[body]\nsides = { left = "clamped", right = "free" }')
     assert scene.body.sides == Sides(
