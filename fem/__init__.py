@@ -47,7 +47,7 @@ from fem.load_and_probe import (
 from fem.maxwell import DispersiveBranch, MaxwellBranch
 from fem.modal import Complex, Poles, exponential_sum, line_response, poles
 from fem.plane_stiffness import Tension
-from fem.reduced import ReducedModel, load_subspace, reduce, transfer
+from fem.reduced import NotReduced, ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.shallow_shell import shell_stiffness
 from fem.static import modes, static
@@ -75,6 +75,7 @@ __all__ = [
     "Material",
     "MaxwellBranch",
     "Membrane",
+    "NotReduced",
     "Operators",
     "Poles",
     "PronyTerm",

@@ -63,6 +63,10 @@ ROUND_OFF = 1e-12  # of a direction: what orthogonalisation leaves of it is roun
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
+class NotReduced(ValueError):
+    """A body whose response takes more moments than a reduced-order model is made of."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedModel:
     """Reduced-order model u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
@@ -116,8 +120,10 @@ def reduce(
 
     Raises
     ------
+    NotReduced
+        If the tolerance is out of reach.
     ValueError
-        If the tolerance is out of reach, or no probe can move.
+        If no probe can move.
     """
     free, report = operators.free, progress or (lambda fraction: None)
     start_vectors = probes[:, free].toarray().T
@@ -149,7 +155,7 @@ def reduce(
             report(max(0.0, np.log(errors[-1] / errors[0]) / np.log(tolerance / errors[0])))
         moments, size, before = moment, space.size, now
     else:
-        raise ValueError(
+        raise NotReduced(
             f"{MOST_MOMENTS} moments leave an error of {errors[-1]:.2g}, above the tolerance "
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )

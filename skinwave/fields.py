@@ -17,6 +17,7 @@ from skinwave.models.reduction import from_rest, oscillating, read_at
 from skinwave.pictures import field_plot
 from skinwave.pictures.motion import Waves, check_values, probe_response, waves
 from skinwave.planning.assessment import told
+from skinwave.progress_bar import reported
 from skinwave.scene import Scene
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def field(
     scene: Scene,
     times: Floats,
     tolerance: float = 0.02,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     *,
     h: float | None = None,
     solver: str = "auto",
@@ -116,7 +117,8 @@ def field(
     ValueError
         If the scene has no body, a number is out of range or the tolerance is out of reach.
     """
-    moved = waves(scene, tolerance, progress, h=h, solver=solver)
+    with reported(progress) as report:
+        moved = waves(scene, tolerance, report, h=h, solver=solver)
     check_values(len(times), len(moved.mesh.points))
     displacement = (from_rest(moved.motion, times) @ moved.basis.T).reshape(len(times), -1, 3)
     at_probes = assessed_probes(scene, moved, h, tolerance, solver)

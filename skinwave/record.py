@@ -92,8 +92,8 @@ def read(folder: Path) -> dict[str, Any]:
     path = folder / FILE
     if not path.exists():
         raise ValueError(
-            f"{path} cannot be read; name a folder that run, compare, report, dispersion, map or "
-            "fit wrote"
+            f"{path} cannot be read; name a folder that run, compare, report, dispersion, map, "
+            "fit, infer, validate or measured wrote"
         )
     try:
         record = fitting(reading.parsed(path), FITTING, "record")
@@ -129,7 +129,9 @@ def hashes(folder: Path) -> dict[str, str]:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it; the path of what exists from anywhere."""
+    """A value as JSON has it; the path of what exists from anywhere, also among several words."""
     if isinstance(value, Path) or (isinstance(value, str) and Path(value).is_file()):
         return str(Path(value).resolve())
+    if isinstance(value, list) and all(isinstance(item, list) for item in value):
+        return [[_plain(word) for word in item] for item in value]
     return value

@@ -19,6 +19,7 @@ from skinwave import window
 from skinwave.cli import main
 from skinwave.fields import Field
 from skinwave.pictures.styles import style
+from skinwave.planning.extent import PlanRow
 from skinwave.reports.album import Album
 from skinwave.reports.chosen import only
 
@@ -271,7 +272,9 @@ def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
     response = skinwave.simulate(scene, "point-kernel", 0.999)
     kernel = replace(response, model="<i>")
     agreement = skinwave.compare(kernel, response, (100.0,))
-    plan = replace(skinwave.plan(scene), warnings=("less <than> asked",), symmetry="x")
+    row = PlanRow(what="model", value="fem", reason="as <than> said")
+    plan = skinwave.Plan(model="fem", body=scene.body, symmetry="x", rows=(row,),
+                         warnings=("less <than> asked",))  # fmt: skip
     for record in (scene, response, kernel, agreement, plan, wave(quantity="pressure")):
         page = record._repr_html_()
         assert "data:image/png;base64," in page

@@ -21,6 +21,8 @@ from skinwave.cli import main
 from skinwave.models import Model, named, names
 from skinwave.models import register as register_model
 from skinwave.scene_file import dumps, loads
+from skinwave.simulation import compute
+from skinwave.sweeps import dataset
 
 ROOT = Path(__file__).parent.parent
 SCENE = """
@@ -119,7 +121,9 @@ def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
 
 
 def test_a_new_model_runs(disc, capsys, static_deflection):
-    found = skinwave.simulate(disc, "static-deflection")
+    said = "the error of static-deflection is not estimated"
+    with pytest.warns(skinwave.SkinwaveWarning, match=said):
+        found = skinwave.simulate(disc, "static-deflection")
     assert found.model == "static-deflection"
     pressure = disc.pressure(disc.probe_points, found.times[7])
     assert found.displacement[7] == pytest.approx(
@@ -129,10 +133,15 @@ def test_a_new_model_runs(disc, capsys, static_deflection):
     words = ["run", "disc.toml", "--model", "static-deflection", "--out", "out", "--quiet"]
     assert main(words) == 0
     assert {row["model"] for row in table("out/lines.csv")} == {"static-deflection"}
+    assert said in capsys.readouterr().err
+    assert said in Path("out/index.html").read_text()
     assert main(["plan", "disc.toml", "--model", "static-deflection"]) == 0
-    assert static_deflection.STATIC.method in capsys.readouterr().out
+    planned = capsys.readouterr()
+    assert static_deflection.STATIC.method in planned.out
+    assert said in planned.err
     assert main(["sweep", "disc.toml", "--vary", "tacton.am_frequency_hz=80,120", *words[2:4],
                  "--out", "swept", "--quiet", "--scheduler", "threads"]) == 0  # fmt: skip
+    assert all(said in row["warnings"] for row in dataset.read(Path("swept")))
     with pytest.raises(SystemExit):
         main(["run", "disc.toml", "--model", "no-model"])
     assert "static-deflection" in capsys.readouterr().err
@@ -145,7 +154,7 @@ def test_a_new_model_refuses_a_body(disc):
 
 
 def test_both_models_are_compared_in_python(disc):
-    static = skinwave.simulate(disc, "static-deflection")
+    static = compute(disc, "static-deflection")
     waves = skinwave.simulate(disc, "fem", 0.5, h=8e-3)
     assert skinwave.compare(static, waves).relative_l2.shape == (3,)
 

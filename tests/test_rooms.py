@@ -33,7 +33,7 @@ INNER = {
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"bodies", "models", "planning", "pictures"},
     "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
-    "web": {"bodies", "models", "planning", "pictures", "reports", "studies"},
+    "web": {"bodies", "models", "planning", "pictures", "reports", "studies", "uncertainty"},
     "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }
 

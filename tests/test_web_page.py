@@ -699,6 +699,44 @@ def test_themes_about_and_a_tablet(page):
     assert wide <= 820
 
 
+def test_bands_come_when_nothing_is_changed_and_go_with_the_next_change(bare):
+    page = bare
+    done = "() => window.trame.state.get('uncertainty').some(said => said.includes('numerical'))"
+    page.wait_for_function(done)
+    band, kernel = drawn(page, "waveform_plot")
+    assert band["name"] == "5 to 95 %"
+    assert max(band["y"]) == pytest.approx(
+        2 * max(kernel["y"]), rel=0.1
+    )  # the pressure is known to 2
+    assert max(band["low"]) == pytest.approx(0.5 * max(kernel["y"]), rel=0.1)
+    assert "device 43 %" in page.locator("#uncertainty summary").inner_text()
+    page.locator("#uncertainty summary").click()
+    assert "focus.peak_pressure_pa" in page.locator("#uncertainty").inner_text()
+    photographed(page, "bands")
+    shade = "0,0,0,71" if not state(page, "dark") else "255,255,255,71"
+    assert ink(page, "waveform_plot").get(shade, 0) > 500
+    page.locator(".sw-row:has(#am-field) [role=slider]").press("ArrowRight")
+    query_has(page, "am=141")
+    page.wait_for_function("() => !window.trame.utils.plots.shown.waveform_plot.figure.data[0].low")
+    assert ink(page, "waveform_plot").get(shade, 0) < 50
+    page.locator("#uncertainty summary").click()
+
+
+def test_on_a_narrow_screen_all_of_the_bar_is_there_and_the_panel_is_not(page):
+    right = "() => document.getElementById('controls').getBoundingClientRect().right"
+    page.set_viewport_size({"width": 700, "height": 900})
+    page.wait_for_function(f"{right} <= 0")
+    beyond, wide = page.evaluate(
+        """() => { const bar = document.querySelector('.v-toolbar__content');
+        return [bar.scrollWidth - bar.clientWidth, document.documentElement.scrollWidth] }"""
+    )
+    photographed(page, "narrow")
+    page.set_viewport_size({"width": 1280, "height": 720})
+    page.wait_for_function(f"{right} > 300")
+    assert beyond <= 0
+    assert wide <= 700
+
+
 @pytest.mark.parametrize("query", ["", "pulses=10/20&foci=2&paths=point/0/9/9,+line/9/0/0"])
 def test_what_can_be_turned_has_a_name_for_a_screen_reader(page, query):
     page.evaluate("q => window.trame.trigger('restart', [q])", query)

@@ -42,8 +42,10 @@ def run(options: argparse.Namespace) -> int:
                                ("seed", options.seed, 0)):  # fmt: skip
         if value < least:
             raise ValueError(f"--{name} = {value} is below {least}; give at least that")
-    table.open_folder(options.out, record.of_command(options))
+    command = record.of_command(options)
+    table.open_folder(options.out, command)
     files.refuse_changed(options.out)
+    table.enter_command(options.out, command)
     how = {"scheduler": options.scheduler, "workers": options.workers}
     with progress_of(options) as progress:
         found = table.fill(

@@ -14,23 +14,25 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from skinwave.commands import compare, dispersion, fit, report
+from skinwave.commands import compare, dispersion, fit, infer, measured, report, validate
 from skinwave.commands import map as map_command
 from skinwave.commands import run as run_command
 from skinwave.commands.common import add_output, progress_of, summarise
 
 REPEATED = {
     "run": run_command, "compare": compare, "report": report, "dispersion": dispersion,
-    "map": map_command, "fit": fit,
+    "map": map_command, "fit": fit, "infer": infer, "validate": validate, "measured": measured,
 }  # fmt: skip
 ONCE_EACH = ("format", "vary", "tie")  # options that are given once for each of their values
+PLACES = ("source", "file", "scene")  # arguments without a name, of which a command has one
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
         "folder", type=Path, metavar="DIR", help="folder that run, compare, report, dispersion, "
-        "map or fit wrote, or a folder of one run in it; the new one is DIR-rerun",
+        "map, fit, infer, validate or measured wrote, or a folder of one run in it; the new one is "
+        "DIR-rerun",
     )  # fmt: skip
     add_output(parser)
 
@@ -78,7 +80,7 @@ def _command_again(
 ) -> int:
     """The command of the command line, with the options that it had."""
     name, asked = kept["command"]["name"], kept["command"]["options"]
-    place = "source" if "source" in asked else "scene"
+    place = next((name for name in PLACES if name in asked), PLACES[-1])
     given = str(scene) if kept["scene"] is not None else asked.get(place)
     if name not in REPEATED:
         raise ValueError(f"the record's command '{name}' is none of {', '.join(REPEATED)}")
@@ -107,10 +109,21 @@ def _words(key: str, value: Any) -> Iterator[str]:
     flag = f"--{key.replace('_', '-')}"
     if value is True:
         yield flag
+    elif isinstance(value, list) and all(isinstance(item, list) for item in value):
+        for item in value:
+            yield from (flag, *_plain_words(key, item))
     elif key in ONCE_EACH and isinstance(value, list):
         yield from (f"{flag}={item}" for item in value if item != "png")  # which is there already
     else:
         yield f"{flag}={','.join(map(str, value)) if isinstance(value, list) else value}"
+
+
+def _plain_words(key: str, item: list[Any]) -> list[str]:
+    """Words of one option that has several, none of which is another option."""
+    words = [str(word) for word in item]
+    if any(word.startswith("-") for word in words):
+        raise ValueError(f"the record's option '{key[:40]}' is none; make the result anew")
+    return words
 
 
 def _parsed(name: str, words: list[str]) -> argparse.Namespace:

@@ -36,7 +36,9 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.validate.validation import sentences, validate
 
     zigzags = [(Path(file), _speed(speed)) for file, speed in options.zigzag]
-    hand = EXAMPLE if options.hand == Path() else options.hand
+    if options.hand == Path():
+        options.hand = EXAMPLE  # which the record names
+    hand = options.hand
     out = options.out or Path("validation")
     inputs = [file for file, _ in zigzags] + [p for p in (hand, options.skinsource) if p]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:

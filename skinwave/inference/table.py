@@ -4,6 +4,7 @@ The files are those of a sweep's rows. Rows of a hypercube are a fair sample; th
 which begins at the best of all rows, are not, and have another `stage`.
 """
 
+import json
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -17,6 +18,7 @@ from skinwave import record
 from skinwave.effort import Progress, one_thread, silent
 from skinwave.inference.assess import CLAIMED, row
 from skinwave.inference.design import PARAMETERS, Candidate, Parameter, name
+from skinwave.outputs import output_file
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.sweep import SweepOutcome
 
@@ -61,6 +63,14 @@ def open_folder(out: Path, command: Mapping[str, Any]) -> None:
     (out / dataset.ROWS).mkdir(parents=True, exist_ok=True)
     if not (out / record.FILE).exists():
         record.write(out, command)
+
+
+def enter_command(out: Path, command: Mapping[str, Any]) -> None:
+    """Have the record of a folder name the last command, which has all candidates of the first."""
+    kept = record.read(out)
+    if kept["command"] != command:
+        with output_file(out / record.FILE, overwrite=True) as file:
+            file.write(json.dumps(kept | {"command": command}, indent=1).encode())
 
 
 def fill(

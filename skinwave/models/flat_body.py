@@ -63,7 +63,7 @@ def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
     return tuple(traction_field(asked, layers, direction) for direction in upright)
 
 
-def takes(scene: Scene) -> bool:
+def takes_load(scene: Scene) -> bool:
     """Whether it takes a scene's load: of tractions of any direction, which need a stack of layers,
     it has the normal motion of the surface.
     """
@@ -98,7 +98,7 @@ FLAT_BODY = register(
         memory=3e8,
         colour="#009E73",
         reads=lambda scene: True,
-        takes=takes,
+        takes_load=takes_load,
         is_infinite=True,
         takes_series=has_table,
     )
@@ -116,7 +116,7 @@ HARMONIC = register(
         memory=3e8,
         colour="#E69F00",
         reads=lambda scene: True,
-        takes=takes,
+        takes_load=takes_load,
         is_infinite=True,
         is_steady=True,
     )

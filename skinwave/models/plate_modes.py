@@ -1,15 +1,18 @@
-"""Modes of a thin plate by Ritz's method: sheets of any support, stretched, with their air."""
+"""Modes of a thin plate by Ritz's method: sheets of any support, stretched, with their air; in the
+steady state, and from rest.
+"""
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
+import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.compliance import AIR_DENSITY
-from simple_model.load_spectrum import load_lines, synthesise
+from simple_model.load_spectrum import Complex, load_lines, synthesise
 from simple_model.plate_modes import Plate, PlateModes, plate_modes, steady_response
 from simple_model.plate_response import modal_path_forces
 from simple_model.sampling import shown
@@ -21,6 +24,7 @@ from skinwave.models.nonlinear_elements import of_surface_motion
 from skinwave.scene import Scene
 
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
+EPSILON = 1e-12  # of a mode that is damped to the limit of vibration, which no sheet is
 
 
 def plate_of(body: Body) -> Plate:
@@ -51,27 +55,80 @@ def loss_factor(body: Body, frequencies: Floats) -> Floats:
     return np.asarray(modulus.imag / modulus.real)
 
 
-def plate_answer(scene: Scene, request: Request) -> Response:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Driven:
+    """Modes of a scene's plate, the `forces` (f, m) in N kg^-1/2 of its load's lines at
+    `frequencies` (f,) in Hz, and the shapes `outputs` (p, m) where it is read.
+    """
+
+    modes: PlateModes
+    frequencies: Floats
+    forces: Complex
+    outputs: Floats
+
+
+def steady_answer(scene: Scene, request: Request) -> Response:
     """Steady state of the modes under every line of the load below half the sampling rate."""
-    started, body, pressure = time.perf_counter(), scene.body, scene.pressure
+    started, driven = time.perf_counter(), _driven(scene, request)
+    values = _steady(scene, driven, request.times)
+    return _response(scene, request, MODES.name, driven, values, started)
+
+
+def answer_from_rest(scene: Scene, request: Request) -> Response:
+    """The steady state and the free vibration that a start from rest leaves."""
+    started, driven = time.perf_counter(), _driven(scene, request)
+    values = _steady(scene, driven, request.times) + _transient(scene, driven, request.times)
+    return _response(scene, request, FROM_REST.name, driven, values, started)
+
+
+def _driven(scene: Scene, request: Request) -> Driven:
+    body, pressure = scene.body, scene.pressure
     request.report("modes", 0.0)
     modes: PlateModes = _modes(plate_of(body))
     request.report("lines", 0.0)
     middle = body.placement.offset
     f, forces = load_lines(pressure).gather(modal_path_forces(modes, pressure, middle))
     below = shown(pressure, f, request.times)
-    f, forces = f[below], forces[below]
-    outputs = modes.at(scene.probe_points - middle)
-    lines = steady_response(modes, f, forces, outputs, loss_factor(body, f))
-    lines = lines * scene.reading.asked.factor(2j * np.pi * f)[:, None]
+    return Driven(
+        modes=modes, frequencies=f[below], forces=forces[below],
+        outputs=modes.at(scene.probe_points - middle),
+    )  # fmt: skip
+
+
+def _response(
+    scene: Scene, request: Request, model: str, driven: Driven, values: Floats, started: float
+) -> Response:
     return Response(
-        model=MODES.name, times=request.times, probes=scene.probe_points,
-        quantity=scene.reading.asked.name, values=synthesise(f, lines, request.times),
+        model=model, times=request.times, probes=scene.probe_points,
+        quantity=scene.reading.asked.name, values=values,
         effort=Effort(
-            seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
-            steps=len(f), peak_memory=peak_memory(),
+            seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
+            steps=len(driven.frequencies), peak_memory=peak_memory(),
         ),
     )  # fmt: skip
+
+
+def _steady(scene: Scene, driven: Driven, times: Floats) -> Floats:
+    """Steady state (t, p)."""
+    f = driven.frequencies
+    lines = steady_response(
+        driven.modes, f, driven.forces, driven.outputs, loss_factor(scene.body, f)
+    )
+    return synthesise(f, lines * scene.reading.asked.factor(2j * np.pi * f)[:, None], times)
+
+
+def _transient(scene: Scene, driven: Driven, times: Floats) -> Floats:
+    """Free vibration (t, p) that ends the state of rest before t = 0: of each mode, at its pole
+    s = w (i sqrt(1 - (eta/2)^2) - eta/2) with the loss factor that it has at its own frequency.
+    """
+    w = np.sqrt(driven.modes.squared)
+    half = loss_factor(scene.body, w / (2 * np.pi)) * driven.modes.elastic / 2
+    poles = w * (1j * np.sqrt(np.maximum(1 - half**2, EPSILON)) - half)
+    iw = 2j * np.pi * driven.frequencies[:, None]
+    # As in `fem.line_response`; the impulse response of a mode is 2 Re(exp(s t) / (s - s*)).
+    start = driven.forces / (iw - poles) + driven.forces.conj() / (-iw - poles)
+    start = -start.sum(axis=0) / (2j * poles.imag) * scene.reading.asked.factor(poles)
+    return fem.exponential_sum(poles, start[:, None] * driven.outputs.T, times)
 
 
 def _refuse(body: Body) -> None:
@@ -99,7 +156,7 @@ MODES = register(
         name="plate-modes",
         method="modes of a thin plate by Ritz's method, line by line",
         words="the steady state of a thin plate, in its modes by Ritz's method",
-        solve=plate_answer,
+        solve=steady_answer,
         refuse=_refuse,
         error=lambda scene, h: ERROR,
         seconds=0.5,
@@ -107,5 +164,16 @@ MODES = register(
         colour="#F0E442",
         reads=of_surface_motion,
         is_steady=True,
+    )
+)
+FROM_REST = register(
+    replace(
+        MODES,
+        name="plate-modes-transient",
+        is_steady=False,
+        solve=answer_from_rest,
+        method="modes of a thin plate by Ritz's method, from rest",
+        words="a thin plate from rest, in its modes by Ritz's method",
+        colour="#8C510A",
     )
 )

@@ -36,10 +36,9 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
             _draw(ax, run, probe)
         x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
         asked = runs[0].response.record if runs else DISPLACEMENT
+        between = "\n" if style.columns else " "  # letters of print are large beside its figures
         for ax in axes if narrow else axes[:1]:
-            ax.set_ylabel(
-                f"{asked.words}{chr(10) if narrow else ' '}at ({x:g}, {y:g}) mm, {asked.shown} peak"
-            )
+            ax.set_ylabel(f"{asked.words}{between}at ({x:g}, {y:g}) mm, {asked.shown} peak")
     return figure
 
 

@@ -176,7 +176,9 @@ def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, An
         if angle and not view.scene.tacton.trajectory.is_static:
             angles.append(f"{label(view.column)} {np.rad2deg(angle):.0f}°")
     if angles:
-        entries[f"Mach angle of a straight path: {', '.join(angles)}"] = {"color": style.ink}
+        between = "\n" if style.is_narrow else " "
+        said = f"Mach angle of a straight path:{between}{', '.join(angles)}"
+        entries[said] = {"color": style.ink}
     return entries
 
 
@@ -189,16 +191,19 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
     with mpl.rc_context(style.rc):
         size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
         if narrow:
-            size = size[0], 2.1 * len(traced) + 0.3
+            size = size[0], 1.7 * len(views) + 0.4
         figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(len(traced), len(views), squeeze=False)
+        rows, columns = (views, traced) if narrow else (traced, views)
+        axes = figure.subplots(len(rows), len(columns), squeeze=False)
+        for ax in axes[:, 0]:
+            ax.set_ylabel("time, ms")
+        axes = axes.T if narrow else axes
         for row, (name, x_label) in zip(axes, traced, strict=True):
             for ax, view in zip(row, views, strict=True):
                 image = _draw_trace(ax, getattr(view, name), name)
                 ax.set_xlabel(x_label)
                 ax.set_title(label(view.column), color=inked(view.column))
                 _draw_world_lines(ax, view, name)
-            row[0].set_ylabel("time, ms")
         title = "motion about its mean over the largest\n(above: at its place)"
         bar = figure.colorbar(image, ax=axes, label=title, shrink=0.6)
         bar.set_ticks([-1, -0.5, 0, 0.5, 1])
@@ -214,18 +219,18 @@ def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Se
     """Maps side by side, in mm, with so much room in inch for what stands below them."""
     if style.is_narrow:
         width = style.size(1, 1)[0]
-        figure = Figure(figsize=(width, 0.75 * width * count + 0.4 + below), layout="constrained")
-        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        figure = Figure(figsize=(width, 0.75 * width * count + 0.4 + below), layout="compressed")
+        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False).ravel()
         for ax in axes:
             ax.set_ylabel("y, mm")
         axes[-1].set_xlabel("x, mm")
-        return figure, axes
+        return figure, list(axes)
     figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for ax in axes:
         ax.set_xlabel("x, mm")
     axes[0].set_ylabel("y, mm")
-    return figure, axes
+    return figure, list(axes)
 
 
 def _title(ax: Axes, view: View, below: str) -> None:

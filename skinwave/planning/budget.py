@@ -45,10 +45,13 @@ class ErrorBudget:
     @property
     def words(self) -> str:
         """The three in one sentence."""
-        return (
-            f"Error of the worst probe's waveform: numerical {_numerical(self.numerical)}; one "
-            f"standard deviation of the {self.spreads}"
-        )
+        return f"Error of the worst probe's waveform: {self.parts}"
+
+    @property
+    def parts(self) -> str:
+        """The three, without what they are of."""
+        numerical = _numerical(self.numerical)
+        return f"numerical {numerical}; one standard deviation of the {self.spreads}"
 
     @property
     def spreads(self) -> str:

@@ -4,15 +4,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+import fem
 from simple_model.focus import gaussian_width
 from simple_model.sampling import resolving_step
 from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
-from skinwave.models import Model, check_reading, named
+from skinwave.models import Model, check_reading, named, takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws
+from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import (
@@ -25,7 +27,8 @@ from skinwave.planning.extent import PlanRow, coat_rows, extent, left_out, symme
 from skinwave.planning.refinement import Convergence, Refined, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
-from skinwave.planning.warnings import of_elements, over_tolerance
+from skinwave.planning.sheets import why_modes
+from skinwave.planning.warnings import error_not_estimated, of_elements, over_tolerance
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
@@ -120,10 +123,12 @@ def plan(
     returned, start = (
         reflection_and_transient(scene) if has_wavenumber_solution(scene) else (1.0, 1.0)
     )
-    exact = returned <= WAVES_SHARE * tolerance and FLAT_BODY.takes(scene)
+    exact = returned <= WAVES_SHARE * tolerance and FLAT_BODY.takes_load(scene)
     if asked.is_infinite if asked else exact:
         found = _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
         return with_series(found, scene, tolerance)
+    if asked is None and (reason := why_modes(scene)):
+        return _by_modes(scene, tolerance, highest, reason, rows)
     body: Body = scene.body
     cut: list[PlanRow] = []
     if model is None or h is None:  # else all of it is meshed, as asked
@@ -133,7 +138,12 @@ def plan(
         *cut,
     ]
     axes = symmetry(scene) if asked is None or asked.is_reduced else ""
-    mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
+    try:
+        mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
+    except fem.NotReduced as error:
+        if not takes(FROM_REST, scene):
+            raise
+        raise ValueError(f"{error}; or use --model {FROM_REST.name}") from None
     scene = replace(scene, body=body)
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     step_error, start_error = _march_errors(scene, asked, step)
@@ -174,7 +184,25 @@ def _unplanned(scene: Scene, tolerance: float, model: Model, h: float | None) ->
     return Plan(
         model=model.name, body=scene.body, h=size, error=error, rows=tuple(rows),
         seconds=model.seconds, memory=model.memory,
-        warnings=over_tolerance(what, error, tolerance, cure),
+        warnings=(
+            *error_not_estimated(model.name, error), *over_tolerance(what, error, tolerance, cure)
+        ),
+    )  # fmt: skip
+
+
+def _by_modes(
+    scene: Scene, tolerance: float, highest: float, reason: str, rows: list[PlanRow]
+) -> Plan:
+    """Plan of a sheet by its modes, from rest."""
+    rows = [
+        *rows, PlanRow(what="model", value=FROM_REST.name, reason=reason),
+        *left_out(scene, highest),
+    ]  # fmt: skip
+    error = FROM_REST.error(scene, None) if FROM_REST.error else np.nan
+    return Plan(
+        model=FROM_REST.name, body=scene.body, highest=highest, error=error,
+        seconds=FROM_REST.seconds, memory=FROM_REST.memory, rows=tuple(rows),
+        warnings=over_tolerance(f"the {FROM_REST.method}", error, tolerance, "a larger one is"),
     )  # fmt: skip
 
 
@@ -278,7 +306,7 @@ def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, 
 
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
-    if not FLAT_BODY.takes(scene):
+    if not FLAT_BODY.takes_load(scene):
         return f"the wavenumber integral has no {scene.reading.words} under {scene.load.words}"
     if gaussian_width(scene.pressure.height, scene.pressure.profile) is None:
         return (

@@ -76,6 +76,13 @@ def error_unknown(error: float) -> tuple[str, ...]:
     )
 
 
+def error_not_estimated(model: str, error: float) -> tuple[str, ...]:
+    """Warning of a model that states no error of its own, as one from outside may."""
+    if np.isfinite(error):
+        return ()
+    return (f"the error of {model} is not estimated; compare its response with another model's",)
+
+
 def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
     """Warning of rigid-body drift under a load with non-zero mean."""
     if scene.body.is_held or not mean_gain(scene):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from skinwave.simulation import compute
 from skinwave.studies import paper15
 from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
 
+if TYPE_CHECKING:
+    from skinwave.pictures.surfaces import MeasuredPlaces
+
 # Skin's stiffness is known to a factor of 2, its loss to one of 5 between sources.
 STIFFER, LOSSIER = 2.0, 5**0.5
 Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's
@@ -28,7 +32,8 @@ FIRST = ("am140-stm20",)  # of the paper's Tactons, the one with both modulation
 class Shown:
     """The Tacton of a page's first screen: its kernel as `published` and under the same load, what
     propagation changes by body, the maps by column, the expected relative error and
-    the shares of motion outside the kernel's region over the range of materials, where known.
+    the shares of motion outside the kernel's region over the range of materials, where known; and
+    where was measured, if it was.
     """
 
     kernel: Run
@@ -39,6 +44,7 @@ class Shown:
     error: float = np.nan
     shares: tuple[float, float] | None = None
     budget: ErrorBudget | None = None
+    measured: "MeasuredPlaces | None" = None
 
     @property
     def body(self) -> Run:

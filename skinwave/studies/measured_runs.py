@@ -12,6 +12,7 @@ from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave.measurements.lines import evenly
 from skinwave.measurements.measurement import Measurement
 from skinwave.models.prepared import Prepared, answer
+from skinwave.pictures.surfaces import MeasuredPlaces
 from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.studies.measured_lines import lines_to_compare
@@ -88,6 +89,14 @@ def _mean_in_step(comparison: MeasuredComparison) -> Floats:
         for values, shift in zip(measurement.values, shifts, strict=True)
     ]
     return np.asarray(np.mean(shifted, axis=0))
+
+
+def measured_places(comparison: MeasuredComparison) -> MeasuredPlaces:
+    """Places of a measurement with the RMS of its lines, read as displacement, to mark on a map."""
+    lines, record = comparison.lines, comparison.measurement.record
+    factor = record.factor(2j * np.pi * lines.frequencies)[:, None]
+    rms = np.sqrt((np.abs(lines.mean / factor) ** 2).sum(axis=0) / 2)
+    return MeasuredPlaces(places=comparison.scene.probe_points, rms=rms)
 
 
 def at_places(run: Run, chosen: np.ndarray) -> Run:

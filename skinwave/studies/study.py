@@ -21,7 +21,7 @@ from skinwave.simulation import check_options, compute
 from skinwave.studies import measured_page, measured_tables, paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
 from skinwave.studies.claims import evaluate, write_claims
-from skinwave.studies.measured_runs import beside, in_quantity
+from skinwave.studies.measured_runs import beside, in_quantity, measured_places
 from skinwave.studies.measured_study import (
     Measured,
     MeasuredComparison,
@@ -109,6 +109,8 @@ def run_study(
         first = None
         with suppress(KeyboardInterrupt):
             first = shown(groups, maps) if outcome.runs == outcome.planned else None
+            if first and found:
+                first = replace(first, measured=measured_places(found[-1]))
         parts = study_page.page_parts(folder, groups, drawn, first, outcome, progress, figures)
         for comparison in found:
             measured_tables.write_tables(folder, comparison)

@@ -9,7 +9,7 @@ from skinwave.document import Markup, paragraph, table
 from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import REPORT, label, sized
 from skinwave.pictures.styles import Style
-from skinwave.pictures.surfaces import SURFACES, surfaces_figure
+from skinwave.pictures.surfaces import BESIDE, SURFACES, surfaces_figure
 from skinwave.propagation import Component, Propagation, Reach, added_lines
 from skinwave.run import Run
 from skinwave.studies.changes import Shown
@@ -39,7 +39,8 @@ def top(
     if name:
         parts[0] = paragraph(f"{name}, one of the Tactons below: {sentences(shown)[0]}")
     if shown.surfaces and shown.changes[shown.body.column].strongest:
-        parts.append(draw(surfaces_figure(shown.kernel.scene, shown.surfaces, style), SURFACES))
+        figure = surfaces_figure(shown.kernel.scene, shown.surfaces, style, measured=shown.measured)
+        parts.append(draw(figure, f"{SURFACES} {BESIDE}" if shown.measured else SURFACES))
     bodies = small_table(list(shown.changes.values()), shown.kernel.tacton)
     return [*parts, bodies, beside_published(shown.kernel, shown.published)]
 

@@ -152,7 +152,7 @@ def model_of(scene: Scene, asked: str) -> str:
     if not scene.body.of_kind.discretise:
         return "point-kernel"
     is_exact = has_wavenumber_solution(scene) and is_laterally_infinite(scene.body)
-    is_exact = is_exact and named("flat-body").takes(scene)
+    is_exact = is_exact and named("flat-body").takes_load(scene)
     return "flat-body" if is_exact else "fem"
 
 

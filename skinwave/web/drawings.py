@@ -1,7 +1,7 @@
 """Drawings of a page other than curves: maps as small pictures, paths in mm, table of lines."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from io import BytesIO
 
@@ -13,6 +13,7 @@ from simple_model import Tacton
 from simple_model.joined import parted
 from skinwave.web.model import Answer, AreaMap
 
+NO_BANDS: Mapping[str, tuple[float, float]] = {}
 # Of 255; red into the body and blue out of it, as in the pictures of a report. Also in body.js.
 INTO, OUT, STILL = (
     np.array(c) for c in ((178.5, 22.95, 43.35), (33.15, 102.0, 170.85), (247.35,) * 3)
@@ -56,8 +57,12 @@ def ends(largest: float, unit: str) -> list[str]:
     return ["0", f"{value / 2:.3g}", f"{value:.3g} {said}"]
 
 
-def rows(kernel: Answer, waves: Answer | None) -> list[dict[str, str]]:
-    """The named lines as a table: frequency, amplitudes and level above threshold."""
+def rows(
+    kernel: Answer, waves: Answer | None, bands: Mapping[str, tuple[float, float]] = NO_BANDS
+) -> list[dict[str, str]]:
+    """The named lines as a table: frequency, amplitudes and level above threshold, with its 5 and
+    95 % by the name of the line.
+    """
     by_wave = {line.name: line for line in waves.lines} if waves else {}
     per = waves.response.record.per_unit if waves else 1.0
     by_kernel = {line.name: line for line in kernel.lines}
@@ -74,6 +79,7 @@ def rows(kernel: Answer, waves: Answer | None) -> list[dict[str, str]]:
             "pressure": f"{pa.amplitude:.3g}" if pa else "",
             "displacement": f"{per * um.amplitude:.3g}" if um else "",
             "level": "" if level is None or not np.isfinite(level) else f"{level:+.0f}",
+            "band": " to ".join(f"{end:+.0f}" for end in bands.get(name, ())),
         })  # fmt: skip
     return found
 

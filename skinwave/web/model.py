@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints
 from simple_model import (
     MovingPressure,
     Response,
@@ -270,12 +270,17 @@ def thinned(x: Floats, y: Floats, most: int = MOST_SHOWN) -> tuple[Floats, Float
     """At most about `most` points of a curve (n,), with every peak: the least and the largest of
     each part.
     """
-    if len(x) <= most:
-        return x, y
-    width = int(np.ceil(2 * len(x) / most))
-    count = len(x) // width * width
+    kept = peaks(y, most)
+    return x[kept], y[kept]
+
+
+def peaks(y: Floats, most: int = MOST_SHOWN) -> Ints:
+    """Indices of at most about `most` values (n,), the least and the largest of each part."""
+    if len(y) <= most:
+        return np.arange(len(y))
+    width = int(np.ceil(2 * len(y) / most))
+    count = len(y) // width * width
     parts = y[:count].reshape(-1, width)
     both = np.sort([parts.argmin(axis=1), parts.argmax(axis=1)], axis=0).T
     kept = np.unique((both + np.arange(0, count, width)[:, None]).ravel())
-    kept = np.append(kept, np.arange(count, len(x)))
-    return x[kept], y[kept]
+    return np.append(kept, np.arange(count, len(y)))

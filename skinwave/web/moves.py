@@ -261,6 +261,7 @@ def open_scene(session: Session, text: str) -> None:
         session.state.problem = f"the scene cannot be opened: {error}"
         return
     session.own = scene.body if values["body"] == OWN_BODY else session.own
+    session.spreads = scenes.spreads_in(scene, values)
     session.state.bodies = shown.bodies(session.own)
     turn(session, values, whole=True)
 

@@ -17,14 +17,16 @@ from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, pressure_threshold
 from skinwave.pictures.styles import LABELS
+from skinwave.web.bands import Bands
 from skinwave.web.drawings import written
-from skinwave.web.model import Answer, commanded_curve, thinned
+from skinwave.web.model import Answer, commanded_curve, peaks, thinned
 
 DIGITS = 5  # of the largest number of a curve that are sent
 STALE = 0.2  # opacity of a response that is not that of the controls
 NAMED = 6  # lines with a name in the plot
 SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (-0.06, 0.0),
          "all": (0.0, np.inf)}  # fmt: skip
+BESIDE = 2.5  # of the largest of the curves: what is seen of a band
 ROOM = 1.4  # of the tallest line of a spectrum, for names above it
 KERNEL = f"{LABELS['point-kernel']}, Pa"
 PlotlyFigure = dict[str, Any]
@@ -33,13 +35,15 @@ PlotlyFigure = dict[str, Any]
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
     """Responses in one plot: the `kernel` under the load of the `waves`, which are of other
-    controls while `stale`; the kernel as `published`; and those that are `pinned`.
+    controls while `stale`; the kernel as `published`; those that are `pinned`; and the `bands` of
+    the waves or, without any, of the kernel.
     """
 
     kernel: Answer
     waves: Answer | None = None
     published: Answer | None = None
     pinned: Sequence[Answer] = ()
+    bands: Bands | None = None
     stale: bool = False
 
 
@@ -93,6 +97,9 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> PlotlyFigure:
     times in s.
     """
     data = []
+    if (bands := curves.bands) is not None and bands.times.size:
+        within = (bands.times >= span[0]) & (bands.times <= span[1] + 0.5 * step(bands.times))
+        data = [_band(curves, 1e3 * bands.times[within], bands.waveform[:, within])]
     for answer, style in _styled(curves):
         times = answer.response.times
         shown = (times >= span[0]) & (times <= span[1] + 0.5 * step(times))
@@ -112,6 +119,9 @@ def spectrum_plot(
     that of a displacement of the surface.
     """
     data, waves = [], curves.waves
+    if (bands := curves.bands) is not None and bands.times.size:
+        within = bands.frequencies <= highest
+        data = [_band(curves, bands.frequencies[within], bands.spectrum[:, within])]
     for answer, style in _styled(curves):
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
@@ -123,7 +133,19 @@ def spectrum_plot(
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
         "names": _names(named, highest),
-        **_axes(data, _second(curves), _tallest(waves, highest, with_threshold), ROOM),
+        **_axes(data, _second(curves), _tallest(curves, highest, with_threshold), ROOM),
+    }  # fmt: skip
+
+
+def _band(curves: Curves, x: Floats, ends: Floats) -> dict[str, Any]:
+    """Band between two ends (2, n), with every peak of either."""
+    answer = curves.waves or curves.kernel
+    of_body = answer.response.record.of_body
+    kept = np.union1d(peaks(ends[0]), peaks(ends[1]))
+    low, high = _in_unit(answer) * ends[:, kept]
+    return {
+        "role": "waves" if of_body else "kernel", "axis": "y2" if of_body else "y",
+        "name": "5 to 95 %", "x": numbers(x[kept]), "low": numbers(low), "y": numbers(high),
     }  # fmt: skip
 
 
@@ -174,14 +196,21 @@ def _threshold_curve(highest: float, *, of_waves: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _tallest(waves: Answer | None, highest: float, with_threshold: bool) -> float | None:
-    """Least range of the axis of waves: the lines, and the minimum of the threshold."""
+def _tallest(curves: Curves, highest: float, with_threshold: bool) -> float | None:
+    """Least range of the axis of waves: the lines with their bands, and the minimum of the
+    threshold.
+    """
+    waves, bands = curves.waves, curves.bands
     if waves is None:
         return None
     f = np.linspace(50, highest, 60)
     shown = waves.spectrum[waves.frequencies <= highest]
     least = 1.3 * float(threshold(f).min()) if with_threshold else 0.0
-    return _in_unit(waves) * max(float(shown.max()), least)
+    most = float(shown.max())
+    if bands is not None:
+        upper = bands.spectrum[1:, bands.frequencies <= highest]
+        most = max(most, min(BESIDE * most, float(upper.max(initial=0.0))))
+    return _in_unit(waves) * max(most, least)
 
 
 def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
@@ -213,7 +242,11 @@ def _axes(
     said = {"y": "pressure, Pa", "y2": second}
     ends = {}
     for name in said:
-        values = [v for curve in data if curve["axis"] == name for v in curve["y"]]
+        own = [curve for curve in data if curve["axis"] == name]
+        values = [v for curve in own if "low" not in curve for v in curve["y"]]
+        limit = BESIDE * max(map(abs, values), default=0.0)
+        values += [min(max(v, -limit), limit) for curve in own if "low" in curve
+                   for v in (*curve["low"], *curve["y"])]  # fmt: skip
         if values:
             high = max([*values, 0.0]) if most is None or name == "y" else most
             ends[name] = (high, -min([*values, 0.0]))

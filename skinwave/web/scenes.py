@@ -1,12 +1,14 @@
 """Between the values of the controls and a scene, either way."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, evenly, joined
 from simple_model.trajectory import SHAPES
+from skinwave.distributions import Distribution
 from skinwave.scene import BODIES, Body, Scene, check_load
 from skinwave.web.controls import (
     CHOICES,
@@ -21,9 +23,45 @@ from skinwave.web.controls import (
 from skinwave.web.layer_values import with_layers
 from skinwave.web.paths import paths_in, paths_of, text_of
 
+OF_BODY = "body."  # of keys
 
-def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
-    """The scene that controls say, probed at the selected point; `own` is a body from a file.
+
+@dataclass(frozen=True, kw_only=True)
+class FileSpreads:
+    """Distributions of a scene file's numbers by key, and the name of its `body`, while which is
+    chosen those of the body hold.
+    """
+
+    given: tuple[tuple[str, Distribution], ...] = ()
+    body: str = ""
+
+    def of(self, body: str) -> tuple[tuple[str, Distribution], ...]:
+        """Those that hold with a body of this name."""
+        return tuple(x for x in self.given if body == self.body or not x[0].startswith(OF_BODY))
+
+
+NO_SPREADS = FileSpreads()
+
+
+def spreads_in(scene: Scene, values: Mapping[str, Any]) -> FileSpreads:
+    """Spreads of a scene whose values of the controls are these."""
+    return FileSpreads(given=scene.spreads, body=values["body"])
+
+
+def scene_of(
+    values: Mapping[str, Any], own: Body | None = None, spreads: FileSpreads = NO_SPREADS
+) -> Scene:
+    """The scene that controls say, probed at the selected point.
+
+    Parameters
+    ----------
+    values : of the controls
+    own : a body from a file
+    spreads : of a file
+
+    Returns
+    -------
+    Scene
 
     Raises
     ------
@@ -54,7 +92,7 @@ def scene_of(values: Mapping[str, Any], own: Body | None = None) -> Scene:
     return Scene(
         name="skinwave web", pressure=pressure, body=body,
         probes=((values["x"] / 1e3, values["y"] / 1e3),), depth=values["depth"] / 1e3,
-        quantity=values["quantity"],
+        quantity=values["quantity"], spreads=spreads.of(values["body"]),
     )  # fmt: skip
 
 

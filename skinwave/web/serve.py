@@ -30,16 +30,17 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
     from skinwave.web.moves import connect
     from skinwave.web.session import Session
 
-    start, own = None, None
+    start, own, spreads = None, None, scenes.NO_SPREADS
     refused: tuple[str, ...] = ()
     if scene:
         read = loads(scene)
         start, refused = controls.in_range(scenes.values_of(read))
         own = read.body if start["body"] == controls.OWN_BODY else None
+        spreads = scenes.spreads_in(read, start)
     given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
     if given:
         start, refused = controls.from_query(urlencode(given), own is not None)
-    session = Session(server, start, own)
+    session = Session(server, start, own, spreads)
     connect(session)
     lay_out(session)
     if refused:

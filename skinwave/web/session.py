@@ -9,6 +9,8 @@ from typing import Any
 
 from skinwave.scene import Body
 from skinwave.web import controls, model, plots, scenes, shown
+from skinwave.web.band_worker import BANDS, FAILED, BandWorker
+from skinwave.web.bands import Bands
 from skinwave.web.controls import KEYS, STARTS, Values
 from skinwave.web.history import History
 from skinwave.web.layer_values import rows
@@ -20,19 +22,29 @@ class Session:
     """Record of what one page shows.
 
     `good` are the values that the controls had last without a mistake, `number` counts the
-    requests to the process that computes the response of a body, `own` is a body from a file and
-    `zoomed` the part in s of the commanded Tacton, if it is not the one that is chosen.
+    requests to the process that computes the response of a body, `own` is a body from a file,
+    `spreads` are those of a file, and `zoomed` is the part in s of the commanded Tacton, if it is
+    not the one that is chosen.
     """
 
-    def __init__(self, server: Any, values: Values | None = None, own: Body | None = None) -> None:
+    def __init__(
+        self,
+        server: Any,
+        values: Values | None = None,
+        own: Body | None = None,
+        spreads: scenes.FileSpreads = scenes.NO_SPREADS,
+    ) -> None:
         self.server, self.state, self.own = server, server.state, own
         self.good = dict(values or STARTS)
         self.history = History(self.good)
+        self.spreads = spreads
         self.worker = Worker(self._told_elsewhere)
+        self.sampler = BandWorker(self._told_elsewhere)
         self.scene: Any = None
         self.kernel: Answer | None = None
         self.waves: Answer | None = None
         self.published: Answer | None = None
+        self.bands: Bands | None = None
         self.pinned: tuple[Answer, ...] = ()
         self.number = 0
         self.zoomed: tuple[float, float] | None = None
@@ -56,11 +68,18 @@ class Session:
         self._loop = loop
         if self.scene and self.scene.body.of_kind.discretise:
             self.ask()
+        elif self.scene:
+            self.ask_bands()
 
     def ask(self) -> None:
         """Have the other process compute the body's response, if there is a page to tell."""
         if self._loop:
             self.worker.ask(self.number, self.scene, bool(self.state.solid))
+
+    def ask_bands(self) -> None:
+        """Have the bands of what is shown computed, in a process that comes after all others."""
+        if self._loop and not self.state.stale:
+            self.sampler.ask(self.number, self.scene, self.answers[-1].response)
 
     def _told_elsewhere(self, what: str, number: int, content: Any) -> None:
         """Messages of the other process, brought to where the page is served."""
@@ -92,13 +111,15 @@ def refresh(session: Session) -> None:
     """Compute the response to the controls: the point kernel at once, a body in its process."""
     state = session.state
     try:
-        session.scene = scenes.scene_of(session.good, session.own)
+        session.scene = scenes.scene_of(session.good, session.own, session.spreads)
         session.kernel = model.kernel(session.scene)
         session.published = model.as_published(session.scene) if state.published else None
     except ValueError as error:
         state.update({"problem": str(error), "stale": True})
         return
     session.number += 1
+    session.bands = None
+    session.sampler.cancel()
     waiting = session.scene.body.of_kind.discretise is not None
     if not waiting:
         session.worker.cancel()
@@ -115,10 +136,12 @@ def refresh(session: Session) -> None:
     draw(session)
     if waiting:
         session.ask()
+    else:
+        session.ask_bands()
 
 
 def told(session: Session, what: str, number: int, content: Any) -> None:
-    """Take a message of the process that computes the response of a body."""
+    """Take a message of a process that computes the response of a body, or its bands."""
     state = session.state
     if what == "progress":
         if session.good["body"] != "none":  # else told before it was cancelled
@@ -135,6 +158,13 @@ def told(session: Session, what: str, number: int, content: Any) -> None:
         state.update({"busy": "", "waves_stale": False})
         draw(session)
         solid(session)  # which may have been asked for in the meantime
+        if session.bands is None:
+            session.ask_bands()
+    elif what == BANDS:
+        session.bands = content
+        draw(session)
+    elif what == FAILED:
+        state.uncertainty = [content]
 
 
 def solid(session: Session) -> None:
@@ -150,7 +180,7 @@ def draw(session: Session) -> None:
         shown.foci(session.state, session.scene)
         shown.answers(session.state, session.scene, plots.Curves(
             kernel=session.kernel, waves=session.waves, published=session.published,
-            pinned=session.pinned, stale=bool(session.state.waves_stale),
+            pinned=session.pinned, bands=session.bands, stale=bool(session.state.waves_stale),
         ))  # fmt: skip
         session.state.differs = (
             shown.differs(controls.values_in(session.state.pinned_query), session.good)

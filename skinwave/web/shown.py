@@ -34,7 +34,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "third": THIRD[0],
         "dark": False, "solid": False,
-        "summary": [], "warnings": [], "expected": "", "published": False,
+        "summary": [], "uncertainty": [], "warnings": [], "expected": "", "published": False,
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
@@ -48,6 +48,7 @@ def first(own: Body | None) -> dict[str, Any]:
 def answers(state: Any, scene: Scene, curves: Curves) -> None:
     """Plots, maps and table of responses."""
     kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
+    bands = curves.bands
     span = plots.span_of(state.span, tacton.duration)
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
@@ -57,7 +58,8 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
         "kernel_map": _map(kernel), "wave_map": _map(waves),
         "own_speeds": drawings.speeds(tacton) if tacton.trajectory.shape == "recorded" else "",
-        "rows": drawings.rows(kernel, None if stale else waves),
+        "rows": drawings.rows(kernel, None if stale else waves, bands.levels if bands else {}),
+        "uncertainty": list(bands.sentences) if bands else [],
         "unresolved": unresolved(
             len(model.unresolved_lines(scene, kernel.response)), tacton.duration
         ),

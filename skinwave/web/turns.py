@@ -6,8 +6,9 @@ and leaves the line.
 
 import time
 
-# Pages at a time: 0.2 GB each with the skin slab (0.12 GB, and 0.085 GB of the process that
-# computes waves), measured as what they do not share; finite-element bodies take more.
+# Pages at a time: 0.28 GB each with the skin slab (0.1 GB, 0.06 GB of the process that computes
+# waves and 0.13 GB of that which samples them), measured as what they do not share;
+# finite-element bodies take more.
 MOST = 12
 AT_ONCE = 2  # pages that are opened at a time: more of them wait for each other's imports
 FORGOTTEN = 5.0  # s after which a page that does not ask any more has left the line

@@ -33,7 +33,7 @@ from simple_model.prony import FIT_TOLERANCE
 from simple_model.response import step
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Progress
+from skinwave.effort import Clock, Progress
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import surface_load
 from skinwave.models.prepared import sample_times
@@ -119,8 +119,12 @@ class BodyResponses:
         return warned_of(scene, reduced_answer(body, scene, moving))
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
+        clock = Clock()
         made, ops = self._keep("body", scene.body, lambda: _assembled(scene.body, progress))
-        return reduced_to_path(made, ops, scene.body, scene.pressure, progress)
+        with clock("reduce"):
+            found = reduced_to_path(made, ops, scene.body, scene.pressure, progress)
+        effort = replace(found.body.effort, seconds=clock.seconds)
+        return replace(found, body=replace(found.body, effort=effort))
 
     def _keep(self, kind: str, key: Any, make: Callable[[], Any]) -> Any:
         kept = self._kept[kind]

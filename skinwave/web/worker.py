@@ -34,9 +34,11 @@ def answer_forever(pipe: Connection) -> None:
             try:
                 found = waves(scene, _teller(pipe, number), moving)
             except MemoryError as error:
-                pipe.send(("failed", number, _said(error) or "not enough memory for this body"))
+                pipe.send(
+                    ("failed", number, one_sentence(error) or "not enough memory for this body")
+                )
             except (ValueError, ArithmeticError, OSError) as error:  # a full disk, say
-                pipe.send(("failed", number, _said(error) or type(error).__name__))
+                pipe.send(("failed", number, one_sentence(error) or type(error).__name__))
             else:
                 pipe.send(("answer", number, found))
 
@@ -54,8 +56,20 @@ def limits(threads: int) -> dict[str, str]:
     return {name: str(threads) for name in THREADS if name not in os.environ}
 
 
-def _said(error: Exception) -> str:
+def one_sentence(error: Exception) -> str:
+    """Words of an error, in one line."""
     return " ".join(str(error).split())
+
+
+def started(target: Callable[[Connection], None], threads: int) -> tuple[Any, Connection]:
+    """A process of a function of a pipe, on so many threads, and this end of the pipe."""
+    context = multiprocessing.get_context("spawn")
+    pipe, other = context.Pipe()
+    process = context.Process(target=target, args=(other,), daemon=True)
+    with environment(limits(threads)):
+        process.start()
+    other.close()
+    return process, pipe
 
 
 def end_with_parent() -> None:
@@ -124,12 +138,7 @@ class Worker:
     def _start(self) -> None:
         if self._process is not None and self._process.is_alive():
             return
-        context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(target=answer_forever, args=(other,), daemon=True)
-        with environment(limits(idle_cores())):
-            self._process.start()
-        other.close()
+        self._process, self._pipe = started(answer_forever, idle_cores())
         threading.Thread(target=self._listen, args=(self._pipe,), daemon=True).start()
 
     def _send(self, number: int, scene: Any, moving: bool) -> None:

@@ -2,6 +2,7 @@
 (() => {
   const EDGE = { left: 56, right: 56, top: 22, bottom: 34 };
   const FONT = "Roboto, sans-serif";
+  const BAND = 0.28; // opacity of what is between the ends of a band
   const PALE = 0.25; // opacity of curves that are not of what the controls say
   const MODES = [1, 2, 3, 4, 5, 6].map((n) => `mode${n}`); // roles of dispersion curves
   const LEAST_DRAG = 6; // pixels that are no click any more
@@ -51,6 +52,13 @@
     const y = to[curve.axis];
     g.beginPath();
     for (let k = 0; k < curve.y.length; k++) g.lineTo(to.x(xOf(curve, k)), y(curve.y[k]));
+    if (curve.low) { // a band
+      for (let k = curve.y.length - 1; k >= 0; k--) g.lineTo(to.x(xOf(curve, k)), y(curve.low[k]));
+      g.globalAlpha *= BAND;
+      g.fill();
+      g.globalAlpha = 1;
+      return;
+    }
     if (curve.mirrored) { // the area between a curve and its mirror image
       for (let k = curve.y.length - 1; k >= 0; k--) g.lineTo(to.x(xOf(curve, k)), y(-curve.y[k]));
       g.globalAlpha = 0.4;
@@ -114,18 +122,26 @@
     return { placed, top: below ? y + 12 : EDGE.top };
   }
 
+  // A title without the last of its clauses that there is no room for.
+  function fitted(g, title, wide) {
+    while (g.measureText(title).width > wide && /[,;]/.test(title))
+      title = title.slice(0, Math.max(title.lastIndexOf(","), title.lastIndexOf(";")));
+    return title;
+  }
+
   function legend(g, { placed }, figure, colours, ink) {
     g.textAlign = "left";
     g.textBaseline = "middle";
     g.fillStyle = ink;
     g.font = `500 12px ${FONT}`;
-    g.fillText(figure.title, 4, 11);
+    g.fillText(fitted(g, figure.title, g.canvas.clientWidth - 8), 4, 11);
     g.font = `11px ${FONT}`;
     for (const { curve, x, y } of placed) {
       line(g, curve, colours);
       g.beginPath();
       g.moveTo(x, y);
       g.lineTo(x + 20, y);
+      if (curve.low) [g.lineWidth, g.globalAlpha] = [9, BAND];
       g.stroke();
       g.globalAlpha = 1;
       g.fillStyle = ink;
@@ -146,7 +162,7 @@
   // The corners of all curves in pixels, with those between which one rises by more than a step.
   function corners({ box, range, to }, figure) {
     const found = [];
-    for (const curve of figure.data) {
+    for (const curve of figure.data.filter((one) => !one.low)) {
       let before = null;
       for (let k = 0; k < curve.y.length; k++) {
         const value = xOf(curve, k);
@@ -227,7 +243,8 @@
         if (xOf(curve, middle) > value) high = middle; else low = middle;
       }
       const k = value - xOf(curve, low) < xOf(curve, high) - value ? low : high;
-      return `${curve.name} ${curve.y[k].toPrecision(4)}`;
+      const least = curve.low ? `${curve.low[k].toPrecision(4)} .. ` : "";
+      return `${curve.name} ${least}${curve.y[k].toPrecision(4)}`;
     });
     g.fillStyle = ink;
     g.fillRect(plot.at, box.y, 1, box.h);
