@@ -31,6 +31,33 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
     return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
+def traction_operator(
+    mesh: TetMesh, tractions: Floats, facets: str | Ints = "top"
+) -> sparse.csr_array:
+    """Load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N per value at each of
+    the `facet_points`.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    tractions : (k q, 3) float, traction vector of a unit value at each point
+    facets : a facet set's name or nodes (k, a)
+
+    Returns
+    -------
+    (3 n, k q) sparse
+    """
+    nodes = facet_set(mesh, facets)
+    N, normals = facet_geometry(mesh, nodes)
+    k, q = normals.shape[:2]
+    area = np.linalg.norm(normals, axis=2)
+    forces = np.einsum("eq,qa,eqi->eaiq", area, N, tractions.reshape(k, q, 3))
+    rows = (3 * nodes[:, :, None, None] + np.arange(3)[:, None]).repeat(q, axis=3)
+    columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
+    shape = (mesh.n_dofs, k * q)
+    return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
 def pressure_force(
     mesh: TetMesh, facets: str | Ints = "top", *, kind: str = "dead"
 ) -> Callable[[Floats, Floats], Floats]:

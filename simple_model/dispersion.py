@@ -204,11 +204,18 @@ def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
     return values[..., 0], (values[..., 2] - values[..., 1]) / step
 
 
+def _without_springs(stack: Stack) -> Stack:
+    """The stack with a free base for an elastic one, whose stiffness is the same at all
+    frequencies.
+    """
+    return replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
+
+
 def _finite(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
 ) -> tuple[Found, Floats]:
     """The least evanescent roots of a finite stack, and the depths of their shapes."""
-    of, change = pencil(stack, omega, moduli), pencil(stack, omega, slopes)
+    of, change = pencil(stack, omega, moduli), pencil(_without_springs(stack), omega, slopes)
     squared, V, W = eigenpairs(of, omega)
     order = np.argsort(np.abs(np.sqrt(squared).imag), axis=1)[:, :most]
     squared = np.take_along_axis(squared, order, axis=1)

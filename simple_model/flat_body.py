@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from simple_model.compliance import Compliance
-from simple_model.focus import spot_width
+from simple_model.focus import gaussian_width
 from simple_model.load_spectrum import (
     foci_harmonics,
     harmonics,
@@ -32,6 +32,7 @@ from simple_model.load_spectrum import (
     merge_lines,
     path_fourier,
     path_samples,
+    path_weights,
     synthesise,
 )
 from simple_model.material import Complex
@@ -100,9 +101,11 @@ def field_lines(
     f, which = np.unique(lines.frequencies, return_inverse=True)
     away = _offsets(pressure, probes)
     respond = _response_at(field, pressure, away, 2 * np.pi * f)
+    weights = path_weights(pressure)
     blocks = max(1, away[..., 0].size * len(f) // AT_ONCE)
     amplitudes = [
-        path_fourier(respond(part))[which, ..., lines.harmonics] * lines.coefficients[:, None, None]
+        path_fourier(respond(part) * weights)[which, ..., lines.harmonics]
+        * lines.coefficients[:, None, None]
         for part in np.array_split(away, min(blocks, len(away)))
     ]
     return merge_lines(lines.frequencies, np.hstack(amplitudes))
@@ -251,7 +254,8 @@ def _circling(
     """Transform (f, p, m) of the field at the probes under foci that run a closed path."""
     f_d = pressure.tacton.trajectory.drawing_frequency
     away = _offsets(pressure, probes)
-    h = path_fourier(_response_at(field, pressure, away, w, NEGLIGIBLE)(away))
+    g = _response_at(field, pressure, away, w, NEGLIGIBLE)(away)
+    h = path_fourier(g * path_weights(pressure))
     u = np.zeros(h.shape[:-1], np.complex128)
     orders = harmonics(h.shape[-1])
     h[..., orders] *= foci_harmonics(pressure, orders)
@@ -291,7 +295,7 @@ def _recorded(
     dt: float,
 ) -> Complex:
     """Transform (f, p, m) of the field at the probes under foci that run any path."""
-    path, width = pressure.tacton.trajectory, spot_width(pressure.height)
+    path, width = pressure.tacton.trajectory, _width(pressure)
     furthest = np.linalg.norm(probes[:, None] - path.outline, axis=2).max()
     table = _table(furthest, width)
     g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
@@ -331,10 +335,17 @@ def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpli
 
 def _check(pressure: MovingPressure) -> None:
     check_lines(pressure)
-    if pressure.profile != "gaussian":
+    if gaussian_width(pressure.height, pressure.profile) is None:
         raise ValueError(
             f"focus '{pressure.profile_name}' has no flat-body solution; use 'gaussian'"
         )
+
+
+def _width(pressure: MovingPressure) -> float:
+    """Standard deviation in metre of the focal spot, which `_check` has found to be Gaussian."""
+    width = gaussian_width(pressure.height, pressure.profile)
+    assert width is not None
+    return width
 
 
 def _offsets(pressure: MovingPressure, probes: ArrayLike) -> Floats:
@@ -352,7 +363,7 @@ def _response_at(
     """Components (f, p, m, k) at any of these offsets (p, k, 2) in metre from the focus: integrated
     at each of few distances, interpolated by a spline between many.
     """
-    width = spot_width(pressure.height)
+    width = _width(pressure)
     distance = np.linalg.norm(offsets, axis=-1)
     unique = np.unique(distance)
     few = len(unique) <= FEW_DISTANCES

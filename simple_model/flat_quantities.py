@@ -110,6 +110,32 @@ def surface_field(asked: Quantity, compliance: Compliance) -> Field:
     return _in_motion(asked, normal_field(compliance))
 
 
+def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field:
+    """Normal motion of the surface under tractions of the focal spot's profile in one direction.
+
+    By reciprocity the vertical motion at x under a force along x' at 0 is the motion along x' at 0
+    under a vertical force at x, which is that of `motion_field`.
+
+    Parameters
+    ----------
+    asked : Quantity, of normal motion
+    stack : Stack
+    direction : (3,) float, unit vector, z upwards
+
+    Returns
+    -------
+    Field
+    """
+    along = np.asarray(direction, np.float64)
+    moved = motion_field(stack)
+
+    def weights(away: Floats) -> Floats:
+        beside = -(away @ along[:2])
+        return np.stack([beside, np.full_like(beside, -along[2])])[None]
+
+    return _in_motion(asked, replace(moved, weights=weights))
+
+
 def from_rest(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:

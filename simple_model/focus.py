@@ -29,6 +29,7 @@ GAUSSIAN_WIDTH = 4.35e-3  # m at 200 mm: the half width of sinc^2, and the force
 HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intensity
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
+CONTACTS = (0.2e-3, 20e-3)  # m, standard deviations of a `ContactSpot`
 FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in metre from the focus -> relative (...)
 
 # Force on a disc of radius 10 mm about the focus by height, relative to 200 mm: `array_field`.
@@ -93,6 +94,40 @@ class PressureMap:
     def _interpolated(self) -> RegularGridInterpolator:
         relative = self.pressure / self.pressure.max()
         return RegularGridInterpolator((self.x, self.y), relative, bounds_error=False, fill_value=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSpot:
+    """Gaussian traction of a small contact, relative to its largest; the same at all heights.
+
+    Parameters
+    ----------
+    width : float, metre, standard deviation
+
+    Raises
+    ------
+    ValueError
+        If the width is outside `CONTACTS`.
+    """
+
+    width: float
+
+    def __post_init__(self) -> None:
+        low, high = CONTACTS
+        if not low <= self.width <= high:
+            raise ValueError(
+                f"width = {1e3 * self.width:g} mm of a contact is outside {1e3 * low:g}.."
+                f"{1e3 * high:g} mm; a point has no response of its own, give the contact's size"
+            )
+
+    @property
+    def spacing(self) -> float:
+        """Length in metre that samples must resolve."""
+        return self.width
+
+    def __call__(self, offsets: Floats) -> Floats:
+        """Traction (...) relative to the largest at offsets (..., 2) in metre from the middle."""
+        return np.asarray(np.exp(-(offsets**2).sum(axis=-1) / (2 * self.width**2)))
 
 
 def read_pressure_map(path: str | Path) -> PressureMap:
@@ -231,8 +266,7 @@ def spot_detail(height: float, profile: str | FocalSpot) -> float:
     """Length in metre that samples of a focal spot along its path must resolve: the standard
     deviation of the Gaussian, or the spacing of a map that is finer.
     """
-    spacing = profile.spacing if isinstance(profile, PressureMap) else np.inf
-    return min(spot_width(height), spacing)
+    return min(spot_width(height), getattr(profile, "spacing", np.inf))
 
 
 def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
@@ -247,7 +281,15 @@ def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
 
 def spot_reach(height: float, profile: str | FocalSpot) -> float:
     """Radius in metre beyond which a focal spot is below 1e-7; infinite unless Gaussian."""
-    return 5.7 * spot_width(height) if profile == "gaussian" else np.inf
+    width = gaussian_width(height, profile)
+    return np.inf if width is None else 5.7 * width
+
+
+def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
+    """Standard deviation in metre of a focal spot; None unless it is Gaussian."""
+    if isinstance(profile, ContactSpot):
+        return profile.width
+    return spot_width(height) if profile == "gaussian" else None
 
 
 @cache

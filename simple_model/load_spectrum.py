@@ -230,6 +230,8 @@ def _knot_phases(pressure: MovingPressure) -> Floats:
         enough, whole = _recorded_knots(pressure.tacton, width)
     else:
         enough, whole = KNOTS_PER_WIDTH * path.length / width, 12
+    if pressure.heading:  # which jumps at corners
+        enough = max(enough, 2.5 * HIGHEST / path.drawing_frequency)
     k = whole * int(np.ceil(max(enough, FEWEST_KNOTS) / whole))
     return (np.arange(k) + 0.5) / k
 

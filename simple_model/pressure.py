@@ -17,6 +17,7 @@ from simple_model.drive import DRIVES, DriveLaw
 from simple_model.focus import (
     FOCI,
     NOMINAL_HEIGHT,
+    ContactSpot,
     FocalSpot,
     along_axis,
     moved_spot,
@@ -25,6 +26,7 @@ from simple_model.focus import (
 from simple_model.tacton import Tacton, level, modulation
 from simple_model.trajectory import Floats
 
+HEADINGS = ("x", "y", "")
 FINER = 8  # samples of a rhythm or signal in each average
 IN_CACHE = 2**15  # samples worked on at a time
 
@@ -46,11 +48,13 @@ class MovingPressure:
     peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a
         factor of 2, is the radiation pressure of a 160 dB focus on a wall that reflects fully.
     height : float, metre, of the focus above the array
+    heading : "x" or "y", the component of the path's unit tangent that multiplies it, as of a
+        traction along the path; or "", none
 
     Raises
     ------
     ValueError
-        If a value is unknown, not finite or out of range.
+        If a value is unknown, not finite or out of range, or a path without tangent has a heading.
     """
 
     tacton: Tacton
@@ -59,6 +63,7 @@ class MovingPressure:
     depth_of_modulation: float = 1.0
     peak_pressure: float = 50.0
     height: float = NOMINAL_HEIGHT
+    heading: str = ""
 
     def __post_init__(self) -> None:
         if not callable(self.profile):
@@ -72,6 +77,13 @@ class MovingPressure:
                 f"peak_pressure = {self.peak_pressure} Pa must be a finite number, 0 or above"
             )
         relative_intensity(self.height)
+        choose("heading", self.heading, HEADINGS)
+        path = self.tacton.trajectory
+        if self.heading and (path.is_static or path.hold):
+            raise ValueError(
+                "a focus that rests or jumps from point to point has no direction along its path; "
+                "give a direction, or let it move"
+            )
         self._check_levels()
 
     def _check_levels(self) -> None:
@@ -104,7 +116,8 @@ class MovingPressure:
         t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)
         path, gain = self.tacton.trajectory, self.gain(t, over).ravel()
         phases = [np.mod(path.phase(t).ravel() + ahead, 1.0) for ahead in self.tacton.foci]
-        gains = [gain * self.weight(phase) if path.levels else gain for phase in phases]
+        weighted = bool(path.levels or self.heading)
+        gains = [gain * self.weight(phase) if weighted else gain for phase in phases]
         foci = [path.at_phase(phase) for phase in phases]
         pressure = np.zeros((t.size, len(points)))
         block = max(1, IN_CACHE // max(1, len(points)))
@@ -116,9 +129,14 @@ class MovingPressure:
         return pressure.reshape(*t.shape, len(points))
 
     def weight(self, phase: ArrayLike) -> Floats:
-        """Factor (...) of the path's level on the pressure at fractions (...) of the period."""
-        levels = self.tacton.trajectory.level_at_phase(phase)
-        return self.law.level_factor(levels, self.depth_of_modulation)
+        """Factor (...) of the path's level on the pressure at fractions (...) of the period, and of
+        the heading.
+        """
+        path = self.tacton.trajectory
+        factor = self.law.level_factor(path.level_at_phase(phase), self.depth_of_modulation)
+        if self.heading:
+            factor = factor * path.tangent_at_phase(phase)[..., HEADINGS.index(self.heading)]
+        return factor
 
     def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level.
@@ -145,7 +163,8 @@ class MovingPressure:
         """Focal spot (..., n) at points (n, 2 or 3), relative, the focus at centres (..., 2)."""
         points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
         spot = moved_spot(points[:, :2], centre, self.height, self.profile)
-        if points.shape[1] == 3 and points[:, 2].any():
+        contact = isinstance(self.profile, ContactSpot)
+        if points.shape[1] == 3 and points[:, 2].any() and not contact:
             spot *= along_axis(points[:, 2], self.height)
         return spot
 

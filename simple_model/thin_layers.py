@@ -149,7 +149,10 @@ def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
         traction[:, at, at] += lam * Nd
         if np.isfinite(stack.thicknesses[layer]):
             depths.append(depths[-1][-1] + nodes[1:] * length[0, e].real)
-    kept = slice(0, count - (stack.base == "clamped" or stack.is_half_space))
+    if not stack.is_rigid:  # springs on the last node, none below a free stack
+        Guu[:, -1, -1] += stack.base_stiffness
+        Gww[:, -1, -1] += stack.base_stiffness
+    kept = slice(0, count - stack.is_rigid)
     square = (slice(None), kept, kept)
     return Pencil(
         Auu=Auu[square], Aww=Aww[:, kept], Guu=Guu[square], Gww=Gww[square], Buw=Buw[square],

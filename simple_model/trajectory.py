@@ -24,6 +24,7 @@ LARGEST = 0.060  # m, the size of a palm
 FURTHEST = 0.100  # m of a point's coordinates, which devices steer to
 MOST_POINTS = 1_000_000
 STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
+NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
 JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
 _TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
@@ -130,6 +131,16 @@ class Trajectory:
         """Position (..., 2) in metre at fractions (...) of the period, 0 to 1."""
         around = self._about_origin(np.asarray(phase, np.float64))
         return around + self.centre if any(self.centre) else around
+
+    def tangent_at_phase(self, phase: ArrayLike) -> Floats:
+        """Unit tangent (..., 2), the way the focus goes at fractions (...) of the period; 0 where
+        it rests.
+        """
+        phase = np.asarray(phase, np.float64)
+        step = NEARBY / max(1, len(self.points))
+        way = np.subtract(*(self.at_phase(np.mod(phase + d, 1.0)) for d in (step, -step)))
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        return np.asarray(way / np.where(length > 0, length, 1.0))
 
     def level_at_phase(self, phase: ArrayLike) -> Floats:
         """Level (...) of the amplitude, 0..1, at fractions (...) of the period."""

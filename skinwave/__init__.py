@@ -29,6 +29,8 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
 _HOMES = {
     "BODIES": "scene",
     "Body": "scene",
+    "Load": "scene",
+    "Sides": "scene",
     "Scene": "scene",
     "read": "scene_file",
     "loads": "scene_file",

@@ -43,6 +43,7 @@ MEASURES = {
     "standard_error": Measure(keys=("standard_error",), shapes=("normal",)),
     "bounds": Measure(keys=("low", "high"), shapes=("uniform", "triangular")),
 }
+RELATIVE = ("spread", "factor")  # measures over the value
 SHAPES = tuple(dict.fromkeys(shape for m in MEASURES.values() for shape in m.shapes))
 
 
@@ -84,6 +85,11 @@ class Distribution:
                 raise ValueError(f"low = {low:g} is not below high = {high:g}; swap them")
         elif self.width[0] < (least := float(self.measure == "factor")):
             raise ValueError(f"{self.measure} = {self.width[0]:g} is below {least:g}, its least")
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether its width is over the value, and the same in any unit."""
+        return self.measure in RELATIVE
 
     @property
     def is_exact(self) -> bool:

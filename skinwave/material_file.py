@@ -14,6 +14,8 @@ PLAIN = ("density", "shear_modulus", "poisson")  # and losses, which may be left
 LOSSES = ("viscosity", "loss_factor", "prony")
 ALONG = ("young_x", "young_y", "poisson_xy")  # of an orthotropic sheet, and shear_xy
 TABULATED = ("density", "poisson", "table")
+SAME_MODULUS = 1e-3  # relative: moduli that are given as Young's and as shear agree as far as this
+LEAST_POISSON = -0.999  # below which no solid is; Poisson's ratio is checked with the others
 
 
 def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Material:
@@ -34,6 +36,7 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
     ValueError
         If a value is missing, not of this kind of material, or out of range.
     """
+    values = _by_shear(values, where, keys)
     kind, needed, optional = _kind(values)
     if missing := [keys[name] for name in needed if name not in values]:
         raise ValueError(f"{where} lacks {' and '.join(missing)}; give it, or name a preset")
@@ -51,6 +54,32 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
         return Material(**values)
     solid = {name: rest.pop(name) for name in ("density", "poisson")}
     return of_law(**solid, law=MODULUS_LAWS[values["law"]](**rest))
+
+
+def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Mapping[str, Any]:
+    """The same values with the shear modulus E / 2 (1 + nu) in place of Young's modulus E.
+
+    Raises
+    ------
+    ValueError
+        If there is no Poisson's ratio, or both moduli contradict each other.
+    """
+    if "young" not in values:
+        return values
+    rest = {name: value for name, value in values.items() if name != "young"}
+    if "poisson" not in values:
+        raise ValueError(
+            f"{where} has {keys['young']} without {keys['poisson']}, which makes it a shear "
+            f"modulus; give {keys['poisson']}"
+        )
+    shear = values["young"] / (2 * (1 + max(values["poisson"], LEAST_POISSON)))
+    given = rest.get("shear_modulus", shear)
+    if "shear_modulus" in rest and not abs(given - shear) <= SAME_MODULUS * abs(shear):
+        raise ValueError(
+            f"{where} has {keys['young']} = {values['young']:g}, a shear modulus of {shear:g} Pa "
+            f"with its Poisson's ratio, and {keys['shear_modulus']} = {given:g}; leave out one"
+        )
+    return rest | {"shear_modulus": given}
 
 
 def _kind(values: Mapping[str, Any]) -> tuple[str, tuple[str, ...], tuple[str, ...]]:

@@ -47,7 +47,7 @@ from skinwave.models.parametric_cache import packed, unpacked
 from skinwave.models.prepared import Prepared, entry_name, typical_spots
 from skinwave.models.prepared import answer as answer_of
 from skinwave.models.reduction import BAND, ReducedBody
-from skinwave.scene import Body, Scene
+from skinwave.scene import Body, Scene, check_load
 
 TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
@@ -243,6 +243,7 @@ def _check(scene: Scene, tolerance: float) -> None:
     """Refuse what no affine sum gives."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    check_load(scene, "a body with free materials")
     check_laws(scene.body, scene.pressure)
     if scene.body.air:
         raise ValueError(

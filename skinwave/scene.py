@@ -18,11 +18,13 @@ from skinwave.bodies import (
     Phalanx,
     Placement,
     Relief,
+    Sides,
     body_name,
     kind_of,
     solid_of,
 )
 from skinwave.distributions import Distribution
+from skinwave.load import PRESSURE, Load
 from skinwave.pictures import scene_plot
 
 if TYPE_CHECKING:
@@ -30,7 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
-    "Body", "Layer", "Mounting", "Phalanx", "Placement", "Reading", "Relief", "Scene",
+    "Body", "Layer", "Load", "Mounting", "Phalanx", "Placement", "Reading", "Relief", "Scene",
+    "Sides",
     "body_name", "check_motion", "kind_of", "solid_of", "with_body",
 ]  # fmt: skip
 
@@ -82,10 +85,11 @@ class Scene:
     Parameters
     ----------
     name : str
-    pressure : MovingPressure, with its Tacton
+    pressure : MovingPressure, with its Tacton; of a load that no device makes, that of the load
     body : Body
     probes : (p, 2) positions in metre, where the surface is watched
     depth : of the probes in metre below the surface, along its normal; one, or one a probe
+    load : how the pressure acts, and gravity
     quantity : name of one of `simple_model.quantities.QUANTITIES`, what the probes read
     spreads : dotted key of a scene file and the distribution of its number about the central value,
         which is that of the scene; `skinwave.spreads` has those of presets and of the device, too
@@ -103,10 +107,14 @@ class Scene:
     probes: tuple[tuple[float, float], ...] = PROBES
     depth: float | tuple[float, ...] = 0.0
     quantity: str = DISPLACEMENT.name
+    load: Load = PRESSURE
     spreads: tuple[tuple[str, Distribution], ...] = ()
 
     def __post_init__(self) -> None:
+        acting = self.load.of_kind.acting(self.load, self.pressure)
+        object.__setattr__(self, "pressure", acting)
         self._check_probes()
+        self._check_load()
         self._check_reading()
         if self.body.of_kind.is_bounded:
             self._check_extent()
@@ -146,6 +154,14 @@ class Scene:
                 f"{1e3 * body.depth:g} mm thick; give less than that"
             )
 
+    def _check_load(self) -> None:
+        _ = self.loads  # a path may have no direction
+        if self.load.gravity and self.body.of_kind.discretise and not self.body.is_held:
+            raise ValueError(
+                "an unconstrained body falls under gravity; clamp its base or its sides, or leave "
+                "gravity out"
+            )
+
     def _check_extent(self) -> None:
         half = np.array([self.body.width, self.body.height]) / 2
         for x, y in self.probes:
@@ -166,6 +182,11 @@ class Scene:
     def tacton(self) -> Tacton:
         """The Tacton of the pressure."""
         return self.pressure.tacton
+
+    @property
+    def loads(self) -> tuple[MovingPressure, ...]:
+        """Components (c,) of the load, each a moving scalar in the direction of its kind."""
+        return self.load.pressures(self.pressure)
 
     @property
     def probe_points(self) -> NDArray[np.float64]:
@@ -214,17 +235,33 @@ def _check_sheet(body: Body, reading: Reading) -> None:
 
 
 def check_motion(scene: Scene, command: str) -> None:
-    """Refuse a scene for a command that is about the displacement of the surface.
+    """Refuse a scene for a command that is about the displacement of the surface under a pressure.
 
     Raises
     ------
     ValueError
-        If its probes read something else.
+        If its probes read something else, or its load is another.
     """
+    check_load(scene, command)
     if not scene.reading.is_plain:
         raise ValueError(
             f"{command} is about the displacement of the surface, not {scene.reading.words}; leave "
             "out depth_mm and quantity, or use skinwave run, compare, report, film or sweep"
+        )
+
+
+def check_load(scene: Scene, command: str) -> None:
+    """Refuse a scene for a command that is about the pressure of a focus.
+
+    Raises
+    ------
+    ValueError
+        If its load is another, or it has gravity.
+    """
+    if not scene.load.is_plain:
+        raise ValueError(
+            f"{command} is about the pressure of a focus, not {scene.load.words}; leave out [load],"
+            " or use skinwave run or sweep"
         )
 
 

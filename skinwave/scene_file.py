@@ -16,6 +16,7 @@ from simple_model.trajectory import BY_POINTS
 from skinwave.bodies import BodyKind
 from skinwave.bodies.parts import check_material
 from skinwave.distributions import Distribution, parent_of, with_spreads, without_spreads
+from skinwave.load import Load
 from skinwave.material_file import with_tables
 from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
 from skinwave.scene_keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
@@ -102,20 +103,43 @@ def from_table(table: dict[str, Any]) -> Scene:
         for section, keys in SECTIONS.items()
     }
     body = _body(parts["body"] | parts["placement"], preset)
+    load = _load(parts["load"], parts["focus"])
     tacton, path = _split(parts["tacton"], PATH)
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
     )
-    scene = Scene(name=top.get("name", "scene"), pressure=pressure, body=body, **parts["probes"])
+    scene = Scene(
+        name=top.get("name", "scene"), pressure=pressure, body=body, load=load, **parts["probes"]
+    )
     return _with_spreads(scene, spreads) if spreads else scene
+
+
+def _load(values: dict[str, Any], focus: dict[str, Any]) -> Load:
+    load = Load(**values)
+    if focus and not load.of_kind.is_of_device:
+        raise ValueError(
+            f"[focus] is that of a device, which makes no load of kind '{load.kind}'; leave it out"
+        )
+    return load
 
 
 def _with_spreads(scene: Scene, spreads: dict[str, Distribution]) -> Scene:
     complete = to_table(scene)
+    spreads = dict(_of_shear(complete, *each) for each in spreads.items())
     for key in spreads:
         if parent_of(complete, key)[0] is None:
             raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
     return replace(scene, spreads=tuple(sorted(spreads.items())))
+
+
+def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[str, Distribution]:
+    """The distribution of a shear modulus for that of a Young's modulus, at its Poisson's ratio."""
+    path, _, name = key.rpartition(".")
+    shear = f"{path}.shear_modulus_pa"
+    if name != "young_modulus_pa" or (table := parent_of(complete, shear)[0]) is None:
+        return key, given
+    share = 1.0 if given.is_relative else 1 / (2 * (1 + table["poisson"]))
+    return shear, replace(given, width=tuple(share * x for x in given.width))
 
 
 def dumps(scene: Scene) -> str:
@@ -135,14 +159,18 @@ def to_table(scene: Scene) -> dict[str, Any]:
         "tacton": (tacton, path),
         "focus": (pressure,),
         "body": (body,),
+        "load": (scene.load,),
         "placement": (body.placement,),
         "probes": (scene,),
     }
     table: dict[str, Any] = {"name": scene.name}
+    left = _without_meaning(scene)
     for section, keys in SECTIONS.items():
+        if section in left:
+            continue
         table[section] = {}
         for key, field in keys.items():
-            if key in DERIVED:
+            if key in DERIVED or f"{section}.{key}" in left:
                 continue
             source = next(s for s in sources[section] if hasattr(s, field.name))
             if section != "tacton" or key not in unused(tacton):
@@ -153,6 +181,16 @@ def to_table(scene: Scene) -> dict[str, Any]:
     for key in _keys_of_kinds() - set(body.of_kind.keys):
         table["body"].pop(key, None)
     return with_spreads(table, scene.spreads)
+
+
+def _without_meaning(scene: Scene) -> set[str]:
+    """Sections and dotted keys that mean nothing with the scene's kind of load and its base."""
+    load = scene.load.of_kind
+    own = SECTIONS["load"].items()
+    has = {"kind", "gravity", *load.defaults}
+    left = {f"load.{key}" for key, field in own if field.name not in has}
+    left |= set() if load.is_of_device else {"focus"}
+    return left | (set() if scene.body.base_stiffness else {"body.base_stiffness_n_per_m3"})
 
 
 def unused(tacton: Tacton) -> set[str]:

@@ -16,7 +16,7 @@ from simple_model.modulus_laws import COLUMNS
 from simple_model.trajectory import Points
 from skinwave.material_file import material_of, values_of, written_table
 from skinwave.plain_text import number_in
-from skinwave.scene import Layer, Mounting, Phalanx, Relief
+from skinwave.scene import Layer, Mounting, Phalanx, Relief, Sides
 
 # Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
 # the base of the epidermis, Meissner's corpuscles in the papillae beside them, Pacini's in the deep
@@ -241,6 +241,25 @@ def _mounting(key: str, value: Any) -> Mounting:
     return Mounting(**values)
 
 
+def _sides(key: str, value: Any) -> str | Sides:
+    if isinstance(value, str):
+        return value
+    names = {field.name: as_text for field in fields(Sides)}
+    return Sides(**checked(f"[body.{key}]", as_table(f"body.{key}", value), names))
+
+
+def _write_sides(sides: str | Sides) -> str | dict[str, str]:
+    return sides if isinstance(sides, str) else sides.by_name
+
+
+def _direction(key: str, value: Any) -> str | tuple[float, ...]:
+    return value if isinstance(value, str) else _numbers(key, value)
+
+
+def _write_direction(direction: str | tuple[float, ...]) -> str | list[float]:
+    return direction if isinstance(direction, str) else list(direction)
+
+
 def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     x, y = _pair(key, value)
     return x / 1e3, y / 1e3
@@ -302,6 +321,7 @@ PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
 MATERIAL = {
     "density_kg_m3": _scaled("density"),
     "shear_modulus_pa": _scaled("shear_modulus"),
+    "young_modulus_pa": _scaled("young"),
     "poisson": _scaled("poisson"),
     "young_x_pa": _scaled("young_x"),
     "young_y_pa": _scaled("young_y"),
@@ -315,6 +335,10 @@ MATERIAL = {
     "time_s": _scaled("time"),
     "table": SceneKey("table", _table, written_table),
     "prony": SceneKey("prony", _prony, lambda terms: [written(PRONY, term) for term in terms]),
+}
+INSTEAD = {  # keys of a material of which one is computed from the other
+    "young_modulus_pa": "shear_modulus_pa",
+    "shear_modulus_pa": "young_modulus_pa",
 }
 MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
     "relaxing_modulus_pa": "modulus_pa",
@@ -380,7 +404,8 @@ SECTIONS = {
         "size_y_mm": _scaled("height", 1e3),
         "thickness_mm": _scaled("depth", 1e3),
         "base": _word("base"),
-        "sides": _word("sides"),
+        "sides": SceneKey("sides", _sides, _write_sides),
+        "base_stiffness_n_per_m3": _scaled("base_stiffness"),
         "layers": SceneKey("layers", _layers, lambda layers: [written(LAYER, x) for x in layers]),
         "relief": SceneKey("relief", _relief, partial(written, RELIEF)),
         "bone": SceneKey("bone", _bone, partial(written, BONE)),
@@ -393,6 +418,13 @@ SECTIONS = {
         "air": SceneKey("air", _switch, bool),
         "mounting": SceneKey("mounting", _mounting, partial(written, MOUNTING)),
         "grammage_g_m2": _scaled("grammage", 1e3),
+    },
+    "load": {
+        "kind": _word("kind"),
+        "direction": SceneKey("direction", _direction, _write_direction),
+        "force_n": _scaled("force"),
+        "width_mm": _scaled("width", 1e3),
+        "gravity_m_per_s2": _scaled("gravity"),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
@@ -432,6 +464,11 @@ def renamed(table: dict[str, Any]) -> dict[str, Any]:
             raise ValueError(f"[body] has both {old} and {new}, which are one; leave out {old}")
         warnings.warn(f"[body] {old} is now {new}; rename it", FutureWarning, stacklevel=3)
     return table | {"body": {RENAMED.get(key, key): value for key, value in body.items()}}
+
+
+def with_key(table: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """A table with another value of a key, and without the key that it stands instead of."""
+    return {name: x for name, x in table.items() if name != INSTEAD.get(key)} | {key: value}
 
 
 def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:

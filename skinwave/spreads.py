@@ -100,7 +100,8 @@ def spreads_of(scene: Scene) -> tuple[Spread, ...]:
         parent, last = parent_of(table, key)
         if parent is not None:
             found.append(Spread(key=key, value=float(parent[last]), distribution=given))
-    if PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
+    device = scene.load.of_kind.is_of_device
+    if device and PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
         found.append(
             Spread(key=PRESSURE, value=scene.pressure.peak_pressure,
                    distribution=known_to(FACTOR), implied=True)

@@ -109,6 +109,7 @@ def body_map(
 def has_wavenumber_integral(scene: Scene) -> bool:
     """Whether a wavenumber integral stands for the scene, whose sides then absorb."""
     plain = scene.pressure.profile == "gaussian" and scene.tacton.trajectory.shape != "recorded"
+    plain = plain and scene.load.is_plain
     return plain and scene.body.sides == "absorbing" and has_exact_waves(scene.body)
 
 

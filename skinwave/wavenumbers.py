@@ -23,6 +23,7 @@ from simple_model.dispersion import DispersionCurves
 from simple_model.focus import lobe_width
 from simple_model.material import Complex
 from simple_model.response import Response, step
+from skinwave.load import PRESSURE
 from skinwave.scene import Scene
 
 PULSE, RAMP = 2e-3, 1e-3  # s: how long the pulse lasts, and its rise and fall
@@ -93,7 +94,7 @@ def pulse_scene(scene: Scene) -> Scene:
         tacton=tacton, drive="force_corrected", depth_of_modulation=0.0, height=height
     )
     probes = tuple((NEAREST + SPACING * n, 0.0) for n in range(count))
-    return replace(scene, pressure=pressure, probes=probes)
+    return replace(scene, pressure=pressure, probes=probes, load=PRESSURE)
 
 
 def transfer_functions(scene: Scene, response: Response, highest: float) -> LineOfProbes:

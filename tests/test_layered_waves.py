@@ -109,6 +109,7 @@ def by_elements(stack, k, w, order=16):
         at = np.concatenate([nodes, n + nodes])
         matrix[np.ix_(at, at)] += stiff
     free = np.arange(2 * n)
+    matrix[[n - 1, 2 * n - 1], [n - 1, 2 * n - 1]] += stack.base_stiffness
     if stack.base == "clamped":
         free = free[(free != n - 1) & (free != 2 * n - 1)]
     load = np.zeros(2 * n)
@@ -159,6 +160,7 @@ def test_soft_on_stiff_moves_as_published():
         (SKIN, 3e-5),
         (replace(SKIN, thicknesses=(0.1e-3, 1e-3, 4e-3, 9.5e-3)), 3e-5),
         (replace(SKIN, base="free"), 1e-3),  # at 1 Hz, where elements lose digits
+        (replace(SKIN, base="elastic", base_stiffness=2e6), 3e-5),
         (
             Stack(
                 materials=(tissue(5e3), tissue(2e6), tissue(20e3)),
@@ -168,7 +170,7 @@ def test_soft_on_stiff_moves_as_published():
         ),
         (ON_STIFF, 1e-6),
     ],
-    ids=["skin", "thin", "free", "hard-inside", "soft-on-stiff"],
+    ids=["skin", "thin", "free", "elastic", "hard-inside", "soft-on-stiff"],
 )
 def test_layers_move_as_spectral_elements_in_depth_do(stack, most):
     """At all depths, whose motion and stresses are those of what is between and below."""

@@ -21,7 +21,7 @@ from simple_model.rhythm import ROLES
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
-from skinwave.bodies.body import BASES
+from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named, names
 from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
@@ -132,7 +132,7 @@ papers = st.builds(
     fem.from_young, density=numbers(300, 1500), young=numbers(1e8, 1e10), poisson=numbers(0, 0.45),
     loss_factor=numbers(0.02, 0.1),
 )  # fmt: skip
-held = st.sampled_from([(b, s) for b in BASES for s in BASES if "clamped" in (b, s)])
+held = st.sampled_from([(b, s) for b in CONDITIONS for s in CONDITIONS if "clamped" in (b, s)])
 
 
 @st.composite

@@ -7,10 +7,10 @@ from skinwave.bodies import none, sheet, slab, palm, mesh, finger, disc  # noqa:
 from skinwave.bodies.body import BODIES, KINDS, Body, BodyKind, body_name, kind_of, register
 from skinwave.bodies.mounting import Mounting
 from skinwave.bodies.parts import FLAT, Layer, Phalanx, Placement, Relief, solid_of
+from skinwave.bodies.supports import Sides
 
 __all__ = [
     "BODIES", "FLAT", "KINDS",
-    "Body", "BodyKind", "Layer", "Mounting", "Phalanx",
-    "Placement", "Relief",
+    "Body", "BodyKind", "Layer", "Mounting", "Phalanx", "Placement", "Relief", "Sides",
     "body_name", "kind_of", "register", "solid_of",
 ]  # fmt: skip

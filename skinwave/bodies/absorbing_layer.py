@@ -18,7 +18,7 @@ LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs carry below it is still near field
 
 def has_layer(body: Body) -> bool:
     """Whether an absorbing layer is meshed around a body."""
-    return body.of_kind.is_layer and body.sides == "absorbing"
+    return body.of_kind.is_layer and "absorbing" in body.conditions
 
 
 def layer_scale(body: Body) -> float:

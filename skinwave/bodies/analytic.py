@@ -79,6 +79,7 @@ def flattened(body: Body) -> Stack:
         materials=materials,
         thicknesses=tuple(thicknesses),
         base=body.base if body.base in BASES else BASES[0],
+        base_stiffness=body.base_stiffness,
     )
 
 

@@ -28,8 +28,8 @@ from skinwave.bodies.parts import (
     check_regions,
     solid_of,
 )
+from skinwave.bodies.supports import USUAL, Sides, check_base, complete
 
-BASES = ("clamped", "absorbing", "free")
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
 LARGEST = 2.0  # m: a body of more was meant in mm
 
@@ -46,8 +46,10 @@ class Body:
     material : the name of a preset, or a Material
     width, height, depth : float, metre, along x, y and downwards, at most 2; a slab's depth may
         be inf, a half-space, which only flat-body can compute
-    base, sides : "clamped", "absorbing" or "free"; of a hand the part that looks downwards, and
-        the ends at the wrist and the fingers or the cuts of a file
+    base, sides : "clamped", "absorbing" or "free", and of a base "elastic", a Winkler foundation;
+        of a hand the part that looks downwards, and the ends at the wrist and the fingers or the
+        cuts of a file; or a condition for each of the `Sides`, where they are not alike
+    base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
     layers : from the surface downwards; what is below them is of `material`
     relief : of a palm
     bone : of a finger
@@ -70,7 +72,8 @@ class Body:
     height: float = 0.100
     depth: float = 0.015
     base: str = "clamped"
-    sides: str = "absorbing"
+    sides: str | Sides = USUAL
+    base_stiffness: float = 0.0
     layers: tuple[Layer, ...] = ()
     relief: Relief = PLAIN
     bone: Phalanx = PHALANX
@@ -85,8 +88,8 @@ class Body:
     def __post_init__(self) -> None:
         kind = self.of_kind
         check_material(self.material)
-        for name in ("base", "sides"):
-            choose(name, getattr(self, name), BASES)
+        check_base(self.base, self.base_stiffness, depth=self.depth, is_plate=kind.is_plate)
+        object.__setattr__(self, "sides", complete(self.sides, kind.named_sides, self.kind))
         for name in ("width", "height", "depth"):
             length, may_be_infinite = getattr(self, name), name == "depth" and kind.is_layer
             if not (length > 0 and (isfinite(length) or (may_be_infinite and length == inf))):
@@ -97,7 +100,7 @@ class Body:
                     f"lengths are in metre here and in mm in a scene file, so that "
                     f"{length:g} mm are {name} = {length / 1e3:g}, or {KEYS[name]} = {length:g}"
                 )
-        if kind.discretise and self.base == self.sides == "free":
+        if kind.discretise and {self.base, *self.conditions} == {"free"}:
             raise ValueError(
                 "a body with free base and free sides is unconstrained and drifts under the mean "
                 "load; clamp one of them"
@@ -212,9 +215,24 @@ class Body:
         return min((self.solid, *inside), key=lambda solid: solid.shear_speed)
 
     @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions of its sides, one if they are alike."""
+        return (self.sides,) if isinstance(self.sides, str) else (*self.sides.by_name.values(),)
+
+    def side(self, name: str) -> str:
+        """Condition of one side."""
+        return self.sides if isinstance(self.sides, str) else getattr(self.sides, name)
+
+    @property
+    def symmetry(self) -> str:
+        """The axes, of "xy", across whose middle planes its supports are their own mirror image."""
+        sides = "xy" if isinstance(self.sides, str) else self.sides.symmetry
+        return "".join(axis for axis in sides if axis in self.mounting.symmetry)
+
+    @property
     def is_held(self) -> bool:
-        """Whether it is constrained: clamped at its base or its sides."""
-        return "clamped" in (self.base, self.sides)
+        """Whether it is constrained: at its base, or clamped at one of its sides."""
+        return self.base in ("clamped", "elastic") or "clamped" in self.conditions
 
     @property
     def is_skin(self) -> bool:
@@ -243,6 +261,7 @@ class BodyKind:
     dispersion : dispersion curves of a laterally infinite body of the same section, at
         frequencies (f,) in Hz and of at most so many modes; None without any
     wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
+    named_sides : names of the sides that may have conditions of their own
     is_plate : bool, whether it is thin, so that it bends, in-plane tension stiffens it, and air
         adds mass
     is_layer : bool, whether it is a layer of uniform depth, which may be inf
@@ -269,6 +288,7 @@ class BodyKind:
     check_exact: Callable[[Body], object] = lambda body: None
     dispersion: Callable[[Body, Floats, int], DispersionCurves] | None = None
     wave_speed: Callable[[Body, float], float] = lambda body, frequency: _rayleigh(body, frequency)
+    named_sides: tuple[str, ...] = ()
     is_plate: bool = False
     is_layer: bool = False
     is_symmetric: bool = False

@@ -17,6 +17,7 @@ from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.sizes import checked, default_size
+from skinwave.bodies.supports import bed, together
 
 # Of a size that is asked for: a mesh that it is compared with may be so much coarser.
 COMPARED = 4 / 3
@@ -80,7 +81,8 @@ def build(
     assert discretise  # else refused
     made = discretise(body, size)
     mesh = made.mesh
-    ends = {"bottom": body.base, "sides": body.sides}
+    sides = {"sides": body.sides} if isinstance(body.sides, str) else body.sides.by_name
+    ends = {"bottom": body.base, **sides}
     ends = {name: end for name, end in ends.items() if len(mesh.facets.get(name, ()))}
     if made.held:
         del ends["sides"]
@@ -90,6 +92,8 @@ def build(
         fixed[f"mirror_{axis}"] = axis
     drag = made.drag(mesh) if made.drag else None
     support = made.support(mesh) if made.support else None
+    if ends.get("bottom") == "elastic":
+        support = together(support, bed(mesh, mesh.facets["bottom"], body.base_stiffness))
     held = made.held(mesh) if made.held else None
     stiffener = made.stiffener(mesh) if made.stiffener else None
     is_fixed = "xyz" in fixed.values() or held is not None

@@ -59,8 +59,8 @@ def support(
     Of a surface whose normal has a cosine c with either direction, a share s is supported, which
     rises smoothly from 0 at c = 0.2 to 1 at 1. Where that is clamped it rests on soft tissue over
     bone, whose thickness falls from infinite to next to nothing as the share rises: springs of
-    mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. Where it is absorbing,
-    the share has dashpots.
+    mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. Where it is elastic, the
+    share has the springs of the base; where it is absorbing, dashpots.
 
     Parameters
     ----------
@@ -79,6 +79,8 @@ def support(
         share = _share(cosine)
         if end == "clamped":
             stiffness += _shear_stiffness(body, mesh) * share / (1 - share + 1 / STIFFEST)
+        elif end == "elastic":
+            stiffness += body.base_stiffness * share
         elif end == "absorbing":
             absorbed = np.maximum(absorbed, share)
     return fem.Support(facets=boundary_facets(mesh.tets), stiffness=stiffness, absorbed=absorbed)

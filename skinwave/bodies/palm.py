@@ -79,7 +79,8 @@ def _support(body: Body, mesh: TetMesh) -> fem.Support:
     """Support below and at both ends, by the normals of the palm's level set."""
     slope = gradient(body.palm, facet_points(mesh, boundary_facets(mesh.tets)))
     outward = np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
-    return support(body, mesh, outward, [(body.sides, np.abs(outward[:, 1]))])
+    ends = [(body.side("front"), -outward[:, 1]), (body.side("back"), outward[:, 1])]
+    return support(body, mesh, outward, ends)
 
 
 PALM = register(
@@ -91,6 +92,7 @@ PALM = register(
         discretise=discretise,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
+        named_sides=("front", "back"),
         may_be_coated=True,
         dispersion=stack_dispersion,  # of a slab as deep as the middle of the palm
         mesh_is_cached=True,

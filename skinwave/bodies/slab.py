@@ -13,6 +13,7 @@ from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.parts import Layer
 
 SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
@@ -32,11 +33,18 @@ def discretise(body: Body, h: float) -> Discretised:
 def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
     """Grid lines along x, y and z: fine where the focus travels, with any absorbing layer."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
-    halves = [graded_axis(side / 2, h, along) for side in (body.width, body.height)]
-    if has_layer(body):
-        halves = [np.concatenate([half, half[-1] + layer_line(body, half)]) for half in halves]
-    x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
+    ends = ((body.width, "left", "right"), (body.height, "front", "back"))
+    x, y = (_line(body, graded_axis(side / 2, h, along), *names) for side, *names in ends)
     return x, y, -_depth_line(body, h)[::-1]
+
+
+def _line(body: Body, half: Floats, *ends: str) -> Floats:
+    """Grid lines from one end to the other of a half, with an absorbing layer where an end has."""
+    layer = half[-1] + layer_line(body, half) if has_layer(body) else half[:0]
+    low, high = (
+        np.concatenate([half, layer]) if body.side(end) == "absorbing" else half for end in ends
+    )
+    return np.concatenate([-low[:0:-1], high])
 
 
 def _depth_line(body: Body, h: float) -> Floats:
@@ -80,6 +88,7 @@ SLAB = register(
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),
         dispersion=stack_dispersion,
+        named_sides=tuple(EDGES),
         is_layer=True,
         is_symmetric=True,
         conforming=True,

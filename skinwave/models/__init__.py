@@ -68,6 +68,7 @@ class Model:
     seconds, memory : predicted for a first response where a plan does not measure, s and bytes
     colour : str, of figures
     reads : whether it has the quantity that a scene asks for, at the depths of its probes
+    takes_load : whether it takes the load of a scene
     quantity : name of the one that it has whatever a scene asks for, as the point kernel has; or ""
     needs_body : bool
     is_reduced : bool, whether bodies are reduced once for all Tactons
@@ -91,6 +92,7 @@ class Model:
     colour: str = "#56B4E9"
     label: str = ""
     reads: "Callable[[Scene], bool]" = lambda scene: scene.reading.is_plain
+    takes_load: "Callable[[Scene], bool]" = lambda scene: scene.load.is_plain
     quantity: str = ""
     needs_body: bool = True
     is_reduced: bool = False
@@ -131,7 +133,7 @@ def of_waves(scene: "Scene") -> bool:
 
 
 def check_reading(model: Model, scene: "Scene") -> None:
-    """Refuse a scene whose quantity or depth a model does not have.
+    """Refuse a scene whose quantity, depth or load a model does not have.
 
     Raises
     ------
@@ -143,15 +145,20 @@ def check_reading(model: Model, scene: "Scene") -> None:
             f"{model.name} has no {scene.reading.words}; use --model fem, or ask for the "
             "displacement at the surface"
         )
+    if not model.takes_load(scene):
+        raise ValueError(
+            f"{model.name} does not take {scene.load.words} with {scene.reading.words}; use "
+            "--model fem, or leave out [load]"
+        )
 
 
 def takes(model: Model, scene: "Scene") -> bool:
-    """Whether a model is for a scene's body, and has the quantity that it asks for."""
+    """Whether a model is for a scene's body and load, and has the quantity that it asks for."""
     try:
         model.refuse(scene.body)
     except ValueError:
         return False
-    return model.reads(scene)
+    return model.reads(scene) and model.takes_load(scene)
 
 
 def names() -> tuple[str, ...]:

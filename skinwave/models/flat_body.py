@@ -8,7 +8,13 @@ import numpy as np
 import simple_model
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response, steady_state
-from simple_model.flat_quantities import from_rest, quantity_field, steady, surface_field
+from simple_model.flat_quantities import (
+    from_rest,
+    quantity_field,
+    steady,
+    surface_field,
+    traction_field,
+)
 from simple_model.wavenumber_integral import Field
 from skinwave.bodies.analytic import exact_waves, stack
 from skinwave.models import Model, Request, of_waves, register
@@ -18,14 +24,14 @@ from skinwave.scene import Scene
 
 def _from_rest(scene: Scene, request: Request) -> Response:
     compliance = exact_waves(scene.body, "flat-body")
-    if not scene.reading.is_plain:
+    if not (scene.reading.is_plain and scene.load.is_plain):
         return _read("flat-body", from_rest, scene, request)
     return simple_model.flat_body(compliance, scene.pressure, scene.probe_points, request.times)
 
 
 def _steady(scene: Scene, request: Request) -> Response:
     compliance = exact_waves(scene.body, "flat-body-harmonic")
-    if not scene.reading.is_plain:
+    if not (scene.reading.is_plain and scene.load.is_plain):
         return _read("flat-body-harmonic", steady, scene, request)
     return steady_state(compliance, scene.pressure, scene.probe_points, request.times)
 
@@ -37,14 +43,33 @@ def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, request: R
     values = np.empty((len(times), len(depths)))
     for depth in np.unique(depths).tolist():
         here = depths == depth
-        values[:, here] = waveforms(
-            field_read(scene, depth), asked, scene.pressure, scene.probe_points[here], times
+        values[:, here] = sum(
+            waveforms(field, asked, pressure, scene.probe_points[here], times)
+            for field, pressure in zip(fields_read(scene, depth), scene.loads, strict=True)
         )
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model=model, times=times, probes=scene.probe_points, quantity=asked.name, values=values,
         effort=effort,
     )  # fmt: skip
+
+
+def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
+    """Fields of the quantity that a scene reads, one for each component of its load."""
+    if scene.load.is_plain:
+        return (field_read(scene, depth),)
+    upright = scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0]
+    asked, layers = scene.reading.asked, stack(scene.body)
+    return tuple(traction_field(asked, layers, direction) for direction in upright)
+
+
+def takes_load(scene: Scene) -> bool:
+    """Whether it takes a scene's load: of tractions of any direction, which need a stack of layers,
+    it has the normal motion of the surface.
+    """
+    reading, load = scene.reading, scene.load
+    own = reading.asked.is_normal and reading.is_on_surface and scene.body.of_kind.is_layer
+    return load.is_plain or (own and not load.gravity)
 
 
 def field_read(scene: Scene, depth: float) -> Field:
@@ -73,6 +98,7 @@ FLAT_BODY = register(
         memory=3e8,
         colour="#009E73",
         reads=of_waves,
+        takes_load=takes_load,
         is_infinite=True,
         takes_series=has_table,
     )
@@ -90,6 +116,7 @@ HARMONIC = register(
         memory=3e8,
         colour="#E69F00",
         reads=of_waves,
+        takes_load=takes_load,
         is_infinite=True,
         is_steady=True,
     )

@@ -15,7 +15,7 @@ from simple_model.choices import choose
 from skinwave.bodies import Body
 from skinwave.bodies.build import Build
 from skinwave.bodies.parts import solid_of
-from skinwave.scene_keys import MATERIAL, PRONY, SECTIONS, write_material
+from skinwave.scene_keys import MATERIAL, PRONY, SECTIONS, with_key, write_material
 
 FIXED = ("poisson", "law", "table")  # keys of a material that are no number, or change the matrices
 MOST_CORNERS = 16
@@ -46,7 +46,7 @@ class FreeKey:
 class Reference:
     """A body as it was meshed, the layer (r,) of each of its materials, None below all layers, and
     the factors (r, 2) of modulus and density of a mesh that stands for a thinner body; and whether
-    it rests on springs.
+    it rests on springs that go with its modulus.
     """
 
     body: Body
@@ -156,7 +156,8 @@ def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference
     Raises
     ------
     ValueError
-        If a free layer is of one material with the next, or the kind of body has other materials.
+        If a free layer is of one material with the next, the kind of body has other materials, or
+        it rests on springs of both kinds.
     """
     tops = np.cumsum([0.0, *(layer.thickness for layer in body.layers)])
     starts, solids = zip(*body.strata, strict=True)
@@ -168,8 +169,28 @@ def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference
             f"{merged[0]} is of a layer that is one with its neighbour; change its range slightly"
         )
     factors = [_factors(m, s) for m, s in zip(meshed_materials(build), solids, strict=True)]
+    return Reference(
+        body=body, layers=layers, factors=np.array(factors), is_sprung=_is_sprung(body, build)
+    )
+
+
+def _is_sprung(body: Body, build: Build) -> bool:
+    """Whether a body rests on springs that stand for its own tissue.
+
+    Raises
+    ------
+    ValueError
+        If its base has a stiffness of its own beside them.
+    """
     sprung = build.support is not None and bool(build.support.stiffness.any())
-    return Reference(body=body, layers=layers, factors=np.array(factors), is_sprung=sprung)
+    if not body.base_stiffness:
+        return sprung
+    if "clamped" in body.conditions and "xyz" not in build.fixed.values():
+        raise ValueError(
+            "a hand with free materials has one kind of springs, and this one has an elastic base "
+            "beside clamped ends, which go with its modulus; reduce it for each material"
+        )
+    return False
 
 
 def meshed_materials(build: Build) -> tuple[Material, ...]:
@@ -246,7 +267,7 @@ def _changed(table: Any, path: Sequence[str], value: float) -> Any:
             raise ValueError(f"there is no Prony term {head} in {len(table)}; count from 0")
         k = int(head)
         return [*table[:k], _changed(table[k], rest, value), *table[k + 1 :]]
-    return table | {head: _changed(table.get(head, []), rest, value)}
+    return with_key(table, head, _changed(table.get(head, []), rest, value))
 
 
 def _with_material(body: Body, layer: int | None, solid: Material) -> Body:

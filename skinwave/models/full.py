@@ -14,7 +14,7 @@ import fem
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.load_spectrum import load_lines, path_samples, pressure_lines, synthesise
+from simple_model.load_spectrum import load_lines, path_samples, synthesise
 from simple_model.material import Material
 from simple_model.sampling import resolving_step, shown
 from skinwave.bodies.build import Build, operators
@@ -23,7 +23,15 @@ from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models import Request
 from skinwave.models.laws import relaxing, series_tolerance
-from skinwave.models.loads import line_factor, probe_rows, surface_load
+from skinwave.models.loads import (
+    line_factor,
+    load_lines_at,
+    loads_at,
+    probe_rows,
+    sag,
+    surface_load,
+    with_sag,
+)
 from skinwave.scene import Body, Scene
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
@@ -108,13 +116,13 @@ def transient_answer(scene: Scene, request: Request) -> Response:
     clock, body = Clock(), relaxing(scene.body, series_tolerance(request.tolerance))
     build = meshed(body, request.h, clock, report)
     ops = assembled(build, clock, report)
-    P, points = surface_load(build)
+    P, points = surface_load(build, scene.load)
     S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
     report("factorise", 0.0)
 
     @lru_cache(maxsize=4)
     def force(t: float) -> Floats:
-        return P @ scene.pressure(points, t, over=dt)
+        return P @ loads_at(scene.loads, points, t, dt)
 
     with clock("march"):
         states = fem.transient(ops, force, dt, solver=solver)
@@ -122,19 +130,26 @@ def transient_answer(scene: Scene, request: Request) -> Response:
         stepped, energy = marched(
             balanced, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
         )
+    still = sag(build, ops, S, scene.load, solver)
     effort = Effort(
         dofs=len(ops.free), steps=steps, energy_imbalance=energy[0], radiated=energy[1], dt=dt,
         solver=fem.available()[0] if solver == "auto" else solver,
     )  # fmt: skip
     return Response(
         model="fem-transient", times=times, probes=scene.probe_points, quantity=scene.quantity,
-        values=in_time(stepped, dt, times, scene, solids),
+        values=in_time(stepped, dt, times, scene, solids, sag=still),
         effort=spent(effort, clock, build, request.h or default_size(scene.body)),
     )  # fmt: skip
 
 
 def in_time(
-    stepped: Floats, dt: float, times: Floats, scene: Scene, solids: tuple[Material, ...] = ()
+    stepped: Floats,
+    dt: float,
+    times: Floats,
+    scene: Scene,
+    solids: tuple[Material, ...] = (),
+    *,
+    sag: Floats | float = 0.0,
 ) -> Floats:
     """Waveforms of a scene's quantity from the steps of a time integration: rates are those of the
     cubic spline that is sampled.
@@ -146,6 +161,7 @@ def in_time(
     times : (t,) float, s
     scene : Scene
     solids : p materials of the probes, where stress relaxes
+    sag : (p c,) float, components at rest under gravity
 
     Returns
     -------
@@ -156,7 +172,7 @@ def in_time(
         each = np.split(stepped, len(solids), axis=1)
         stepped = np.hstack([fem.relaxed(x, dt, m) for x, m in zip(each, solids, strict=True)])
     sampled = CubicSpline(np.arange(len(stepped)) * dt, stepped)(times, asked.rate)
-    return asked.waveforms(sampled, len(scene.probes))
+    return asked.waveforms(with_sag(sampled, sag, asked), len(scene.probes))
 
 
 def marched(
@@ -224,18 +240,18 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
     clock = Clock()
     build = meshed(scene.body, request.h, clock, report)
     ops = assembled(build, clock, report)
-    P, points = surface_load(build)
+    P, points = surface_load(build, scene.load)
     S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
     asked = scene.reading.asked
     with clock("lines"):
-        lines, knots = load_lines(scene.pressure, threshold), path_samples(scene.pressure)
+        lines, knots = load_lines(scene.loads[0], threshold), path_samples(scene.loads[0])
         count = len(np.unique(np.round(lines.frequencies, 9)))
         if count > MOST_LINES or len(knots) > MOST_KNOTS:
             raise ValueError(
                 f"this load has {count:,} lines from {len(knots):,} positions, the limits are "
                 f"{MOST_LINES:,} and {MOST_KNOTS:,}; take --model fem"
             )
-        frequencies, pressures = pressure_lines(scene.pressure, points, threshold)
+        frequencies, pressures = load_lines_at(scene.loads, points, threshold)
         if not scene.body.is_held:  # under its mean an unconstrained body would drift
             frequencies, pressures = frequencies[frequencies > 0], pressures[frequencies > 0]
         amplitudes = np.empty((len(frequencies), S.shape[0]), np.complex128)
@@ -246,6 +262,7 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             report("lines", (k + 1) / len(frequencies))
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
+        still = sag(build, ops, S, scene.load, solver)
     energy = energy_balance(total)
     amplitudes = amplitudes * line_factor(asked, 2j * np.pi * frequencies, solids, S.shape[0])
     below = shown(scene.pressure, frequencies, times)
@@ -256,7 +273,8 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
     return Response(
         model="fem-harmonic", times=times, probes=scene.probe_points, quantity=scene.quantity,
         values=asked.waveforms(
-            synthesise(frequencies[below], amplitudes[below], times), len(scene.probes)
+            with_sag(synthesise(frequencies[below], amplitudes[below], times), still, asked),
+            len(scene.probes),
         ),
         effort=spent(effort, clock, build, request.h or default_size(scene.body)),
     )  # fmt: skip

@@ -30,7 +30,7 @@ def vacuum_only(model: str, body: Body) -> None:
 def _reduced(scene: Scene, request: Request) -> Response:
     prepared = prepare(
         scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
-        tolerance=reduction_tolerance(request.tolerance), reading=scene.reading,
+        tolerance=reduction_tolerance(request.tolerance), reading=scene.reading, load=scene.load,
     )  # fmt: skip
     return answer(prepared, scene, request.report)
 
@@ -44,6 +44,7 @@ FEM = register(
         error=None,
         default_size=default_size,
         reads=lambda scene: True,
+        takes_load=lambda scene: True,
         colour="#0072B2",
         is_reduced=True,
         fits_damping=True,
@@ -60,6 +61,7 @@ HARMONIC = register(
         error=None,
         default_size=default_size,
         reads=lambda scene: True,
+        takes_load=lambda scene: True,
         colour="#CC79A7",
         is_steady=True,
     )
@@ -74,6 +76,7 @@ TRANSIENT = register(
         error=None,
         default_size=default_size,
         reads=lambda scene: True,
+        takes_load=lambda scene: True,
         colour="#D55E00",
         is_stepped=True,
         fits_damping=True,

@@ -1,5 +1,7 @@
 """Load and probes of a meshed body under a moving pressure."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,29 +12,120 @@ from fem.interior import displacement_operator
 from fem.load_and_probe import (
     facet_normals,
     facet_points,
-    load_operator,
     probe_operator,
     surface_frame,
+    traction_operator,
 )
 from fem.stress import materials_at, strain_operator
 from meshes.tetmesh import Floats
+from simple_model import MovingPressure
+from simple_model.load_spectrum import merge_lines, pressure_lines
 from simple_model.material import Material
 from simple_model.quantities import STRAIN, Quantity
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
+from skinwave.bodies.build import operators as operators_of
+from skinwave.load import PRESSURE, Load
 from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene import Reading
 
 
-def surface_load(build: Build) -> tuple[sparse.csr_array, Floats]:
-    """Load operator P (3 n, k): nodal forces in N of the pressure in Pa on a surface across the
-    beam, and the points (k, 3) in metre where it is taken.
-
-    Radiation pressure goes with the square of the cosine of incidence: once for the beam that is
-    spread over a sloping surface, and once for the momentum that is reflected along its normal.
+def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array, Floats]:
+    """Load operator P (3 n, c k): nodal forces in N of the c components of a load in Pa on a
+    surface across the beam, one after the other, and the points (k, 3) in metre where each is
+    taken.
     """
-    cosine = np.maximum(facet_normals(build.mesh)[:, 2], 0.0)
-    return load_operator(build.mesh) * cosine**2, facet_points(build.mesh)
+    normals, points = facet_normals(build.mesh), facet_points(build.mesh)
+    each = [traction_operator(build.mesh, t) for t in load.tractions(normals)]
+    return each[0] if len(each) == 1 else sparse.hstack(each, format="csr"), points
+
+
+def spread(P: sparse.csr_array, values: Floats) -> Floats:
+    """Nodal forces (3 n, c m) of patterns (k, m) over the points of each component of a load
+    operator (3 n, c k).
+    """
+    count = P.shape[1] // len(values)
+    return np.hstack([P[:, k * len(values) :][:, : len(values)] @ values for k in range(count)])
+
+
+def loads_at(pressures: Sequence[MovingPressure], points: Floats, t: float, over: float) -> Floats:
+    """Components (c k,) in Pa of a load at points (k, 3) in metre, as `surface_load` has them.
+
+    Parameters
+    ----------
+    pressures : (c,) MovingPressure
+    points : (k, 3) float, metre
+    t : s
+    over : s, the time that rhythms and signals are averaged over
+
+    Returns
+    -------
+    (c k,) float
+    """
+    return np.concatenate([each(points, t, over=over) for each in pressures])
+
+
+def load_lines_at(
+    pressures: Sequence[MovingPressure], points: Floats, threshold: float
+) -> tuple[Floats, fem.Complex]:
+    """Lines of the components of a load.
+
+    Parameters
+    ----------
+    pressures : (c,) MovingPressure
+    points : (k, 3) float, metre
+    threshold : as of `load_lines`
+
+    Returns
+    -------
+    distinct frequencies (f,) in Hz and amplitudes (f, c k) in Pa
+    """
+    each = [pressure_lines(pressure, points, threshold) for pressure in pressures]
+    k, found = len(points), np.concatenate([f for f, _ in each])
+    rows = [np.pad(a, ((0, 0), (c * k, (len(each) - 1 - c) * k))) for c, (_, a) in enumerate(each)]
+    return each[0] if len(each) == 1 else merge_lines(found, np.vstack(rows))
+
+
+def sag(
+    build: Build, operators: fem.Operators, outputs: sparse.csr_array, load: Load, solver: str
+) -> Floats:
+    """Static response to gravity, in equilibrium before the load begins.
+
+    Parameters
+    ----------
+    build : Build, constrained
+    operators : those of its mesh
+    outputs : (p c, 3 n) sparse, what the probes read
+    load : Load, with its gravity
+    solver : of `fem.linear_solver`
+
+    Returns
+    -------
+    (p c,) float, in the unit of the outputs
+    """
+    if not load.gravity:
+        return np.zeros(outputs.shape[0])
+    whole = operators_of(replace(build, fixed={}, held=None))  # fixed nodes have a share of a mass
+    down = np.zeros(whole.n_dofs)
+    down[2::3] = -load.gravity
+    weight = whole.expand(whole.M @ down[whole.free])
+    return np.asarray(outputs @ fem.static(operators, weight, solver=solver))
+
+
+def with_sag(components: Floats, sag: Floats | float, asked: Quantity) -> Floats:
+    """Components with those under gravity, of which rates have none.
+
+    Parameters
+    ----------
+    components : (t, p c) float
+    sag : (p c,) float, under gravity
+    asked : Quantity, that they are of
+
+    Returns
+    -------
+    (t, p c) float
+    """
+    return components if asked.rate else components + sag
 
 
 def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:

@@ -17,9 +17,10 @@ from simple_model.sampling import shown
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
+from skinwave.load import PRESSURE, Load
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import line_factor, probe_rows, surface_load
+from skinwave.models.loads import line_factor, probe_rows, sag, spread, surface_load, with_sag
 from skinwave.models.reduction import (
     BAND,
     ReducedBody,
@@ -34,10 +35,10 @@ from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = 2  # of what is cached of a body
+FORMAT = 3  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points")
-OTHERS = ("relaxing", "relaxation_times", "read")
+OTHERS = ("relaxing", "relaxation_times", "read", "sag")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
 
 
@@ -54,11 +55,13 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
     """Reduced body of probes (p, 2) in metre, which read a quantity: its components at rest are
-    `read` (p c, r) of the body's coordinates; `solids`, if any, are the materials of the probes.
+    `read` (p c, r) of the body's coordinates, and `sag` (p c,) under gravity; `solids`, if any, are
+    the materials of the probes.
     """
 
     probes: Floats
     read: Floats
+    sag: Floats | float = 0.0
     body: ReducedBody
     reading: Reading = SURFACE
     solids: tuple[Material, ...] = ()
@@ -79,6 +82,7 @@ def prepare(
     tolerance: float = REDUCTION_TOLERANCE,
     symmetry: str = "",
     reading: Reading = SURFACE,
+    load: Load = PRESSURE,
 ) -> Prepared:
     """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
     cache, once per machine.
@@ -91,6 +95,7 @@ def prepare(
     tolerance : relative error of the reduction
     symmetry : as in `bodies.build.build`: for all Tactons that have it
     reading : what the probes read; with symmetry, of normal motion alone
+    load : what pushes, with its gravity; with symmetry, a pressure
 
     Returns
     -------
@@ -101,7 +106,7 @@ def prepare(
     build = meshed(body, h, clock, silent, symmetry)
     outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
-    name = entry_name(body, build, probes, solver, tolerance, outputs=own)
+    name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
     with clock("read from cache"):
         entry = cache.load(name)
     size, report = h or default_size(body), progress or silent
@@ -109,7 +114,7 @@ def prepare(
     if not found:
         with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
             found = _prepared_anew(
-                body, build, size, probes, outputs, clock, report, solver, tolerance, name
+                body, build, size, probes, outputs, clock, report, solver, tolerance, name, load
             )
     return replace(found, reading=reading, solids=solids)
 
@@ -122,6 +127,7 @@ def entry_name(
     tolerance: float,
     *,
     outputs: sparse.csr_array | None,
+    load: Load = PRESSURE,
 ) -> str:
     """Cache key of everything that a reduced body depends on.
 
@@ -131,6 +137,7 @@ def entry_name(
     build : its mesh
     probes, solver, tolerance : as of `prepare`
     outputs : (p c, 3 n) sparse, what the probes read; None if that is normal motion at the surface
+    load : as of `prepare`
 
     Returns
     -------
@@ -146,7 +153,7 @@ def entry_name(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
         build.fixed, build.absorbing, build.coat, build.drag, build.held, build.tension,
         *rests, probes, BAND, tolerance, used,
-        versions(), *read,
+        versions(), *read, load,
     )  # fmt: skip
 
 
@@ -163,7 +170,8 @@ def _from_cache(
         "values": (modes,), "inputs": (modes, unknowns), "outputs": (unknowns, modes),
         "damping": square, "radiation": square, "relaxing": (terms, *square),
         "relaxation_times": (terms,),
-        "read": (outputs, unknowns), "load": (surface, unknowns), "points": (surface, 3),
+        "read": (outputs, unknowns), "points": (surface, 3), "sag": (outputs,),
+        "load": (len(entry["load"]) // max(surface, 1) * surface, unknowns),
     }  # fmt: skip
     if any(entry[field].shape != shape for field, shape in expected.items()):
         return None
@@ -179,7 +187,7 @@ def _from_cache(
         branches=tuple(fem.MaxwellBranch(K=K, time=time) for K, time in branches),
         **{name: entry[name] for name in ARRAYS},
     )
-    return Prepared(probes=probes, read=entry["read"], body=reduced)
+    return Prepared(probes=probes, read=entry["read"], sag=entry["sag"], body=reduced)
 
 
 def _prepared_anew(
@@ -193,24 +201,29 @@ def _prepared_anew(
     solver: str,
     tolerance: float,
     name: str,
+    load: Load,
 ) -> Prepared:
     operators = assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        P, points = surface_load(build)
+        P, points = surface_load(build, load)
+        still = sag(build, operators, outputs, load, solver)
         reduced, model = reduce_body(
             body, build, operators, outputs, tolerance, surface=(P, points),
-            loads=P @ typical_spots(body, points), solver=solver, report=report,
+            loads=spread(P, typical_spots(body, points)), solver=solver, report=report,
         )  # fmt: skip
     effort = spent(reduced.effort, clock, build, h)
     arrays = {
         "read": model.outputs,
+        "sag": still,
         "relaxing": np.array([b.K for b in model.branches]).reshape(-1, *model.K.shape),
         "relaxation_times": np.array([b.time for b in model.branches]),
         **{name: getattr(reduced, name) for name in ARRAYS},
     }
     cache.store(name, asdict(effort), **asdict(reduced.poles), **arrays)
-    return Prepared(probes=probes, read=model.outputs, body=replace(reduced, effort=effort))
+    return Prepared(
+        probes=probes, read=model.outputs, sag=still, body=replace(reduced, effort=effort)
+    )
 
 
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
@@ -252,12 +265,13 @@ def answer(
     if progress:
         progress("lines", 0.0)
     with clock("lines"):
-        motion = components(prepared, scene.pressure)
+        motion = components(prepared, *scene.loads)
         # Lines are not weighed against the mean: that of an unconstrained body has no bound.
         strength, mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
         heard &= shown(scene.pressure, motion.frequencies, times)
-        waveforms = from_rest(select_lines(motion, heard), times)
+        moving = from_rest(select_lines(motion, heard), times)
+        waveforms = with_sag(moving, prepared.sag, asked)
     effort = replace(
         prepared.effort,
         seconds={**prepared.effort.seconds, **clock.seconds},
@@ -272,11 +286,11 @@ def answer(
     )  # fmt: skip
 
 
-def components(prepared: Prepared, pressure: MovingPressure) -> ReducedResponse:
+def components(prepared: Prepared, *pressures: MovingPressure) -> ReducedResponse:
     """Response of the components that the probes of a reduced body read, with their rates and the
     relaxation of stress.
     """
-    motion = read_at(respond(prepared.body, pressure), prepared.read)
+    motion = read_at(respond(prepared.body, *pressures), prepared.read)
     return in_motion(motion, prepared.reading.asked, prepared.solids)
 
 

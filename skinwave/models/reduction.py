@@ -19,7 +19,7 @@ from scipy import sparse
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure
-from simple_model.load_spectrum import reduced_lines
+from simple_model.load_spectrum import merge_lines, reduced_lines
 from skinwave.bodies.build import Build
 from skinwave.bodies.sheet import air
 from skinwave.effort import Progress, silent
@@ -35,7 +35,7 @@ class ReducedBody:
 
     `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
     `radiation` (r, r) in it and its Maxwell `branches` of (r, r); `load` (k, r): reduced forces of
-    unit pressure at the surface points (k, 3) in metre.
+    unit pressure at the surface points (k, 3) in metre; of a load of c components (c k, r).
     """
 
     poles: fem.Poles
@@ -85,7 +85,7 @@ def reduce_body(
     operators : those of the mesh
     outputs : (p, 3 n) sparse, as `fem.reduce` takes them
     tolerance : relative error of the reduction
-    surface : load operator (3 n, k) and points (k, 3), of `bodies.surface_load` or a part of them
+    surface : load operator (3 n, c k) and points (k, 3), of `bodies.surface_load` or a part of them
     loads : (3 n, j), as `fem.reduce` takes them
     solver, report : as for `simulate`, `report` its progress
 
@@ -109,15 +109,29 @@ def reduce_body(
     return reduced, model
 
 
-def respond(reduced: ReducedBody, pressure: MovingPressure) -> ReducedResponse:
-    """Response of a reduced body to a moving pressure, in its coordinates (online stage).
+def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Floats, fem.Complex]:
+    """Distinct frequencies (f,) in Hz and reduced forces (f, r) of the components of a load."""
+    parts = np.split(reduced.load, len(pressures))
+    each = [
+        reduced_lines(pressure, reduced.points, part)
+        for pressure, part in zip(pressures, parts, strict=True)
+    ]
+    if len(each) == 1:
+        return each[0]
+    frequencies, forces = zip(*each, strict=True)
+    return merge_lines(np.concatenate(frequencies), np.vstack(forces))
+
+
+def respond(reduced: ReducedBody, *pressures: MovingPressure) -> ReducedResponse:
+    """Response of a reduced body to a moving pressure, or to the components of another load, in its
+    coordinates (online stage).
 
     Raises
     ------
     Diverged
         If its energy balance is violated.
     """
-    frequencies, forces = reduced_lines(pressure, reduced.points, reduced.load)
+    frequencies, forces = reduced_forces(reduced, *pressures)
     lines, start = fem.line_response(reduced.poles, forces, frequencies)
     damping = reduced.damping, reduced.radiation
     power = fem.mean_power(*damping, forces, lines, frequencies, reduced.branches)

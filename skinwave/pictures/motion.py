@@ -16,7 +16,7 @@ from skinwave.effort import Clock, Progress, silent
 from skinwave.models import reduction
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing, series_tolerance
-from skinwave.models.loads import probe_rows, surface_load
+from skinwave.models.loads import probe_rows, spread, surface_load
 from skinwave.models.prepared import in_motion, sample_times
 from skinwave.scene import Scene
 from skinwave.simulation import check_options
@@ -86,6 +86,10 @@ def waves(
     solver: str = "auto",
 ) -> Waves:
     """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
+    if scene.load.gravity:
+        raise ValueError(
+            "the motion of a whole body is that about its rest under gravity; leave gravity out"
+        )
     moved = driven(scene, tolerance, progress, h=h, solver=solver)
     mesh, basis = moved.build.mesh, moved.basis
     nodes = np.arange(len(mesh.points))
@@ -118,17 +122,17 @@ def driven(
     body = relaxing(scene.body, series_tolerance(tolerance))
     build = meshed(body, h, clock, report)
     operators = assembled(build, clock, report)
-    P, points = surface_load(build)
+    P, points = surface_load(build, scene.load)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        spots = scene.pressure.spot(points, path_samples(scene.pressure))
-        subspace = sparse.csr_array(fem.load_subspace(P @ spots.T, tolerance / 10).T)
+        spots = scene.pressure.spot(points, path_samples(scene.loads[0]))
+        subspace = sparse.csr_array(fem.load_subspace(spread(P, spots.T), tolerance / 10).T)
         reduced, model = reduction.reduce_body(
             body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
             report=report,
         )  # fmt: skip
     with clock("lines"):
-        motion = reduction.respond(reduced, scene.pressure)
+        motion = reduction.respond(reduced, *scene.loads)
     offline = spent(reduced.effort, clock, build, h or default_size(scene.body))
     effort = replace(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,

@@ -6,13 +6,14 @@ from math import isfinite
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Trajectory
+from simple_model import MovingPressure, Trajectory
 from simple_model.flat_body import flat_body, steady_lines, steady_state
-from simple_model.focus import spot_width
+from simple_model.focus import gaussian_width, spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
 from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance, is_flat_layer, stack
+from skinwave.bodies.mounting import EDGES
 from skinwave.scene import Body, Scene
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
@@ -37,7 +38,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if pressure.profile != "gaussian":  # of the same width; only to find which lines matter
+        if _width(pressure) is None:  # of the same width; only to find which lines matter
             pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(
@@ -79,7 +80,16 @@ def is_laterally_infinite(body: Body) -> bool:
 
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether the scene has a wavenumber integral, but for reflections from its sides."""
-    return is_flat_layer(scene.body) and scene.pressure.profile == "gaussian"
+    return is_flat_layer(scene.body) and _width(scene.pressure) is not None
+
+
+def spot_scale(pressure: MovingPressure) -> float:
+    """Standard deviation in metre of the Gaussian that is, or is as wide as, the focal spot."""
+    return _width(pressure) or spot_width(pressure.height)
+
+
+def _width(pressure: MovingPressure) -> float | None:
+    return gaussian_width(pressure.height, pressure.profile)
 
 
 def reflection_and_transient(scene: Scene) -> tuple[float, float]:
@@ -95,8 +105,9 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     """
     body, probes, tacton = scene.body, scene.probe_points, scene.tacton
     half = np.array([body.width, body.height]) / 2
-    images = [] if is_laterally_infinite(body) else _mirrored(probes, half)
-    if images and _to_edge(scene, half) < 2 * spot_width(scene.pressure.height):
+    images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
+    width = spot_scale(scene.pressure)
+    if images and _to_edge(scene, half) < 2 * width:
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
     seen = np.vstack([probes, *images])
@@ -146,7 +157,8 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     -------
     float, 0..1; 1, for unknown, of a body with too little loss for that
     """
-    body, width = scene.body, spot_width(scene.pressure.height)
+    body = scene.body
+    width = spot_scale(scene.pressure)
     path = _along(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0
@@ -173,6 +185,12 @@ def _mirrored(points: Floats, half: Floats) -> list[Floats]:
         for axis in (0, 1)
         for sign in (-1, 1)
     ]
+
+
+def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
+    """The mirror images in those of a body's four sides that do not absorb."""
+    each = zip(EDGES, images, strict=True)  # both are left, right, front and back
+    return [image for name, image in each if body.side(name) != "absorbing"]
 
 
 def _to_edge(scene: Scene, half: Floats) -> float:

@@ -11,6 +11,7 @@ from skinwave.bodies.coat import AT, layer_name
 from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import air_mass
+from skinwave.load import PRESSURE
 from skinwave.models.plate_modes import middle_compliance
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
 from skinwave.scene import FLAT, Body, Scene
@@ -34,6 +35,8 @@ def symmetry(scene: Scene) -> str:
         return ""
     if not scene.reading.asked.is_normal:  # others change sign, or are recovered across it
         return ""
+    if scene.load.moving != PRESSURE:  # which may have a direction
+        return ""
     if not isinstance(scene.pressure.profile, str):  # which may have no symmetry
         return ""
     path = scene.tacton.trajectory
@@ -41,7 +44,7 @@ def symmetry(scene: Scene) -> str:
     return "".join(
         axis
         for axis, x in zip("xy", path_points.T, strict=True)
-        if np.abs(x).max() < 1e-9 and axis in scene.body.mounting.symmetry
+        if np.abs(x).max() < 1e-9 and axis in scene.body.symmetry
     )
 
 

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import fem
+from simple_model.focus import gaussian_width
 from simple_model.sampling import resolving_step
 from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
-from skinwave.models import Model, named, takes
+from skinwave.models import Model, check_reading, named, takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws
@@ -103,6 +104,7 @@ def plan(
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if asked:
         asked.refuse(scene.body)
+        check_reading(asked, scene)
         if asked.error and not asked.needs_body:
             return _unplanned(scene, tolerance, asked, h)
     check_laws(scene.body, scene.pressure)
@@ -121,7 +123,8 @@ def plan(
     returned, start = (
         reflection_and_transient(scene) if has_wavenumber_solution(scene) else (1.0, 1.0)
     )
-    if asked.is_infinite if asked else returned <= WAVES_SHARE * tolerance:
+    exact = returned <= WAVES_SHARE * tolerance and FLAT_BODY.takes_load(scene)
+    if asked.is_infinite if asked else exact:
         found = _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
         return with_series(found, scene, tolerance)
     if asked is None and (reason := why_modes(scene)):
@@ -303,7 +306,9 @@ def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, 
 
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
-    if scene.pressure.profile != "gaussian":
+    if not FLAT_BODY.takes_load(scene):
+        return f"the wavenumber integral has no {scene.reading.words} under {scene.load.words}"
+    if gaussian_width(scene.pressure.height, scene.pressure.profile) is None:
         return (
             f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.profile_name}'"
         )

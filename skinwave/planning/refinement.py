@@ -138,7 +138,7 @@ def refined(
         prepared = prepare(
             body, scene.probe_points, progress, h=size,
             tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=solver,
-            reading=scene.reading,
+            reading=scene.reading, load=scene.load,
         )  # fmt: skip
         return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))
 
@@ -237,7 +237,7 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
     """
     if scene.body.is_held:
         return found.values
-    return oscillating(components(prepared, scene.pressure)).lines
+    return oscillating(components(prepared, *scene.loads)).lines
 
 
 def convergence(

@@ -11,10 +11,10 @@ import numpy as np
 
 import fem
 from meshes.tetmesh import Floats
-from simple_model.load_spectrum import reduced_lines
 from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.sizes import default_size
 from skinwave.models.prepared import Prepared, prepare
+from skinwave.models.reduction import reduced_forces
 from skinwave.scene import SAMPLE_RATE as RATE
 from skinwave.scene import Scene
 
@@ -41,9 +41,9 @@ def sensitivity(scene: Scene, prepared: Prepared | None = None) -> Sensitivity:
     mesh, seconds once per body.
     """
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
-    coarse = prepared or prepare(scene.body, scene.probe_points, h=h)
+    coarse = prepared or prepare(scene.body, scene.probe_points, h=h, load=scene.load.moving)
     values = coarse.body.poles.values * (1 - DETUNING)
-    frequencies, forces = reduced_lines(scene.pressure, coarse.body.points, coarse.body.load)
+    frequencies, forces = reduced_forces(coarse.body, *scene.loads)
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE
 
     def parts(moved: float) -> tuple[Floats, Floats]:

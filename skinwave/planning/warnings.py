@@ -6,11 +6,10 @@ from fem.materials import rayleigh_damping
 from fem.viscoelastic import LOSS_BAND
 from meshes.tetmesh import Floats
 from simple_model import Response
-from simple_model.focus import spot_width
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.sheet import tension
 from skinwave.models import named
-from skinwave.planning.estimates import mean_gain, response_spectrum
+from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
@@ -41,7 +40,7 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
         *over_tolerance(
             f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"
         ),
-        *under_resolved(h, spot_width(scene.pressure.height)),
+        *under_resolved(h, spot_scale(scene.pressure)),
     )
 
 

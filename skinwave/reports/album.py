@@ -39,7 +39,7 @@ from skinwave.pictures.views import (
 )
 from skinwave.planning.plan import Plan, plan
 from skinwave.run import Run
-from skinwave.scene import BODIES, Scene, body_name, with_body
+from skinwave.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute
 from skinwave.studies import description, paper15
@@ -78,6 +78,7 @@ def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
     ValueError
         If a body beside it is unknown, or the path or probes do not fit on it.
     """
+    check_load(scene, "a film or report")
     bodies: dict[str, Scene] = {}
     if scene.body.of_kind.discretise:
         bodies[body_name(scene.body)] = scene

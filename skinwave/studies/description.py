@@ -37,7 +37,8 @@ def modelled(runs: Iterable[Run]) -> list[str]:
     on_bodies = [run for group in groups.values() for run in group if run.is_motion]
     notes = [run.scene.pressure.law.note for run in on_bodies if run.is_am]
     paragraphs += [note for note in dict.fromkeys(notes) if note]
-    return [*paragraphs, UNCERTAIN] if on_bodies else paragraphs
+    by_device = any(run.scene.load.of_kind.is_of_device for run in on_bodies)
+    return [*paragraphs, UNCERTAIN] if by_device else paragraphs
 
 
 def unresolved(runs: Iterable[Run]) -> list[str]:
@@ -55,6 +56,8 @@ def _answered(runs: list[Run]) -> str:
     """One body by one model."""
     pressure, model = runs[0].scene.pressure, named(runs[0].model)
     load = f"drive law {pressure.drive}, {spot_of(pressure)}"
+    if not (acting := runs[0].scene.load).is_plain:
+        load = f"{acting.words}; {load}" if acting.of_kind.is_of_device else acting.words
     text = f"{_sentence(answered(runs[0]))}: {model.words}; {load}."
     return text if not runs[0].is_motion else f"{text} {_sentence(_body(runs))}"
 

@@ -49,7 +49,7 @@ def write_single(folder: Path, run: Run, more: Sequence[str] = ()) -> None:
     """The folder of one run, with its page, which may have more parts before the effort."""
     fill(folder, run)
     figure = tacton_figure(run.tacton, [run])
-    group = beside_kernels(run) if run.is_motion else []
+    group = beside_kernels(run) if run.is_motion and run.scene.load.is_plain else []
     first = shown({run.tacton: group}, quick_maps)
     parts = [
         *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),

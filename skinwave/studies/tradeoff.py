@@ -23,7 +23,7 @@ from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
 from skinwave.processes import apart
-from skinwave.scene import Scene
+from skinwave.scene import Scene, check_load
 from skinwave.simulation import compute
 
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
@@ -127,8 +127,9 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
     Raises
     ------
     ValueError
-        If the scene has no body.
+        If the scene has no body, or another load than a pressure.
     """
+    check_load(scene, "tradeoff")
     if not scene.body.of_kind.discretise:
         raise ValueError("a scene without a body has one model only; give it a sheet or a slab")
     todo = list(chosen or candidates(scene))

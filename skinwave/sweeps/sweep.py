@@ -19,7 +19,7 @@ from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolera
 from skinwave.planning.assessment import assessed
 from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
-from skinwave.scene import Body, Reading, Scene
+from skinwave.scene import Body, Load, Reading, Scene
 from skinwave.simulation import answered, check_options
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import columns, commanded, measured
@@ -152,6 +152,7 @@ def model_of(scene: Scene, asked: str) -> str:
     if not scene.body.of_kind.discretise:
         return "point-kernel"
     is_exact = has_wavenumber_solution(scene) and is_laterally_infinite(scene.body)
+    is_exact = is_exact and named("flat-body").takes_load(scene)
     return "flat-body" if is_exact else "fem"
 
 
@@ -162,11 +163,12 @@ def _check(model_options: ModelOptions) -> None:
         raise ValueError(f"tolerance = {model_options.tolerance} is outside 0 < tolerance < 1")
 
 
-Solid = tuple[Body, tuple[tuple[float, float], ...], Reading]  # a body, its probes, their reading
+# A body, its probes, what they read, and what pushes it.
+Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 
 
 def _key(scene: Scene) -> Solid:
-    return scene.body, scene.probes, scene.reading
+    return scene.body, scene.probes, scene.reading, scene.load
 
 
 def _solid(case: DesignPoint, model_options: ModelOptions) -> Solid | None:
@@ -228,11 +230,11 @@ def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
 
 @lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
 def _prepared(solid: Solid, h: float, model_options: ModelOptions) -> Prepared:
-    body, probes, reading = solid
+    body, probes, reading, load = solid
     tolerance = reduction_tolerance(model_options.tolerance)
     return prepare(
         body, np.array(probes), h=h, solver=model_options.solver, tolerance=tolerance,
-        reading=reading,
+        reading=reading, load=load,
     )  # fmt: skip
 
 

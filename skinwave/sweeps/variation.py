@@ -20,7 +20,7 @@ from skinwave.distributions import Distribution, called, without_spreads
 from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, from_table, loads, parsed, read, to_table
-from skinwave.scene_keys import SECTIONS, renamed, write_material
+from skinwave.scene_keys import SECTIONS, renamed, with_key, write_material
 from skinwave.sweeps.saltelli import EDGE, saltelli_shares
 
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
@@ -305,7 +305,7 @@ def _with(node: Any, complete: Any, path: Sequence[str], value: Any) -> Any:
         raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
     before = complete.get(head) if isinstance(complete, dict) else None
     inner = node.get(head, before if rest and before is not None else {})
-    return node | {head: _with(inner, before, rest, value)}
+    return with_key(node, head, _with(inner, before, rest, value))
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:

@@ -9,7 +9,7 @@ import numpy as np
 from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, evenly, joined
 from simple_model.trajectory import SHAPES
 from skinwave.distributions import Distribution
-from skinwave.scene import BODIES, Body, Scene
+from skinwave.scene import BODIES, Body, Scene, check_load
 from skinwave.web.controls import (
     CHOICES,
     OWN_BODY,
@@ -128,6 +128,7 @@ def values_of(scene: Scene) -> Values:
     ValueError
         If it has what no control says.
     """
+    check_load(scene, "the interactive tool")
     tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
     known = {body: name for name, body in BODIES.items()}
     ratio = {weights: name for name, weights in RATIOS.items()}.get(tacton.superposition)
