@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.parametric import ParametricBody, prepare
     from skinwave.pictures.styles import paper
     from skinwave.planning.plan import Plan, plan
-    from skinwave.scene import BODIES, Body, Scene
+    from skinwave.scene import BODIES, Body, Load, Scene, Sides
     from skinwave.scene_file import dumps, loads, read
     from skinwave.simulation import simulate
     from skinwave.sweeps.in_python import SweepTable, sweep
@@ -51,9 +51,9 @@ _HOMES = {
     "SweepTable": "sweeps.in_python",
 }
 __all__ = [
-    "BODIES", "Agreement", "Body", "Field", "ParametricBody", "Plan", "Scene", "SkinwaveWarning",
-    "SweepTable", "cite", "compare", "dumps", "field", "loads", "paper", "plan", "prepare", "read",
-    "simulate", "sweep",
+    "BODIES", "Agreement", "Body", "Field", "Load", "ParametricBody", "Plan", "Scene", "Sides",
+    "SkinwaveWarning", "SweepTable", "cite", "compare", "dumps", "field", "loads", "paper", "plan",
+    "prepare", "read", "simulate", "sweep",
 ]  # fmt: skip
 
 

@@ -11,44 +11,6 @@ TACTONS = (
     "the Skin. Extended Abstracts of the CHI Conference on Human Factors in Computing Systems "
     "(CHI EA '24), 2024. doi 10.1145/3613905.3650981"
 )
-LAYERS = (
-    "E. Kausel, J. M. Roesset: Stiffness matrices for layered soils. Bulletin of the Seismological "
-    "Society of America 71 (1981) 1743-1761"
-)
-REDUCTION = (
-    "Z. Bai, Y. Su: Dimension reduction of large-scale second-order dynamical systems via a "
-    "second-order Arnoldi method. SIAM Journal on Scientific Computing 26 (2005) 1692-1709"
-)
-ARNOLDI = (
-    "D. Lu, Y. Su, Z. Bai: Stability analysis of the two-level orthogonal Arnoldi procedure. SIAM "
-    "Journal on Matrix Analysis and Applications 37 (2016) 195-214"
-)
-ALPHA = (
-    "J. Chung, G. M. Hulbert: A time integration algorithm for structural dynamics with improved "
-    "numerical dissipation: the generalized-alpha method. Journal of Applied Mechanics 60 (1993) "
-    "371-375. doi 10.1115/1.2900803"
-)
-NEWTON = (
-    "T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures. "
-    "Wiley, 2000"
-)
-MACROELEMENTS = (
-    "R. Stenberg: Analysis of mixed finite element methods for the Stokes problem: a unified "
-    "approach. Mathematics of Computation 42 (1984) 9-23"
-)
-PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
-SOURCES = {  # by the name of a model
-    "point-kernel": (),
-    "point-kernel-published": (),
-    "flat-body": (LAYERS,),
-    "flat-body-harmonic": (LAYERS,),
-    "fem": (REDUCTION, ARNOLDI, MACROELEMENTS),
-    "fem-harmonic": (MACROELEMENTS,),
-    "fem-transient": (ALPHA, MACROELEMENTS),
-    "fem-nonlinear": (ALPHA, NEWTON),
-    "fem-nonlinear-transient": (ALPHA, NEWTON),
-    "plate-modes": (PLATES,),
-}
 SOLVERS = {
     "pardiso": "O. Schenk, K. Gärtner: Solving unsymmetric sparse systems of linear equations with "
     "PARDISO. Future Generation Computer Systems 20 (2004) 475-487. "
@@ -85,7 +47,7 @@ class Citations:
 def cite(*responses: Response) -> Citations:
     """References for some responses: the program, what each model is computed by, and solvers.
 
-    A model from outside is named by its method; what it rests on is for its author to say.
+    What a model rests on is its own to say, also of one from outside.
 
     Raises
     ------
@@ -102,7 +64,7 @@ def cite(*responses: Response) -> Citations:
         f"The skinwave authors: skinwave {release}: waves in skin and paper under mid-air "
         "ultrasound haptics. Software"
     )
-    sources = [source for name in models for source in SOURCES.get(name, ())]
+    sources = [source for name in models for source in named(name).sources]
     solvers = [text for name, text in SOLVERS.items()
                if any(name in response.effort.solver for response in responses)]  # fmt: skip
     return Citations(

@@ -10,7 +10,8 @@ NOTEBOOK = ROOT / "examples/notebook.ipynb"
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")  # of the libraries of notebooks
-def test_the_notebook_runs():
+def test_the_notebook_runs(monkeypatch):
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # by which figures would not be inline
     client = pytest.importorskip("nbclient")
     nbformat = pytest.importorskip("nbformat")
     pytest.importorskip("ipykernel")

@@ -18,6 +18,7 @@ from simple_model.focus import spot_width
 from skinwave import window
 from skinwave.cli import main
 from skinwave.fields import Field
+from skinwave.models import BUILT_IN, named
 from skinwave.pictures.styles import style
 from skinwave.planning.extent import PlanRow
 from skinwave.reports.album import Album
@@ -316,6 +317,9 @@ def test_references_are_those_of_the_models():
     assert "Kausel" in found.references[2]
     assert "10.1145/3613905.3650981" in str(found)
     assert len(found.references) == 3
+    assert {name for name in BUILT_IN if not named(name).sources} == {
+        "point-kernel", "point-kernel-published",
+    }  # fmt: skip
     steps = replace(wave(), model="fem-transient", effort=Effort(solver="pardiso"))
     assert [name in str(skinwave.cite(steps)) for name in ("Chung", "PARDISO", "Kausel")] == [
         True, True, False,

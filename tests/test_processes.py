@@ -87,7 +87,7 @@ def works(process, which):
         for number in which(process.pid):
             with suppress(OSError):
                 if "_sparsetools" in Path(f"/proc/{number}/maps").read_text():  # of scipy
-                    time.sleep(2)
+                    time.sleep(1)
                     return True
         time.sleep(0.05)
     return False
@@ -149,7 +149,13 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
     for name, arguments in asked.items():
         threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
         code = 2 if name in ("film", "fit") else 0  # no report is there, and no motion measured
-        until = {"relax": below, "tradeoff": below, "verify": itself, "validate": itself}.get(name)
+        until = {
+            "infer": itself,
+            "relax": below,
+            "tradeoff": below,
+            "validate": itself,
+            "verify": itself,
+        }.get(name)
         said = run_there(hostile, name, *arguments, threads=threads, code=code, until=until)
         assert "no_such_key" not in said, name
 

@@ -422,7 +422,7 @@ def test_how_sensitive_a_hand_is_can_be_told(body, monkeypatch):
     small = Body(width=0.03, height=0.03)
     monkeypatch.setattr(
         "skinwave.planning.sensitivity.prepare",
-        lambda body, probes, h: prepare(small, probes, h=h),
+        lambda body, probes, h, load: prepare(small, probes, h=h, load=load),
     )
     text = f"[tacton]\nam_frequency_hz = 140\n[body]\n{body}\n[probes]\npoints_mm = [[0, 0]]"
     found = sensitivity(loads(text))

@@ -67,6 +67,7 @@ class Model:
     default_size : element size in metre for a body; None without a mesh
     seconds, memory : predicted for a first response where a plan does not measure, s and bytes
     colour : str, of figures
+    sources : of str, references to cite for its method
     reads : whether it has the quantity that a scene asks for, at the depths of its probes
     takes_load : whether it takes the load of a scene
     quantity : name of the one that it has whatever a scene asks for, as the point kernel has; or ""
@@ -90,6 +91,7 @@ class Model:
     seconds: float = 0.1
     memory: float = 1e8
     colour: str = "#56B4E9"
+    sources: tuple[str, ...] = ()
     label: str = ""
     reads: "Callable[[Scene], bool]" = lambda scene: scene.reading.is_plain
     takes_load: "Callable[[Scene], bool]" = lambda scene: scene.load.is_plain

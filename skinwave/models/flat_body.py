@@ -19,6 +19,7 @@ from simple_model.wavenumber_integral import Field
 from skinwave.bodies.analytic import exact_waves, stack
 from skinwave.models import Model, Request, of_waves, register
 from skinwave.models.laws import has_table
+from skinwave.models.sources import LAYERS
 from skinwave.scene import Scene
 
 
@@ -97,6 +98,7 @@ FLAT_BODY = register(
         seconds=2.0,
         memory=3e8,
         colour="#009E73",
+        sources=(LAYERS,),
         reads=of_waves,
         takes_load=takes_load,
         is_infinite=True,
@@ -115,6 +117,7 @@ HARMONIC = register(
         seconds=2.0,
         memory=3e8,
         colour="#E69F00",
+        sources=(LAYERS,),
         reads=of_waves,
         takes_load=takes_load,
         is_infinite=True,

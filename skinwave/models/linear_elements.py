@@ -9,6 +9,7 @@ from skinwave.models import Model, Request, register
 from skinwave.models.full import harmonic_answer, transient_answer
 from skinwave.models.laws import has_own_law
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
+from skinwave.models.sources import ALPHA, ARNOLDI, MACROELEMENTS, REDUCTION
 from skinwave.scene import Scene
 
 
@@ -46,6 +47,7 @@ FEM = register(
         reads=lambda scene: True,
         takes_load=lambda scene: True,
         colour="#0072B2",
+        sources=(REDUCTION, ARNOLDI, MACROELEMENTS),
         is_reduced=True,
         fits_damping=True,
         takes_series=has_own_law,
@@ -63,6 +65,7 @@ HARMONIC = register(
         reads=lambda scene: True,
         takes_load=lambda scene: True,
         colour="#CC79A7",
+        sources=(MACROELEMENTS,),
         is_steady=True,
     )
 )
@@ -78,6 +81,7 @@ TRANSIENT = register(
         reads=lambda scene: True,
         takes_load=lambda scene: True,
         colour="#D55E00",
+        sources=(ALPHA, MACROELEMENTS),
         is_stepped=True,
         fits_damping=True,
         takes_series=has_own_law,

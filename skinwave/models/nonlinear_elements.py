@@ -6,6 +6,7 @@ from skinwave.bodies.body import Body
 from skinwave.models import Model, register
 from skinwave.models.laws import without_own_law
 from skinwave.models.linear_elements import vacuum_only
+from skinwave.models.sources import ALPHA, NEWTON
 from skinwave.models.stretching import (
     expected_error,
     full_answer,
@@ -45,6 +46,7 @@ REDUCED = register(
         error=_error,
         default_size=partial(stretching_size, reduced=True),
         reads=lambda scene: True,
+        sources=(ALPHA, NEWTON),
         is_nonlinear=True,
     )
 )
@@ -58,6 +60,7 @@ FULL = register(
         error=_error,
         default_size=partial(stretching_size, reduced=False),
         reads=lambda scene: True,
+        sources=(ALPHA, NEWTON),
         is_nonlinear=True,
     )
 )

@@ -20,6 +20,7 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.effort import peak_memory
 from skinwave.models import Model, Request, of_surface_motion, register
+from skinwave.models.sources import PLATES
 from skinwave.scene import Scene
 
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
@@ -161,6 +162,7 @@ MODES = register(
         seconds=0.5,
         memory=2e8,
         colour="#F0E442",
+        sources=(PLATES,),
         reads=of_surface_motion,
         is_steady=True,
     )
