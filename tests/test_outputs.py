@@ -664,7 +664,7 @@ def test_names_of_results_do_not_lead_out_of_a_report(folder):
 def test_the_column_of_a_view_does_not_lead_out_of_a_report(folder, monkeypatch):
     view = Namespace(column="../../up", times=np.arange(2), tets=(), tensors=None)
     monkeypatch.setattr(
-        "skinwave.exports._grid", lambda view, frame: Namespace(save=lambda p: p.write_text("grid"))
+        "skinwave.exports._grid", lambda *asked: Namespace(save=lambda p: p.write_text("grid"))
     )
     (folder / "data").mkdir()
     exports.write_field(folder / "data", view)
