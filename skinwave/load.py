@@ -69,6 +69,11 @@ class Load:
         return self == PRESSURE
 
     @property
+    def is_normal(self) -> bool:
+        """Whether what moves is normal to a flat surface, as a pressure is."""
+        return not self.moving.tractions(np.array([[0.0, 0.0, 1.0]]))[..., :2].any()
+
+    @property
     def moving(self) -> "Load":
         """The same without gravity."""
         return replace(self, gravity=0.0)

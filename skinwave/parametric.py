@@ -26,6 +26,7 @@ from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, pressure_lines
 from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
+from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent
 from skinwave.models.free_materials import (
@@ -239,12 +240,24 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
     )  # fmt: skip
 
 
+def has_affine_operators(body: Body) -> bool:
+    """Whether the operators of a body are sums over its materials: those of a sheet that is
+    stretched, not held by all of its edges, or orthotropic have other terms.
+    """
+    return body.mounting == FRAME and body.solid.orthotropy is None
+
+
 def _check(scene: Scene, tolerance: float) -> None:
     """Refuse what no affine sum gives."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     check_load(scene, "a body with free materials")
     check_laws(scene.body, scene.pressure)
+    if not has_affine_operators(scene.body):
+        raise ValueError(
+            "a body with free materials is an isotropic sheet in a frame, or none: tension and "
+            "other mountings do not scale with its modulus; reduce the body of each material"
+        )
     if scene.body.air:
         raise ValueError(
             "a body with free materials has no air: its added mass is a dense operator; leave air "

@@ -156,6 +156,12 @@ class Scene:
 
     def _check_load(self) -> None:
         _ = self.loads  # a path may have no direction
+        if self.body.of_kind.is_plate and not self.load.is_normal:
+            raise ValueError(
+                f"a {self.body.kind} takes what is normal to it, not {self.load.words}: its "
+                "elements are of another thickness, with another moment about its middle; take a "
+                "slab"
+            )
         if self.load.gravity and self.body.of_kind.discretise and not self.body.is_held:
             raise ValueError(
                 "an unconstrained body falls under gravity; clamp its base or its sides, or leave "

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fem
+import skinwave
 from fem.load_and_probe import facet_normals, load_operator, traction_operator
 from meshes import block
 from simple_model import Material, MovingPressure, Stack, Tacton, Trajectory
@@ -16,8 +17,12 @@ from simple_model.quantities import DISPLACEMENT
 from simple_model.wavenumber_integral import point_integrals
 from skinwave import Body, dumps, loads
 from skinwave.bodies.build import build, operators
+from skinwave.fits.predicted import target
 from skinwave.load import LOADS, Load, LoadKind, register
 from skinwave.models.loads import loads_at, surface_load
+from skinwave.models.prepared import answer, prepare
+from skinwave.patterns.conversion import write_pattern
+from skinwave.patterns.pattern import Options
 from skinwave.planning.extent import symmetry
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
@@ -282,3 +287,29 @@ def test_pages_of_a_focus_refuse_other_loads():
 def test_kinds_of_load_are_registered_once():
     with pytest.raises(ValueError, match="'shear' is registered already"):
         register(LoadKind(name="shear", words=str, defaults={}, tractions=LOADS["shear"].tractions))
+
+
+SHEAR = '[load]\nkind = "shear"\ndirection = [1, 0]\n'
+
+
+def test_what_is_computed_for_a_pressure_alone_refuses_other_loads():
+    scene = loads(SHEAR + SMALL)
+    with pytest.raises(ValueError, match="a fit is about the pressure of a focus"):
+        target(scene, "flat-body", DISPLACEMENT, scene.probe_points)
+    with pytest.raises(ValueError, match="a pattern of a device is about"):
+        write_pattern(scene, ".csv", Options())
+    with pytest.raises(ValueError, match="takes what is normal to it"):
+        loads(SHEAR + "[body]\npreset = 'paper-sheet'")
+    reduced = prepare(scene.body, scene.probe_points, h=6e-3)
+    assert np.isfinite(answer(reduced, replace(scene, load=Load())).values).all()
+    with pytest.raises(ValueError, match="is reduced for"):
+        answer(reduced, scene)
+
+
+def test_gravity_does_not_hide_the_error_of_a_mesh():
+    """A sag of many times the motion."""
+    scene = loads(SMALL)
+    heavy = replace(scene, load=Load(gravity=9.81))
+    without, under = (skinwave.simulate(s, "fem", h=5e-3) for s in (scene, heavy))
+    assert np.abs(under.values).max() > 3 * np.abs(without.values).max()
+    assert under.expected_error == pytest.approx(without.expected_error, rel=0.2)

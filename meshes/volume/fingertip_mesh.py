@@ -16,6 +16,16 @@ EASINGS, EASED = 6, 0.7
 FEWEST, BONY = 3, 2  # shells, and those of them in the bone
 
 
+def shells_of(shape: Fingertip, h: float) -> int:
+    """Number of shells of cells of a size h in metre at the skin."""
+    return max(FEWEST, round_up(quarter_of(shape) / h))
+
+
+def quarter_of(shape: Fingertip) -> float:
+    """A quarter of the way around a fingertip in metre."""
+    return float(np.pi / 4 * (shape.breadth + shape.thickness) / 2)
+
+
 def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     """Ten-node tetrahedra of a fingertip, curved at its skin and its bone.
 
@@ -36,8 +46,7 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     """
     if not 0 < h < np.inf:
         raise MeshError(f"h = {h} m must be finite and above 0")
-    around = np.pi / 4 * (shape.breadth + shape.thickness) / 2
-    shells = max(FEWEST, round_up(around / h))
+    shells = shells_of(shape, h)
     bone = max(BONY, shells - max(1, round(shape.cover / h)))
     layers = max(1, round_up((shape.length - shape.breadth / 2) / h))
     check_size((2 * shells, 2 * shells, layers + shells), order=2)

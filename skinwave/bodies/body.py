@@ -268,6 +268,7 @@ class BodyKind:
     is_symmetric : bool, whether its mesh may be halved at x = 0 and y = 0
     is_bounded : bool, whether width and height are those of its surface
     may_be_layered : bool
+    actual_size : size in metre that a mesh of one asked for has, where cells come in whole numbers
     conforming : bool, whether elements follow its layers
     may_be_coated : bool, whether layers that elements do not resolve may be a coat
     mesh_is_cached : bool, whether its mesh is one per machine, which no run has to wait for
@@ -294,6 +295,7 @@ class BodyKind:
     is_symmetric: bool = False
     is_bounded: bool = True
     may_be_layered: bool = True
+    actual_size: Callable[["Body", float], float] | None = None
     conforming: bool = False
     may_be_coated: bool = False
     mesh_is_cached: bool = False

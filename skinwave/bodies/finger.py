@@ -3,6 +3,7 @@
 import fem
 from fem.load_and_probe import facet_normals
 from meshes import Fingertip, TetMesh, boundary_facets, fingertip_mesh
+from meshes.volume.fingertip_mesh import quarter_of, shells_of
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.discretised import Discretised
@@ -18,6 +19,11 @@ def shape(body: Body) -> Fingertip:
         bone_breadth=body.bone.breadth, bone_thickness=body.bone.thickness, cover=body.bone.cover,
         tip=body.bone.tip,
     )  # fmt: skip
+
+
+def actual_size(body: Body, h: float) -> float:
+    """Size in metre of the cells at the skin of a mesh of h, whose shells are a whole number."""
+    return quarter_of(shape(body)) / shells_of(shape(body), h)
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -52,6 +58,7 @@ FINGER = register(
         discretise=discretise,
         default_size=lambda body: min(SIZE, coarsest_size(body)),
         interactive_size=3e-3,
+        actual_size=actual_size,
         may_be_coated=True,
     )
 )  # fmt: skip

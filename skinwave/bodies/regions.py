@@ -42,8 +42,13 @@ def in_regions(
             "they are of; name those of another material than the rest in [body.regions]"
         )
     now = np.array(mesh.region)
-    for k, (name, _) in enumerate(body.regions):
-        now[region == number_of(name, named, source)] = len(materials) + k
+    numbers = [number_of(name, named, source) for name, _ in body.regions]
+    for k, number in enumerate(numbers):
+        if number in numbers[:k]:
+            raise MeshError(
+                f"[body.regions] names region {number} of {source} twice; leave one of them out"
+            )
+        now[region == number] = len(materials) + k
     own = [solid_of(material) for _, material in body.regions]
     if (now >= len(materials)).all() and body.solid not in own:
         raise MeshError(

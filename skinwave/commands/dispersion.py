@@ -37,6 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
+    from skinwave.scene import check_load
     from skinwave.scene_file import read
     from skinwave.simulation import check_options
     from skinwave.studies.dispersion_page import observed_sentence, sentences, taken_as, write
@@ -46,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     if not 1 <= options.modes <= 12:
         raise ValueError(f"--modes {options.modes} is outside 1..12; give one of these")
     scene = read(options.scene)
+    check_load(scene, "dispersion")
     found = driven_modes(scene, highest=options.highest, most=options.modes)
     out = options.out or Path(f"{options.scene.stem}-dispersion")
     inputs = [options.scene, scene.body.file]

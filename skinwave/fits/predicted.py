@@ -35,7 +35,7 @@ from skinwave.fits.parameters import (
 from skinwave.models import Model, check_reading, named
 from skinwave.models.free_materials import free_keys
 from skinwave.parametric import ParametricBody
-from skinwave.scene import SAMPLE_RATE, Scene
+from skinwave.scene import SAMPLE_RATE, Scene, check_load
 from skinwave.simulation import compute
 from skinwave.sweeps.variation import varied
 
@@ -119,6 +119,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
         If the model or the quantity is not one of motion normal to a body, a place is not known or
         off the body, or the model refuses the scene.
     """
+    check_load(scene, "a fit")
     if not quantity.is_normal:
         raise ValueError(
             "a fit is to displacement, velocity or acceleration into the body, not "
@@ -157,6 +158,8 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
     scene = aim.varied({})
+    if not parametric.has_affine_operators(scene.body):
+        return aim
     try:
         free_keys(scene.body, ranges)
     except ValueError:  # of a key that changes more than materials

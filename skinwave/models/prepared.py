@@ -56,7 +56,7 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 class Prepared:
     """Reduced body of probes (p, 2) in metre, which read a quantity: its components at rest are
     `read` (p c, r) of the body's coordinates, and `sag` (p c,) under gravity; `solids`, if any, are
-    the materials of the probes.
+    the materials of the probes. It has the `load` for which it is reduced.
     """
 
     probes: Floats
@@ -65,6 +65,7 @@ class Prepared:
     body: ReducedBody
     reading: Reading = SURFACE
     solids: tuple[Material, ...] = ()
+    load: Load = PRESSURE
 
     @property
     def effort(self) -> Effort:
@@ -116,7 +117,7 @@ def prepare(
             found = _prepared_anew(
                 body, build, size, probes, outputs, clock, report, solver, tolerance, name, load
             )
-    return replace(found, reading=reading, solids=solids)
+    return replace(found, reading=reading, solids=solids, load=load)
 
 
 def entry_name(
@@ -260,6 +261,11 @@ def answer(
     Diverged
         If the energy balance is violated.
     """
+    if scene.load.moving != prepared.load.moving:
+        raise ValueError(
+            f"the body is reduced for {prepared.load.words}, not {scene.load.words}; reduce it for"
+            " the load of the scene"
+        )
     clock, asked = Clock(), prepared.reading.asked
     times = sample_times(scene) if times is None else times
     if progress:

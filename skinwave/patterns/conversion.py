@@ -6,7 +6,7 @@ from meshes import reading
 from skinwave import scene_file
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
 from skinwave.patterns.pattern import Options, Pattern, onto
-from skinwave.scene import Scene
+from skinwave.scene import Scene, check_load
 
 READERS = (".toml", ".adaptics", ".csv", ".wav")
 WRITERS = (".toml", ".adaptics", ".csv", ".wav", ".py")
@@ -65,6 +65,7 @@ def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, t
     """
     if suffix == ".toml":
         return scene_file.dumps(scene).encode(), ()
+    check_load(scene, "a pattern of a device")
     modules = {".adaptics": adaptics_out, ".csv": focal_points, ".wav": waveform, ".py": autd3}
     return modules[suffix].write(scene, options)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 import fem
 from meshes import reading
@@ -118,7 +119,11 @@ class View:
         from matplotlib.tri import Triangulation
 
         x, y = self.places.T
-        return Triangulation(x, y, self.triangles).get_trifinder()
+        corners = np.stack([x, y], axis=1)[self.triangles]
+        along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+        kept = area > 1e-6 * area.max()  # of a steep rim some are seen edge-on, or from below
+        return Triangulation(x, y, self.triangles[kept]).get_trifinder()
 
     @property
     def peak(self) -> float:
@@ -149,8 +154,12 @@ def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | N
     times = np.arange(frames) * period / frames
     check_values(frames, len(mesh.points))
     motion = vibration(moved, times) @ moved.basis.T
-    read = fem.probe_operator(mesh, mesh.points[surface])
+    # Nodes of a bowed rim may lie beside all facets, seen from above: they are read next to it.
+    seen = fem.on_surface(mesh, mesh.points[surface, :2])
+    nearest = cKDTree(mesh.points[surface[seen]]).query(mesh.points[surface])[1]
+    read = fem.probe_operator(mesh, mesh.points[surface[seen]])
     frequencies, amplitudes = line_amplitudes(moved, read)
+    amplitudes = amplitudes[:, nearest]
     levels = np.full(len(surface), -np.inf)
     if scene.body.is_skin:
         levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)

@@ -17,10 +17,15 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import compared_with, convergence, quantity_of_interest
+from skinwave.planning.refinement import (
+    about_its_rest,
+    compared_with,
+    convergence,
+    quantity_of_interest,
+)
 from skinwave.planning.series import series_error
 from skinwave.planning.warnings import beyond_linear, of_elements
-from skinwave.scene import Body, Reading, Scene
+from skinwave.scene import Body, Load, Reading, Scene
 
 Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
 
@@ -82,6 +87,7 @@ def told(
     other, coarse = compared or coarser_body(scene, h, tolerance, solver)
     same = coarse.effort.dofs == response.effort.dofs
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
+    found, fine = (about_its_rest(scene, each) for each in (found, fine))
     _, error = convergence(body, (other, size), (found, fine), tolerance, same=same)
     error += series_error(scene, response.model, tolerance, coarse)
     warnings = sentences(scene, response, tolerance, h=size, error=error)
@@ -105,7 +111,8 @@ def coarser_body(
     body = scene.body
     other = compared_with(body, h) if h else _coarser(body, default_size(body))
     reduction = reduction_tolerance(tolerance)
-    return other, _prepared(body, scene.probes, other, solver, reduction, reading=scene.reading)
+    asked = (body, scene.probes, other, solver, reduction)
+    return other, _prepared(*asked, reading=scene.reading, load=scene.load)
 
 
 def sentences(
@@ -155,5 +162,8 @@ def _prepared(
     tolerance: float,
     *,
     reading: Reading,
+    load: Load,
 ) -> Prepared:
-    return prepare(body, np.array(probes), h=h, solver=solver, tolerance=tolerance, reading=reading)
+    return prepare(
+        body, np.array(probes), h=h, solver=solver, tolerance=tolerance, reading=reading, load=load
+    )

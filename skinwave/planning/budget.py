@@ -138,6 +138,7 @@ def _has_lines(scene: Scene) -> bool:
     flat = body.of_kind.dispersion is not None and not body.of_kind.is_plate
     lossy = any(solid.has_loss for _, solid in body.strata)
     moves = scene.tacton.trajectory.shape != "recorded" and scene.reading.is_plain
+    moves = moves and scene.load.is_normal
     return bool(flat and lossy and moves)
 
 

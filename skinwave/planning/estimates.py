@@ -107,7 +107,8 @@ def reflection_and_transient(scene: Scene) -> tuple[float, float]:
     half = np.array([body.width, body.height]) / 2
     images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
     width = spot_scale(scene.pressure)
-    if images and _to_edge(scene, half) < 2 * width:
+    known = scene.load.is_normal  # what returns of another load is not estimated
+    if images and (not known or _to_edge(scene, half) < 2 * width):
         return 1.0, 1.0
     times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
     seen = np.vstack([probes, *images])

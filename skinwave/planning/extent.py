@@ -13,7 +13,7 @@ from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import air_mass
 from skinwave.load import PRESSURE
 from skinwave.models.plate_modes import middle_compliance
-from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain
+from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain, spot_scale
 from skinwave.scene import FLAT, Body, Scene
 
 STIFF = 30.0  # times the modulus below, from where the error of a coat is stated
@@ -149,6 +149,16 @@ def left_out(scene: Scene, highest: float) -> list[PlanRow]:
     ]
 
 
+def _mean_force(scene: Scene) -> float:
+    """Mean force in N that presses on the middle of a flat body."""
+    if scene.load.moving.is_plain:
+        return float(2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene))
+    downwards = -scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0, 2]
+    forces = [2 * np.pi * spot_scale(each) ** 2 * mean_gain(replace(scene, pressure=each))
+              for each in scene.loads]  # fmt: skip
+    return float(downwards @ forces)
+
+
 def mean_sag(scene: Scene) -> float:
     """Linear deflection in metre of a held sheet's middle under its mean load, if applied there.
 
@@ -156,7 +166,7 @@ def mean_sag(scene: Scene) -> float:
     supports, and of orthotropic or stretched sheets, by the modes of the plate.
     """
     body = scene.body
-    force = 2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene)
+    force = _mean_force(scene)
     if body.mounting == FRAME and body.solid.orthotropy is None:
         sag = 0.0056 * min(body.width, body.height) ** 2 / body.bending_stiffness
     else:

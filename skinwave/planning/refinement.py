@@ -167,7 +167,12 @@ def element_sizes(body: Body) -> Floats:
         coarsest = min(FIRST_HAND * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
-        return np.geomspace(coarsest, finest, 64)
+        sizes = np.geomspace(coarsest, finest, 64)
+        if actual := body.of_kind.actual_size:  # one of those with the same mesh
+            sizes = sizes[
+                np.unique([-actual(body, h) for h in sizes.tolist()], return_index=True)[1]
+            ]
+        return sizes
     found, layers = [body.depth], 1
     while found[-1] > finest:
         layers = max(layers + 1, round(RATIO * layers))
@@ -185,6 +190,10 @@ def _finer(sizes: Floats, size: float) -> Floats:
 
 def compared_with(body: Body, h: float) -> float:
     """Size that a given one can be compared with: coarser, or finer than a single layer."""
+    if actual := body.of_kind.actual_size:
+        sizes = (h * np.geomspace(1, 4, 80)).tolist() + (h / np.geomspace(1, 4, 80)).tolist()
+        far = (s for s in sizes if abs(np.log(actual(body, s) / actual(body, h))) > np.log(RATIO))
+        return next(far, RATIO * h)
     if not _has_cell_layers(body):
         return min(RATIO * h, max(body.width, body.height))
     layers = cell_layers(body, h)
@@ -215,10 +224,19 @@ def coarser_by(body: Body, other: float, h: float) -> float:
     -------
     float
     """
+    if actual := body.of_kind.actual_size:
+        return actual(body, other) / actual(body, h)
     if not _has_cell_layers(body):
         return other / h
     down = cell_layers(body, h) / cell_layers(body, other)
     return min(other / h, down, key=lambda ratio: abs(np.log(ratio)))
+
+
+def about_its_rest(scene: Scene, waveforms: NDArray[Any]) -> NDArray[Any]:
+    """Waveforms (t, p) without the mean under gravity, which a coarse mesh has as well and which
+    would hide the error of the motion.
+    """
+    return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
 
 
 def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
@@ -236,7 +254,7 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
     without the mean, because rigid-body drift would hide the rest
     """
     if scene.body.is_held:
-        return found.values
+        return about_its_rest(scene, found.values)
     return oscillating(components(prepared, *scene.loads)).lines
 
 

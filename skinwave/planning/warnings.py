@@ -165,7 +165,8 @@ def under_resolved(h: float, width: float) -> tuple[str, ...]:
     """Warning of elements that do not resolve the focal spot."""
     if h <= 2 * width:
         return ()
+    kept = "neither its force nor its shape" if h > 3 * width else "its force but not its shape"
     return (
         f"elements of {1e3 * h:.3g} mm are wider than twice the standard deviation of the focal "
-        f"spot, {1e3 * width:.2g} mm: they preserve its force but not its shape; make them smaller",
+        f"spot, {1e3 * width:.2g} mm: they preserve {kept}; make them smaller",
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,11 +10,12 @@ import numpy as np
 from meshes import cache
 from simple_model.response import SETTLE
 from skinwave.effort import versions
+from skinwave.marks import digest
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.budget import ErrorBudget, error_budget
 from skinwave.propagation import Propagation, propagation, share_outside
 from skinwave.run import Run
-from skinwave.scene import Scene
+from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
 from skinwave.studies import paper15
 from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
@@ -111,11 +113,18 @@ def first_of(names: Iterable[str]) -> str:
     return next((name for name in (*FIRST, *names) if name in names), "")
 
 
+def content_of(body: Body) -> str:
+    """SHA-256 of the file of a body, or "" without one."""
+    return digest(Path(body.file)) if body.file else ""
+
+
 def element_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
     """A body's map by elements, cached, and the kernel's."""
     x, y = grid(scene)
     below = kernel_map(scene.pressure, x, y)
-    name = cache.key("surface", scene.body, scene.pressure, x, y, h, solver, versions())
+    name = cache.key(
+        "surface", scene.body, content_of(scene.body), scene.pressure, x, y, h, solver, versions()
+    )
     names = ("x", "y", "rms", "level")
     if (entry := cache.load(name)) is not None:
         arrays = {n: entry[n] for n in names}
