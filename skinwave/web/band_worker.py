@@ -13,7 +13,7 @@ from skinwave.processes import end_group
 from skinwave.web.worker import Told, end_with_parent, one_sentence, started
 
 LEAST_PRIORITY = 15
-REST = 0.4  # s without a change after which samples are begun
+REST = 2.0  # s without a change after which samples are begun: they take a core for seconds
 BANDS, FAILED = "bands", "no bands"  # what is told
 END = object()  # of what is asked
 

@@ -113,9 +113,14 @@ async def gone(page: PageProcess) -> None:
 
 async def _ended(process: Any) -> None:
     """Wait for the end of a process, and close its pipes: asyncio would do so when it deletes
-    them, which may be after the loop has closed, and fail.
+    them, which may be after the loop has closed, and fail. Who is cancelled here once more, as at
+    the end of the server, ends the process and still waits.
     """
-    await process.wait()
+    while process.returncode is None:
+        try:
+            await process.wait()
+        except asyncio.CancelledError:
+            kill(process)
     process._transport.close()
 
 
