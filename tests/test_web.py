@@ -1190,10 +1190,16 @@ def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypat
         return says if says is not None else await asyncio.sleep(60)
 
     def made():
-        process, over = Mock(), asyncio.Event()
+        process, over = Mock(returncode=None), asyncio.Event()
+
+        def end():
+            ends.append(True)
+            process.returncode = 0
+            over.set()
+
         process.stdin.drain = AsyncMock()
         process.stdout.readline, process.wait = line, over.wait
-        process.stdin.close = lambda: (ends.append(True), over.set())
+        process.stdin.close = end
         return PageProcess(process=process, port=1, password="secret", folder=str(tmp_path / "x"))
 
     async def started(_):
