@@ -30,14 +30,18 @@ moving = f > 0
 time = (0.024 + 0.030) / speed
 u = synthesise(f[moving], a[moving], np.array([time])).reshape(len(y), len(x))
 
-figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
-limit = 1e6 * np.abs(u).max()
-image = ax.pcolormesh(1e3 * x, 1e3 * y, 1e6 * u, cmap="RdBu_r", vmin=-limit, vmax=limit)
-ax.plot([24, 24 - 20 / np.tan(np.pi / 6)], [0, 20], "k--", label="arcsin(c/v) = 30°")
+figure, ax = plt.subplots(figsize=(7, 5.4), layout="constrained")
+both, limit = 1e6 * np.vstack([u[:0:-1], u]), 1e6 * np.abs(u).max()  # the other side is its mirror
+image = ax.pcolormesh(
+    1e3 * x, 1e3 * np.concatenate([-y[:0:-1], y]), both, cmap="RdBu_r", vmin=-limit, vmax=limit,
+    shading="gouraud",
+)  # fmt: skip
+back = 24 - 20 / np.tan(np.pi / 6)
+ax.plot([back, 24, back], [-20, 0, 20], "k--", label="arcsin(c/v) = 30°")
 ax.plot(24, 0, "ko", label="focus")
 ax.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")
 ax.legend(loc="upper left")
-figure.colorbar(image, ax=ax, label="displacement into the body, µm", shrink=0.7)
+figure.colorbar(image, ax=ax, label="displacement into the body, µm", shrink=0.8)
 
 # %%
 # The front is where the body is pushed in most, at each distance from the path.

@@ -48,8 +48,8 @@ ax.plot([1e6 * closed_form(z) for z in fine], 1e3 * fine, label="closed form, at
 ax.plot(1e6 * strain, 1e3 * depths, "o", label="wavenumber integral, 1 Hz")
 for name, depth in {"Meissner": 0.7, "Pacini": 2.0}.items():
     ax.axhline(depth, color="0.6", ls=":")
-    ax.annotate(name, (600, depth), va="bottom", ha="right")
-ax.set(xlabel="vertical strain, µm/m", ylabel="depth, mm", ylim=(14, 0), xlim=(0, 620))
+    ax.annotate(name, (215, depth), va="bottom", ha="right")
+ax.set(xlabel="vertical strain, µm/m", ylabel="depth, mm", ylim=(14, 0), xlim=(0, 220))
 ax.legend(loc="lower right")
 
 # %%
