@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -96,7 +97,29 @@ def inaccessible(folder: Path) -> Iterator[str]:
                     where = each["nodes"][0]["target"]
                     yield f"{name}: {each['id']} at {where}, {len(each['nodes'])} in all"
             page.close()
+        yield from unmoved(context.new_page(), folder)
         browser.close()
+
+
+def unmoved(page: Any, folder: Path) -> Iterator[str]:
+    """Sentences on what does not move on the page of recorded waves."""
+    picture = "document.getElementById('waves').toDataURL()"
+    page.goto((folder / "moving-waves.html").as_uri())
+    page.wait_for_timeout(300)
+    if page.evaluate(picture) != (at_rest := page.evaluate(picture)):
+        yield "moving-waves: moves although less motion is asked for"
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(1000)
+    if page.evaluate(picture) == at_rest:
+        yield "moving-waves: the skin does not move"
+    said = page.inner_text("#found"), page.inner_text("#wave-caption")
+    page.focus("#speed")
+    page.keyboard.press("ArrowLeft")
+    page.focus("#waves")
+    page.keyboard.press("ArrowUp")
+    now = page.inner_text("#found"), page.inner_text("#wave-caption")
+    if said[0] == now[0] or said[1] == now[1]:
+        yield f"moving-waves: neither speed nor point may be without effect, and it says {now}"
 
 
 def main() -> int:

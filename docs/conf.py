@@ -66,6 +66,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "show_signature": False,
     "show_memory": False,
+    "capture_repr": (),
     "min_reported_time": 10_000,
     "remove_config_comments": True,
     "notebook_extensions": set(),

@@ -34,10 +34,25 @@ def _cell(value: Any) -> str:
 def described(record: type) -> dict[str, str]:
     """What the docstring of a record says of each of its fields."""
     found = {}
+    said = {f"`{name}`": _listed(values) for name, values in _choices().items()}
     for names, text in PARAMETER.findall(inspect.getdoc(record) or ""):
         for name in names.split(", "):
             found[name] = " ".join(text.split())
+            for constant, values in said.items():
+                found[name] = found[name].replace(constant, values)
     return found
+
+
+def _choices() -> dict[str, Iterable[str]]:
+    """Constants that docstrings name, whose values a reader of the page wants."""
+    from simple_model.trajectory import BY_POINTS, SHAPES
+    from skinwave.load import LOADS
+
+    return {"SHAPES": SHAPES, "BY_POINTS": BY_POINTS, "LOADS": LOADS}
+
+
+def _listed(values: Iterable[str]) -> str:
+    return ", ".join(f"`{value}`" for value in values)
 
 
 # The command line
@@ -203,9 +218,9 @@ def materials() -> str:
         speed = 1 / (1 / np.sqrt(modulus / solid.density)).real
         rows.append(
             [
-                f"`{name}`", f"{solid.density:g}", f"{solid.shear_modulus / 1e3:.4g}",
-                f"{solid.poisson:.4g}", f"{modulus.real / 1e3:.4g}",
-                f"{modulus.imag / modulus.real:.2g}", f"{speed:.3g}",
+                f"`{name}`", f"{solid.density:g}", _shown(solid.shear_modulus / 1e3),
+                f"{solid.poisson:.4g}", _shown(modulus.real / 1e3),
+                f"{modulus.imag / modulus.real:.2g}", _shown(speed),
             ]
         )  # fmt: skip
     at = f"at {HERTZ:g} Hz"
@@ -213,6 +228,10 @@ def materials() -> str:
     return table(
         [*head, f"storage modulus {at}, kPa", f"loss factor {at}", f"shear speed {at}, m/s"], rows
     )
+
+
+def _shown(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
 
 
 def quantities() -> str:

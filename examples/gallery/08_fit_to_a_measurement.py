@@ -43,8 +43,8 @@ for k, colour in ((0, "#0072B2"), (2, "#E69F00"), (4, "#009E73")):
     label = f"{1e3 * places[k][0]:.0f} mm"
     ax.plot(1e3 * times, 1e6 * measured.values[0, :, k], ".", ms=3, color=colour)
     ax.plot(1e3 * times, 1e6 * fitted[:, k], color=colour, label=label)
-ax.set(xlabel="time, ms", ylabel="displacement, µm", xlim=(100, 140))
-ax.legend(title="dots measured, lines fitted")
+ax.set(xlabel="time, ms", ylabel="displacement, µm", xlim=(100, 140), ylim=(-1.2, 4.2))
+ax.legend(title="dots measured, lines fitted", ncols=3, loc="upper center")
 
 # %%
 modulus = found.values[key]
