@@ -46,6 +46,7 @@ suppress_warnings = ["config.cache"]  # functions in the settings of the gallery
 nitpicky = True  # of pages and labels; annotations name numpy's types, whose pages are elsewhere
 nitpick_ignore_regex = [(r"py:.*", r".*")]
 default_role = "code"
+highlight_language = "none"  # of formulas in docstrings; code says its own
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # docstrings have shapes and units

@@ -43,6 +43,8 @@ def rewritten(lines: list[str]) -> list[str]:
 def process(app: "Sphinx", what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Rewrite a docstring in place."""
     lines[:] = rewritten(lines)
+    if what == "property":  # whose first line napoleon takes for "type: meaning"
+        lines.insert(0, "")
 
 
 def setup(app: "Sphinx") -> dict[str, bool]:

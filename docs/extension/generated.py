@@ -6,6 +6,7 @@ What is listed is what the program itself reads: parsers, keys, registries and d
 import argparse
 import inspect
 import json
+import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 MARK = re.compile(r"<!-- generated: ([\w-]+) -->")
+RELATIVE = re.compile(r"\]\(([^)\s]+)")
 HERTZ = 200.0  # at which a table of materials states losses and speeds
 PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", re.MULTILINE)
 
@@ -301,9 +303,17 @@ def _number(value: float | None) -> str:
 # Pages that stand beside docs/
 
 
-def _page(name: str) -> str:
-    """A Markdown page of the repository without its title; links as of a page in docs/."""
-    return (ROOT / name).read_text("utf-8").split("\n", 1)[1].replace("](docs/", "](")
+def _page(name: str, folder: str) -> str:
+    """A Markdown page of the repository without its title, with links as from a folder."""
+    path = ROOT / name
+
+    def turned(match: re.Match[str]) -> str:
+        target = match.group(1)
+        if "://" in target or target.startswith("#"):
+            return match.group()
+        return f"]({os.path.relpath(path.parent / target, ROOT / folder)}"
+
+    return RELATIVE.sub(turned, path.read_text("utf-8").split("\n", 1)[1])
 
 
 PAGES: Mapping[str, Callable[[], str]] = {
@@ -316,9 +326,9 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "quantities": quantities,
     "drives": drives,
     "verification": verification,
-    "changelog": lambda: _page("CHANGELOG.md"),
-    "contributing": lambda: _page("CONTRIBUTING.md"),
-    "benchmarks": lambda: _page("bench/README.md").replace("](../docs/", "](../"),
+    "changelog": lambda: _page("CHANGELOG.md", "docs"),
+    "contributing": lambda: _page("CONTRIBUTING.md", "docs"),
+    "benchmarks": lambda: _page("bench/README.md", "docs/reference"),
 }
 
 
@@ -327,7 +337,14 @@ def read(app: "Sphinx", page: str, source: list[str]) -> None:
     source[0] = MARK.sub(lambda match: PAGES[match.group(1)](), source[0])
 
 
+def outdated(app: "Sphinx", env: Any, *changes: set[str]) -> list[str]:
+    """Pages that are read anew in every build, since the code may have changed."""
+    pages = [page for page in env.found_docs if env.doc2path(page).suffix == ".md"]
+    return [page for page in pages if MARK.search(env.doc2path(page).read_text("utf-8"))]
+
+
 def setup(app: "Sphinx") -> dict[str, bool]:
     """Register the reader."""
     app.connect("source-read", read)
+    app.connect("env-get-outdated", outdated)
     return {"parallel_read_safe": True}

@@ -52,7 +52,7 @@ for k, ax in enumerate(axes):
     ax.set(xlim=(100, 150), title=f"{1e3 * places[k][0]:g} mm from the focus")
 axes[1].set_ylabel("velocity into the body, mm/s")
 axes[2].set_xlabel("time, ms")
-axes[0].legend(loc="upper right", ncols=2)
+figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
 
 # %%
 print(f"delay {1e3 * found.delay:.4f} ± {1e3 * found.delay_error:.4f} ms, gain {found.gain:.3f}")
