@@ -33,7 +33,17 @@ INNER = {
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"bodies", "models", "planning", "pictures"},
     "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
-    "web": {"bodies", "models", "planning", "pictures", "reports", "studies", "uncertainty"},
+    "web": {
+        "bodies",
+        "measurements",
+        "models",
+        "patterns",
+        "planning",
+        "pictures",
+        "reports",
+        "studies",
+        "uncertainty",
+    },
     "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }
 

@@ -709,7 +709,7 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
         def recv(self):
             if (number := next(questions, None)) is None:
                 raise EOFError
-            return number, None, False
+            return number, None, False, ()
 
         def send(self, content):
             sent.append(content)

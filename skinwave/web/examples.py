@@ -13,8 +13,8 @@ class Example:
 
 
 EXAMPLES = {
-    "felt": Example(
-        title="Felt beyond the path",
+    "beyond": Example(
+        title="Motion beyond the path",
         sentence="AM at 200 Hz on a point: the kernel ends at the focus, waves carry it on.",
         query="shape=point&size=0&am=200&x=15",
     ),

@@ -7,7 +7,7 @@ import numpy as np
 from skinwave.pictures.styles import LABELS
 from skinwave.scene import Scene
 from skinwave.web import controls, scenes
-from skinwave.web.levels import Levels, kernel_level
+from skinwave.web.levels import FAINTEST, Levels, kernel_level
 from skinwave.web.model import Answer
 from skinwave.web.plots import PlotlyFigure, numbers
 
@@ -18,7 +18,6 @@ LEVELS: dict[str, tuple[str, float, float]] = {  # the view: a control, and the 
     "level by AM": ("am", 10.0, 400.0),
     "level by height": ("height", 100.0, 400.0),
 }
-DEEPEST = -60.0  # dB: what is less is drawn there
 
 
 def variants(view: str, values: controls.Values, *given: Any) -> tuple[Levels, tuple[Scene, ...]]:
@@ -56,9 +55,9 @@ def level_plot(levels: Levels, waves: Answer | None) -> PlotlyFigure:
     for role, name, own in curves:
         known = np.isfinite(own)
         data.append({"role": role, "axis": "y", "name": name, "x": numbers(levels.at[known]),
-                     "y": numbers(np.maximum(own[known], DEEPEST))})  # fmt: skip
+                     "y": numbers(np.maximum(own[known], FAINTEST))})  # fmt: skip
     shown = [value for curve in data for value in curve["y"]]
-    ends = [max(DEEPEST, min([-6.0, *shown])) - 2.0, 1.3 * max([6.0, *shown])]
+    ends = [max(FAINTEST, min([-6.0, *shown])) - 2.0, 1.3 * max([6.0, *shown])]
     data += [
         {"role": "threshold", "axis": "y", "name": "threshold", "dash": "dash",
          "x": [low, high], "y": [0.0, 0.0]},
@@ -68,7 +67,7 @@ def level_plot(levels: Levels, waves: Answer | None) -> PlotlyFigure:
     best, names = levels.best, []
     if best is not None:
         level = float(curves[-1][2][levels.at == best][0])
-        names = [{"x": best, "y": max(level, DEEPEST), "axis": "y",
+        names = [{"x": best, "y": max(level, FAINTEST), "axis": "y",
                   "said": [f"{best:.3g} {number.unit}", f"{level:+.0f} dB"]}]  # fmt: skip
     words = number.label[0].lower() + number.label[1:] if key != "am" else number.label
     return {

@@ -1,4 +1,4 @@
-"""Sensation level at a page's point: whether it is felt, and how far.
+"""Sensation level at a page's point: whether it is above threshold, and how far.
 
 The level of a response is that of its steady line with the highest sensation level, of a rhythm
 with its pauses, as in the table of lines.
@@ -16,6 +16,7 @@ from simple_model.load_spectrum import path_samples, pressure_lines
 from skinwave.scene import Scene
 from skinwave.web.model import FAINTEST_LEVEL, Answer, AreaMap, mean_level, places
 
+FAINTEST = -60.0  # dB: what is less is not worth a number
 WEAK = 1e-3  # of the strongest line of a load: one that is left out
 
 
@@ -56,17 +57,17 @@ def reach(scene: Scene, found: AreaMap) -> tuple[float, bool] | None:
     """How far in metre from the path a map is at threshold or above, and whether that goes on
     beyond the map; None if it nowhere is.
     """
-    felt = np.nan_to_num(found.level, nan=FAINTEST_LEVEL) >= 0.0
-    if not felt.any():
+    above = np.nan_to_num(found.level, nan=FAINTEST_LEVEL) >= 0.0
+    if not above.any():
         return None
-    at = np.concatenate([places()[felt.ravel()], *found.threshold])
+    at = np.concatenate([places()[above.ravel()], *found.threshold])
     away = cKDTree(path_samples(scene.pressure)).query(at)[0].max()
-    return float(away), bool(felt[[0, -1]].any() or felt[:, [0, -1]].any())
+    return float(away), bool(above[[0, -1]].any() or above[:, [0, -1]].any())
 
 
-def felt(scene: Scene, answers: Sequence[Answer]) -> str:
-    """Whether the selected point feels a response, at which line, and how far it is felt; nothing
-    of a body that is not skin.
+def above_threshold(scene: Scene, answers: Sequence[Answer]) -> str:
+    """Whether a response is above threshold at the selected point, at which line, and how far from
+    the path it is; nothing of a body that is not skin.
     """
     kernel, waves = answers[0], answers[-1]
     own = waves is not kernel
@@ -75,14 +76,14 @@ def felt(scene: Scene, answers: Sequence[Answer]) -> str:
     unit = "m" if own else "Pa"
     levels = {x: float(sensation_level(x.amplitude, x.frequency, unit=unit))
               for x in waves.lines if x.frequency > 0}  # fmt: skip
-    if not levels:
-        return "Felt at the point: no, nothing moves."
-    line = max(levels, key=lambda each: levels[each])
+    line = max(levels, key=lambda each: levels[each], default=None)
+    if line is None or levels[line] < FAINTEST:
+        return "Above threshold at the point: no, next to nothing moves there."
     yes = "yes" if levels[line] >= 0 else "no"
     how = f"{levels[line]:+.0f} dB SL at {line.frequency:.0f} Hz ({line.name})"
     far = _far(reach(scene, waves.map))
     beside = f" (kernel: {_far(reach(scene, kernel.map))})" if own else ""
-    return f"Felt at the point: {yes}, {how}; around the path felt {far}{beside}."
+    return f"Above threshold at the point: {yes}, {how}; from the path {far}{beside}."
 
 
 def _far(found: tuple[float, bool] | None) -> str:

@@ -39,7 +39,7 @@ def connect(session: Session) -> None:
         session.state.change(*keys)(_without_state(answered, session))
     for move in (
         entered, select, restart, zoom, follow, own_path, own_layer, preset, undo, redo, pin,
-        exchange, cancel, felt_most, example,
+        exchange, cancel, highest_level, example,
     ):  # fmt: skip
         session.server.trigger(move.__name__)(partial(move, session))
     for name, made in offered(session).items():
@@ -239,7 +239,7 @@ def look(session: Session) -> None:
     draw(session)
 
 
-def felt_most(session: Session) -> None:
+def highest_level(session: Session) -> None:
     """Set the control, over which levels are shown, to the value with the highest."""
     if session.levels is not None and session.levels.best is not None:
         key = LEVELS[session.levels.view][0]

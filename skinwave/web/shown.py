@@ -13,7 +13,7 @@ from skinwave.scene import Body, Scene
 from skinwave.web import drawings, guided, measured, model, moving, plots
 from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.level_view import LEVELS, level_plot
-from skinwave.web.levels import felt
+from skinwave.web.levels import above_threshold
 from skinwave.web.model import Answer
 from skinwave.web.plots import Curves
 
@@ -100,10 +100,10 @@ def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
 
 
 def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
-    """Sentences on whether and how far it is felt, on the effect of propagation, if a body's
+    """Sentences on what is above threshold, on the effect of propagation, if a body's
     response follows the kernel's, and on that of drive law and focus.
     """
-    here = [sentence] if (sentence := felt(scene, answers)) else []
+    here = [sentence] if (sentence := above_threshold(scene, answers)) else []
     new = added_names(scene.pressure)[:NAMED]
     said = f"adds {', '.join(new)}, which the published load lacks" if new else "adds no component"
     load = f"{scene.pressure.drive}, {scene.pressure.profile_name}"

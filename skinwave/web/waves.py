@@ -118,7 +118,7 @@ class BodyResponses:
 
     def level(self, scene: Scene) -> float:
         """Level of a scene's probe as `levels.level_of`; nan where it would take another table of
-        wavenumbers or reduction, or the probe reads something else than what is felt.
+        wavenumbers or reduction, or the probe reads something else than the threshold is of.
         """
         if not (scene.body.is_skin and scene.reading.is_plain):
             return float("nan")
