@@ -36,7 +36,7 @@ def read(name: str, content: bytes) -> Measurement:
 
 
 def nearest(measured: Measurement, probe: Floats) -> int:
-    """Which place is nearest a probe (2,) in metre; the first if no place is known."""
+    """Index of the place nearest a probe (2,) in metre; the first if no place is known."""
     away = np.linalg.norm(measured.places - probe, axis=1)
     return 0 if np.isnan(away).all() else int(np.nanargmin(away))
 
@@ -65,7 +65,7 @@ def spectrum(measured: Measurement, place: int) -> tuple[Floats, Floats]:
 
 
 def refusal(measured: Measurement, shown: Quantity) -> str:
-    """Why it is not drawn beside a quantity; nothing if it is."""
+    """Reason why it is not drawn beside a quantity; nothing if it is."""
     if measured.quantity == shown.name:
         return ""
     words = quantity(measured.quantity).words

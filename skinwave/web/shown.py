@@ -172,7 +172,7 @@ def foci(state: Any, scene: Scene) -> None:
 
 
 def _measured(curves: Curves) -> str:
-    """What is shown of a measurement, or why nothing is."""
+    """Sentence on what is shown of a measurement, or why nothing is."""
     found, waves = curves.measured, curves.waves
     if found is None:
         return ""

@@ -153,7 +153,7 @@ class BodyResponses:
 
 
 def _reduction(scene: Scene) -> tuple[Any, ...]:
-    """What a reduced body depends on."""
+    """Key of a reduced body: all that it depends on."""
     tacton, pressure = scene.tacton, scene.pressure
     places_only = at_any_speed(tacton.trajectory), tacton.n_paths
     return scene.body, places_only, pressure.height, pressure.profile
