@@ -47,8 +47,8 @@ async def fronted(monkeypatch, token="right"):
         yield one, client
 
 
-def served(folder=None, *, words=("-P", "-m", "skinwave", "web", "--port", "0")):
-    """A server in a process of its own, and its address."""
+def served(folder=None, *, words=("-P", "-m", "skinwave", "web", "--port", "0", "--samples", "2")):
+    """A server in a process of its own, by itself with few samples, and its address."""
     process = subprocess.Popen(
         [sys.executable, *words],
         stderr=subprocess.PIPE, text=True, cwd=folder,
@@ -385,7 +385,7 @@ OF_FEW_PAGES = f"""
 from skinwave.web import turns
 turns.MOST = {FEW}
 from skinwave.cli import main
-raise SystemExit(main(["web", "--port", "0"]))
+raise SystemExit(main(["web", "--port", "0", "--samples", "0"]))
 """
 slow = pytest.mark.slow
 on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes")
