@@ -39,7 +39,7 @@ KNOWN = {
     ),
     "rigid-body drift": (
         f'{AM}[body]\n{SMALL}base = "absorbing"\nsides = "absorbing"\n{PROBES}',
-        {"model": "fem", "h": 0.01},
+        {"model": "fem", "h": 0.02},
         "this body is unconstrained",
     ),
     "damping misfit": (
