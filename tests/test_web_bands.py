@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from simple_model import sensation_level
+from skinwave.cli import main
 from skinwave.scene import BODIES
 from skinwave.scene_file import dumps
 from skinwave.simulation import compute
@@ -201,6 +202,19 @@ def test_bands_are_asked_for_after_the_waves_and_go_with_the_next_change(session
     assert session.sampler.cancel.called
     assert session.bands is None
     assert "low" not in session.state.waveform_plot["data"][0]
+
+
+def test_a_page_of_no_samples_asks_for_no_bands(session):
+    session._loop, session.samples = Mock(), 0
+    with session.state:
+        told(session, "answer", session.number, answer(session.scene))
+    assert not session.sampler.ask.called
+
+
+@pytest.mark.parametrize("count", ["-1", "1", "1001"])
+def test_a_number_of_samples_without_bands_is_refused(capsys, count):
+    assert main(["web", "--port", "0", "--samples", count]) == 2
+    assert f"--samples = {count} is outside 2..1000; give 0 for" in capsys.readouterr().err
 
 
 def test_a_band_beyond_all_others_does_not_hide_the_curve(session):
