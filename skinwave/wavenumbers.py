@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import hankel2
 
 from meshes.tetmesh import Floats
@@ -193,6 +192,8 @@ def _fits(r: Floats, motions: Complex) -> list[_Fit]:
 
 def _fitted(r: Floats, motion: Complex, start: Complex) -> _Fit:
     """Hankel functions that fit a motion (r,) best, from the wavenumbers (n,) of a start."""
+    from scipy.optimize import least_squares  # which takes long to import
+
     weights = np.sqrt(r)
 
     def projected(x: Floats) -> tuple[Complex, Complex]:

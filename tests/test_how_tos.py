@@ -14,7 +14,12 @@ from skinwave import SkinwaveWarning, cli
 DOCS = Path(__file__).parent.parent / "docs"
 WRITTEN = {
     "labelled-data": ("tactons.csv",),
-    "fit-a-vibrometer": ("palm.csv", "seen/index.html", "fitted/scene.toml", "fitted/estimates.csv"),
+    "fit-a-vibrometer": (
+        "palm.csv",
+        "seen/index.html",
+        "fitted/scene.toml",
+        "fitted/estimates.csv",
+    ),
     "own-sheet": ("sheet/lines.csv", "clips/rows"),
     "silicone-disc": ("disc/responses.npz", "disc.gif", "disc.pvd", "waves/index.html"),
     "fingertip": (),
@@ -37,7 +42,10 @@ def run(language, text):
         exec(compile(text, "how-to", "exec"), {})
     else:
         for line in text.splitlines():
-            assert cli.main([*shlex.split(line)[1:], "--quiet"][: None if "plan" not in line else -1]) == 0
+            assert (
+                cli.main([*shlex.split(line)[1:], "--quiet"][: None if "plan" not in line else -1])
+                == 0
+            )
 
 
 @pytest.mark.slow

@@ -173,6 +173,18 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
     assert {"numpy"} <= loaded
 
 
+@pytest.mark.parametrize("module", ["simulation", "sweeps.sweep", "web.layout"])
+def test_what_few_commands_need_is_loaded_by_these_alone(module):
+    """Each takes a tenth of a second of every process that is started."""
+    if module == "web.layout":
+        pytest.importorskip("trame_vuetify")
+    code = f"import sys, skinwave.{module}\n"
+    code += (
+        "assert not {'scipy.interpolate', 'scipy.optimize', 'matplotlib.figure'} & {*sys.modules}"
+    )
+    subprocess.check_call([sys.executable, "-c", code])
+
+
 def test_help_loads_nothing_heavy():
     code = "import sys, skinwave.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
     code += "assert not {'numpy', 'scipy', 'matplotlib', 'rich', 'dask'} & set(sys.modules)\n"

@@ -28,9 +28,9 @@ class Session:
 
     `good` are the values that the controls had last without a mistake, `number` counts the
     requests to the process that computes the response of a body, `own` is a body from a file,
-    `spreads` are those of a file, `levels` those over one of the controls with its `variants`, if
-    they are shown, and `zoomed` is the part in s of the commanded Tacton, if it is not the one that
-    is chosen.
+    `spreads` are those of a file, `samples` how many bands are of, `levels` those over one of the
+    controls with its `variants`, if they are shown, and `zoomed` is the part in s of the commanded
+    Tacton, if it is not the one that is chosen.
     """
 
     def __init__(
@@ -39,13 +39,15 @@ class Session:
         values: Values | None = None,
         own: Body | None = None,
         spreads: scenes.FileSpreads = scenes.NO_SPREADS,
+        samples: int = 0,
     ) -> None:
         self.server, self.state, self.own = server, server.state, own
         self.good = dict(values or STARTS)
         self.history = History(self.good)
         self.spreads = spreads
         self.worker = Worker(self._told_elsewhere)
-        self.sampler = BandWorker(self._told_elsewhere)
+        self.samples = samples
+        self.sampler = BandWorker(self._told_elsewhere, samples)
         self.scene: Any = None
         self.kernel: Answer | None = None
         self.waves: Answer | None = None
@@ -87,7 +89,7 @@ class Session:
 
     def ask_bands(self) -> None:
         """Have the bands of what is shown computed, in a process that comes after all others."""
-        if self._loop and not self.state.stale:
+        if self._loop and self.samples and not self.state.stale:
             self.sampler.ask(self.number, self.scene, self.answers[-1].response)
 
     def _told_elsewhere(self, what: str, number: int, content: Any) -> None:

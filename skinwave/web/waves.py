@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, sparse
-from scipy.interpolate import CubicSpline
 
 import fem
 from meshes.tetmesh import Floats, Ints
@@ -186,6 +185,8 @@ def gaussian_only(pressure: MovingPressure) -> None:
 
 def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     """Motion from rest of a scene's probe, and RMS motion of the area."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     pressure = scene.pressure
     response = _at_point(table, scene) if scene.reading.is_plain else compute(scene, "flat-body")
     f, w = path_amplitudes(_steady(pressure))
@@ -226,6 +227,8 @@ def _at_point(table: Table, scene: Scene) -> Response:
 
 def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Floats) -> Floats:
     """Motion (t,) in metre of a probe (2,) from rest at times (t,) in s."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     dt, n = step(times), len(times)
     padded = fft.next_fast_len(n + round(TAIL / dt), real=True)
     t = np.arange(padded) * dt
