@@ -8,7 +8,6 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model.quantities import Quantity, quantity
 from skinwave.measurements import Measurement
-from skinwave.measurements.reading import read as read_file
 
 LARGEST_FILE = 20_000_000  # bytes of what a page sends
 
@@ -26,6 +25,8 @@ def read(name: str, content: bytes) -> Measurement:
             f"a file of {len(content) / 1e6:.3g} MB exceeds {LARGEST_FILE / 1e6:g} MB, the most "
             "that a page takes; use skinwave compare --measured"
         )
+    from skinwave.measurements.reading import read as read_file
+
     with TemporaryDirectory() as folder:
         file = Path(folder, f"measured{Path(name).suffix.lower()}")
         file.write_bytes(content)

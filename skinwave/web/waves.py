@@ -210,6 +210,8 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
 
 def flat_lines(table: Table, scene: Scene) -> tuple[Floats, fem.Complex]:
     """Frequencies (f,) in Hz and steady lines (f,) in metre of a scene's probe."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     f, w = path_amplitudes(_steady(scene.pressure))
     away = np.linalg.norm(scene.probe_points[0, :2] - path_samples(scene.pressure), axis=1)
     g = CubicSpline(table.distances, table.g, axis=1)(away)
