@@ -316,6 +316,11 @@ def test_thin_layers_on_a_palm_are_a_coat_and_leave_its_elements_as_they_are():
     assert row.value == "epidermis of 0.3 mm"
     assert "thinner than half an element of 5 mm" in row.reason
     assert not coat_rows(BODIES["palm"], 5e-3)
+    assert coat_rows(BODIES["palm-layers"], 5e-3)[0].what == "layers"
+    fat = Layer(thickness=4e-3, material="fat")
+    _, row = coat_rows(palm(EPIDERMIS, fat), 5e-3)
+    assert (row.what, row.value) == ("layers", "fat of 4 mm")
+    assert "half an element of 5 mm or more" in row.reason
     assert "times as stiff" not in row.reason
     stiff = Layer(thickness=0.3e-3, material="forearm-epidermis")
     (row,) = coat_rows(replace(body, layers=(stiff,), material="forearm-dermis"), 5e-3)
