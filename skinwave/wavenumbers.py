@@ -21,6 +21,7 @@ from simple_model import MovingPressure, Rhythm, Tacton
 from simple_model.dispersion import DispersionCurves
 from simple_model.focus import lobe_width
 from simple_model.material import Complex
+from simple_model.quantities import DISPLACEMENT
 from simple_model.response import Response, step
 from skinwave.load import PRESSURE
 from skinwave.scene import Scene
@@ -93,7 +94,14 @@ def pulse_scene(scene: Scene) -> Scene:
         tacton=tacton, drive="force_corrected", depth_of_modulation=0.0, height=height
     )
     probes = tuple((NEAREST + SPACING * n, 0.0) for n in range(count))
-    return replace(scene, pressure=pressure, probes=probes, load=PRESSURE)
+    return replace(
+        scene,
+        pressure=pressure,
+        probes=probes,
+        load=PRESSURE,
+        quantity=DISPLACEMENT.name,
+        depth=0.0,
+    )
 
 
 def transfer_functions(scene: Scene, response: Response, highest: float) -> LineOfProbes:
