@@ -381,3 +381,5 @@ PRESETS: Mapping[str, Material] = {
         density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03
     ),
 }
+# Those whose motion no skin has: thresholds of detection are not theirs.
+NOT_SKIN = ("ecoflex", "bone", "paper", "paper-grain")
