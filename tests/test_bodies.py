@@ -35,7 +35,7 @@ SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
 CLAMPED = Body(width=0.06, height=0.06, sides="clamped")  # an eighth of the cost of `SKIN`'s
 STILL = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25))
 THREE = ((0.0, 0.0), (0.01, 0.0), (0.02, 0.0))  # probes: in the middle, on the path, beyond it
-HAND_LINES = (140.0, 280.0)  # Hz, of the AM, which move the middle, too
+HAND_LINE = 140.0  # Hz, of the AM, which moves the middle, too
 
 
 def answered(body):
@@ -414,16 +414,14 @@ def test_a_palm_answers_alike_however_it_is_meshed():
 
 
 def motion(body, made):
-    """Two lines (2, p) of the motion at three probes, by a factorisation each: of a hand they cost
-    a third of what a model does that is reduced up to 1 kHz.
+    """A line (p,) of the motion at three probes, by one factorisation: of a hand it costs a sixth
+    of what a model does that is reduced up to 1 kHz.
     """
     (P, points), ops = surface_load(made), operators(made)
     S = surface_motion(body, made, np.array(THREE))
     frequencies, pressures = pressure_lines(LOAD, points)
-    forces = [P @ pressures[np.argmin(np.abs(frequencies - f))] for f in HAND_LINES]
-    return np.array(
-        [S @ fem.harmonic(ops, q, f)[0] for q, f in zip(forces, HAND_LINES, strict=True)]
-    )
+    force = P @ pressures[np.argmin(np.abs(frequencies - HAND_LINE))]
+    return S @ fem.harmonic(ops, force, HAND_LINE)[0]
 
 
 @pytest.mark.slow
@@ -433,7 +431,7 @@ def test_a_hand_from_a_file_answers_alike_however_it_is_meshed(monkeypatch):
     one, other = (build(body, 0.006) for _ in range(2))  # at 7.5 mm some pairs differ by 3.2 %
     assert len(one.mesh.points) != len(other.mesh.points)
     first, second = motion(body, one), motion(body, other)
-    assert (np.linalg.norm(second - first, axis=0) / np.linalg.norm(first, axis=0)).max() < 0.03
+    assert (np.abs(second - first) / np.abs(first)).max() < 0.03
 
 
 @pytest.mark.parametrize(
@@ -466,18 +464,20 @@ def test_tactons_are_compared_on_the_body_of_a_file(
 
 
 @pytest.mark.slow
-def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(tmp_path, monkeypatch):
+def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
+    in_one_process, tmp_path, monkeypatch
+):
     """Hand of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
     monkeypatch.chdir(tmp_path)
-    short = MovingPressure(tacton=replace(LOAD.tacton, duration=0.1))
+    short = MovingPressure(tacton=replace(STILL.tacton, duration=0.05))
     (tmp_path / "scene.toml").write_text(dumps(replace(SKIN, pressure=short, probes=THREE[:2])))
-    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "12"]
+    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "16"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
     page = (tmp_path / "both/index.html").read_text()
     assert "Body from generic-hand-right.glb, -x towards the device" in page
     assert "thicker sheet" not in page
-    assert "elements of 12 mm" in page  # of the map, too
-    assert "--up -x --element-size 12" in page
+    assert "elements of 16 mm" in page  # of the map, too
+    assert "--up -x --element-size 16" in page
     rows = list(csv.DictReader((tmp_path / "both/lines.csv").read_text().splitlines()))
     moved = [
         float(r["displacement_um"]) for r in rows if r["line"] == "f_AM" and r["body"] == "mesh"
