@@ -404,7 +404,7 @@ def test_a_palm_answers_alike_however_it_is_meshed():
     """
     small = {"width": 0.055, "height": 0.055, "depth": 0.0145}
     scene = replace(SKIN, body=replace(BODIES["palm"], **small), probes=THREE)
-    one, fine = (compute(scene, "fem", h=h) for h in (0.005, 0.004))
+    one, fine = (compute(scene, "fem", h=h) for h in (0.005, 0.0042))
     assert compare(fine, one).relative_l2.max() < 0.02
     required = plan(scene, 0.1)
     (row,) = (row for row in required.rows if row.what == "element size")
@@ -488,12 +488,13 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
 
 def test_what_is_seen_of_a_body_is_not_the_layer_around_it():
     times = np.arange(20) / 1000
+    small = replace(SKIN, body=Body(width=0.03, height=0.03), probes=THREE[:2])
     with pytest.warns(skinwave.SkinwaveWarning, match="elements of 10 mm"):
-        seen = skinwave.field(SKIN, times, 0.2, h=0.01)
-    assert np.abs(seen.mesh.points[:, :2]).max() == pytest.approx(0.03)
+        seen = skinwave.field(small, times, 0.2, h=0.01)
+    assert np.abs(seen.mesh.points[:, :2]).max() == pytest.approx(0.015)
     assert seen.displacement.shape == (20, len(seen.mesh.points), 3)
     top = seen.mesh.facets["top"]
     corners = seen.mesh.points[top[:, :3], :2]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
-    assert area == pytest.approx(0.06**2)
+    assert area == pytest.approx(0.03**2)
