@@ -333,6 +333,27 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
     assert found.effects() == []
 
 
+def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch):
+    small = Body(width=0.03, height=0.03, depth=0.004)
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
+        lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
+    )
+    monkeypatch.setattr("skinwave.studies.relax.apart", lambda work, *given: work(*given))
+    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    found = hierarchy_of(SKIN, lambda phase, done: None, h=4e-3).steps
+    first, *others = [step.response.effort.seconds for step in found]
+    reduction = {"assemble", "factorise and reduce"}
+    assert reduction <= set(first)
+    for step, own in zip(found[1:], others, strict=True):
+        assert not reduction & set(own)
+        assert step.seconds > first["factorise and reduce"]
+        assert (step.response.values == found[0].response.values).all()
+
+
 def test_line_changes_are_of_lines_that_count():
     times = np.arange(1000) / 10_000
     loud = np.sin(2 * np.pi * 140 * times)[:, None]
