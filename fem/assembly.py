@@ -207,6 +207,8 @@ def _volume(
         for m in np.flatnonzero(lam > direct).tolist()
     }
     beside: dict[int, Any] = {m: D[m].T @ D[m] for m in D}
+    for dilatation in beside.values():
+        dilatation.sort_indices()  # its blocks, so that no later sum has to sort their entries
     for m, added in directional_parts(materials).items():
         own = region == m
         part = replace(pattern, slot=pattern.slot[own])
