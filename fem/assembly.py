@@ -160,7 +160,10 @@ def assemble(
     if coat is not None:
         added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
         K, C, M, branches = together((K, C, M, branches), added)
-    K, C, M = (restricted(A, free) for A in (K, C, M))
+    del volume  # whose parts, and then each whole matrix, free their memory
+    K = restricted(K, free)
+    C = restricted(C, free)
+    M = restricted(M, free)
     K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
     branches = on_free(branches, free)
     return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
