@@ -14,7 +14,6 @@ from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
 BESIDE = 1e-9  # barycentric: how far outside a facet a point still counts as on it
-BOWED, ROUND_OFF = 0.3, 1e-6  # the same of the straight facet below a bowed one, and on that one
 
 
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
@@ -175,17 +174,13 @@ def _surface_frame(
         raise ValueError("there are no facets to read; name a facet set that is not empty")
     points = points[:, :2]
     owner, barycentric = _nearest(mesh.points[nodes[:, :3], :2], points)
-    beside = np.asarray((barycentric < -BESIDE).any(axis=1))
-    if mesh.order == 2:  # what is beside the straight facet may be on the bowed one
-        near = (barycentric >= -BOWED).all(axis=1)
-        at = on_curved(mesh.points[nodes[owner[near]], :2], barycentric[near], points[near])
-        beside[near] &= (at < -ROUND_OFF).any(axis=1)
-        barycentric[near] = at
-    if beside.any():
+    if (beside := (barycentric < -BESIDE).any(axis=1)).any():
         x_mm, y_mm = 1e3 * points[beside][0]
         raise ValueError(
             f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
         )
+    if mesh.order == 2:
+        barycentric = on_curved(mesh.points[nodes[owner], :2], barycentric, points)
     N = shape_functions(barycentric, nodes.shape[1])
     if patch:
         places = np.einsum("pa,pai->pi", N, mesh.points[nodes[owner]])

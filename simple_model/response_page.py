@@ -50,6 +50,6 @@ def _tables(response: "Response") -> list[str]:
         for place, peak, level in zip(response.probes, largest, rms, strict=True)
     ]
     header = ["probe, mm", f"largest, {unit}", f"RMS about the mean, {unit}"]
-    left = [] if len(rows) <= MOST_ROWS else [f"{len(rows) - MOST_ROWS:,} further probes"]
-    listed = drawing.table([*rows[:MOST_ROWS], *([left] if left else [])], header)
+    left = [[f"{len(rows) - MOST_ROWS:,} further probes"]] if len(rows) > MOST_ROWS else []
+    listed = drawing.table([*rows[:MOST_ROWS], *left], header)
     return [drawing.table(facts), listed]

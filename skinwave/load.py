@@ -15,6 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.choices import choose
 from simple_model.focus import NOMINAL_HEIGHT, ContactSpot
+from skinwave import extensions
 
 ALONG_PATH = "path"
 STRONGEST = 30.0  # m/s2 of gravity: three times that of the earth
@@ -61,6 +62,8 @@ class Load:
     @property
     def of_kind(self) -> "LoadKind":
         """The registered record of its kind."""
+        if self.kind not in LOADS:
+            extensions.load()
         return LOADS[choose("load kind", self.kind, LOADS)]
 
     @property
@@ -136,9 +139,7 @@ def register(kind: LoadKind) -> LoadKind:
     ValueError
         If there is one of that name.
     """
-    if kind.name in LOADS:
-        raise ValueError(f"'{kind.name}' is registered already; choose another name")
-    LOADS[kind.name] = kind
+    extensions.add(LOADS, kind.name, kind, kind.tractions)
     return kind
 
 

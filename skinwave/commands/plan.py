@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from typing import TYPE_CHECKING
 
 from skinwave.commands.common import (
     add_mesh,
@@ -13,6 +14,11 @@ from skinwave.commands.common import (
     show,
 )
 from skinwave.plain_text import say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from skinwave.scene import Scene
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +34,6 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from dataclasses import asdict, replace
 
-    from skinwave.pictures.scene_plot import scene_figure
     from skinwave.planning.budget import mesh_row
     from skinwave.scene_file import read
 
@@ -43,5 +48,11 @@ def run(options: argparse.Namespace) -> int:
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
     for row in required.rows:
         say(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
-    show(options, lambda: {scene.name: scene_figure(scene)})
+    show(options, lambda: _figures(scene))
     return 0
+
+
+def _figures(scene: "Scene") -> "dict[str, Figure]":
+    from skinwave.pictures.scene_plot import scene_figure
+
+    return {scene.name: scene_figure(scene)}

@@ -21,6 +21,8 @@ from skinwave.commands.common import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from skinwave.run import Run
 
 
@@ -45,7 +47,6 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave import record
     from skinwave.outputs import output_folder
-    from skinwave.pictures.figures import tacton_figure
     from skinwave.run import Run
     from skinwave.scene import body_name
     from skinwave.scene_file import read
@@ -81,8 +82,14 @@ def run(options: argparse.Namespace) -> int:
         **told(response),
     }
     summarise(options, summary, f"{response.model}: wrote {out}/index.html")
-    show(options, lambda: {scene.name: tacton_figure(scene.name, [run])})
+    show(options, lambda: _figures(run))
     return 0
+
+
+def _figures(run: "Run") -> "dict[str, Figure]":
+    from skinwave.pictures.figures import tacton_figure
+
+    return {run.tacton: tacton_figure(run.tacton, [run])}
 
 
 def _uncertainty(

@@ -86,8 +86,8 @@ def told(
     body, size = scene.body, h or default_size(scene.body)
     other, coarse = compared or coarser_body(scene, h, tolerance, solver)
     same = coarse.effort.dofs == response.effort.dofs
+    fine = about_its_rest(scene, fine)
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
-    found, fine = (about_its_rest(scene, each) for each in (found, fine))
     _, error = convergence(body, (other, size), (found, fine), tolerance, same=same)
     error += series_error(scene, response.model, tolerance, coarse)
     warnings = sentences(scene, response, tolerance, h=size, error=error)

@@ -144,9 +144,10 @@ def sweep(
         found = runner.sweep(wanted, kept, options, report, scheduler=scheduler, workers=workers)
         if found.interrupted:
             raise KeyboardInterrupt
-        names = {case.name(version("skinwave"), options) for case in wanted}
-        rows = [row for row in dataset.read(kept) if row[dataset.KEY] in names]
-    return SweepTable(rows=tuple(rows), varied=tuple(v.key for v in variations))
+        there = {row[dataset.KEY]: row for row in dataset.read(kept)}
+    names = (case.name(version("skinwave"), options) for case in wanted)
+    rows = tuple(there[name] for name in names if name in there)
+    return SweepTable(rows=rows, varied=tuple(v.key for v in variations))
 
 
 def _variation(key: str, values: Values) -> Variation:
