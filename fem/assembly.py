@@ -28,7 +28,7 @@ from scipy import sparse
 
 from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.coat import Coat, coat_operators
-from fem.combination import Laws, proportional
+from fem.combination import Laws, proportional, with_added
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_products, jacobians, shape_nodes
 from fem.materials import Material
@@ -50,7 +50,7 @@ from fem.sparsity import (
     slabs,
     starts_of_kept,
 )
-from fem.viscoelastic import property_of, rayleigh_rates, together, viscoelastic
+from fem.viscoelastic import Matrices, property_of, rayleigh_rates, together, viscoelastic
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
@@ -154,19 +154,20 @@ def assemble(
     if drag is not None:
         R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
     beside, R = restricted(beside, free), restricted(R, free)
-    if coat is None and len(materials) == 1 and materials[0].law is None:
-        return _of_one_material(materials[0], volume, share, (beside, R), free, mesh.n_dofs)
-    K, C, M, branches = viscoelastic(materials, *volume, share)
-    if coat is not None:
-        added = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
-        K, C, M, branches = together((K, C, M, branches), added)
-    del volume  # whose parts, and then each whole matrix, free their memory
-    K = restricted(K, free)
-    C = restricted(C, free)
-    M = restricted(M, free)
-    K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
-    branches = on_free(branches, free)
-    return Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
+    if len(materials) == 1 and materials[0].law is None:
+        found = _of_one_material(materials[0], volume, share, (beside, R), free, mesh.n_dofs)
+    else:
+        K, C, M, branches = viscoelastic(materials, *volume, share)
+        del volume  # whose parts, and then each whole matrix, free their memory
+        K = restricted(K, free)
+        C = restricted(C, free)
+        M = restricted(M, free)
+        K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
+        branches = on_free(branches, free)
+        found = Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
+    if coat is None:
+        return found
+    return _coated(found, coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed)))
 
 
 def _of_one_material(
@@ -192,6 +193,21 @@ def _of_one_material(
         K=K, C=laws.damping.of(K, M), M=M, R=R, free=free, n_dofs=n_dofs, laws=laws,
         branches=tuple(MaxwellBranch(K=part.of(K, M), time=time) for part, time in each),
     )  # fmt: skip
+
+
+def _coated(body: Operators, coat: Matrices) -> Operators:
+    """Operators of a body with what its coat adds on all dofs of the mesh."""
+    K, C, M = (restricted(A, body.free) for A in coat[:3])
+    relaxing = on_free(coat[3], body.free)
+    whole = together((body.K, body.C, body.M, body.branches), (K, C, M, relaxing))
+    laws = None
+    if body.laws:
+        of_time = {
+            branch.time: branch.K for branch in relaxing if isinstance(branch, MaxwellBranch)
+        }
+        each = [of_time[b.time] if isinstance(b, MaxwellBranch) else b.K for b in whole[3]]
+        laws = with_added(body.laws, (K, C, M), each)
+    return replace(body, K=whole[0], C=whole[1], M=whole[2], branches=whole[3], laws=laws)
 
 
 def _volume(

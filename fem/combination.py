@@ -119,6 +119,36 @@ def unrelated(C: Any, branches: Sequence[Branch]) -> Laws:
     )
 
 
+def with_added(laws: Laws, added: tuple[Any, Any, Any], further: Sequence[Any]) -> Laws:
+    """Laws of a body to which few entries are added, such as those of a coat.
+
+    Parameters
+    ----------
+    laws : Laws of the body
+    added : (K, C, M), sparse, what is added to each
+    further : sparse, what is added to each branch; beyond the body's own, new ones
+
+    Returns
+    -------
+    Laws
+    """
+    K, C, M = added
+    own = (*laws.parts, *(Combination() for _ in further[len(laws.branches) :]))
+
+    def rest(part: Combination, more: Any) -> Any:
+        """`rest`, and what of `more` is not that of K and M."""
+        apart = more - part.stiffness * K - part.mass * M
+        apart.eliminate_zeros()
+        if not apart.nnz:
+            return part.rest
+        return apart if part.rest is None else part.rest + apart
+
+    damping, *branches = (
+        replace(part, rest=rest(part, more)) for part, more in zip(own, (C, *further), strict=True)
+    )
+    return Laws(damping=damping, branches=tuple(branches))
+
+
 def proportional(
     m: Material, rayleigh: tuple[float, float], rests: tuple[Any, Any]
 ) -> tuple[Laws, tuple[float, ...]]:

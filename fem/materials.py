@@ -6,7 +6,6 @@ from collections.abc import Callable
 from math import pi, sqrt
 
 import numpy as np
-from scipy.optimize import linprog
 
 from simple_model.material import PRESETS, Floats, Material, from_young
 
@@ -49,6 +48,8 @@ def _of_share(
     loss_factor: float, w: Floats, share: Callable[[Floats], Floats]
 ) -> tuple[float, float]:
     """The pair of least maximum deviation from a loss factor at w (f,), by linear programming."""
+    from scipy.optimize import linprog  # which takes long to import
+
     one = np.column_stack([1 / w / share(w) * w[0], w / w[-1]])  # of a/w0 and of b w1
     bounds = np.vstack([np.column_stack([sign * one, -np.ones(len(w))]) for sign in (1, -1)])
     limits = np.repeat([1.0, -1.0], len(w))

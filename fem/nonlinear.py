@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
-from scipy.optimize import brentq
 
 from fem.energy import EnergyBalance, with_losses
 from fem.finite_strain import Elastic
@@ -122,6 +121,7 @@ def _line_search(
     unbalanced: Callable[[Floats], tuple[Floats, float]], u: Floats, step: Floats
 ) -> float:
     """Line search: the fraction of a step at which the residual does no more work along it."""
+    from scipy.optimize import brentq  # which takes long to import
 
     def work(part: float) -> float:
         return float(step @ unbalanced(u + part * step)[0])

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.interpolate import CubicSpline
 
 from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
@@ -136,7 +135,8 @@ def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
     ValueError
         If the material has a modulus law of its own.
     """
-    from scipy.signal import lfilter  # which takes long to import
+    from scipy.interpolate import CubicSpline  # which take long to import
+    from scipy.signal import lfilter
 
     if material.law is not None:
         raise ValueError(NO_INTERNAL)

@@ -18,10 +18,10 @@ integrals times weights that depend on x_p - x.
 import time
 from collections.abc import Callable
 from functools import cache, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from simple_model.compliance import Compliance
 from simple_model.focus import gaussian_width
@@ -41,6 +41,9 @@ from simple_model.response import Effort, Response, step
 from simple_model.sampling import finer, highest, reached, shown, transform
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import Field, normal_field, point_integrals
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
 WRAPPED = 1e-5
@@ -327,8 +330,10 @@ def _table(furthest: float, width: float) -> Floats:
     return np.linspace(0, furthest, max(8, int(np.ceil(furthest / width * 6))))
 
 
-def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
+def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> "CubicSpline":
     """A spline that is flat at distance 0."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     flat = (1, np.zeros(np.delete(values.shape, axis), values.dtype))
     return CubicSpline(table, values, axis=axis, bc_type=(flat, "not-a-knot"))
 

@@ -12,13 +12,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 from scipy.special import j1
 
 from simple_model.trajectory import Floats
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 SPEED_OF_SOUND = 343.0  # m/s
 WAVENUMBER = 2 * np.pi * 40e3 / SPEED_OF_SOUND
@@ -39,7 +42,6 @@ _FORCES = np.array(
     [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
     + [1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414]
 )
-_INTENSITY = PchipInterpolator(_HEIGHTS, _FORCES)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -91,7 +93,9 @@ class PressureMap:
         return np.asarray(self._interpolated(offsets))
 
     @cached_property
-    def _interpolated(self) -> RegularGridInterpolator:
+    def _interpolated(self) -> "RegularGridInterpolator":
+        from scipy.interpolate import RegularGridInterpolator
+
         relative = self.pressure / self.pressure.max()
         return RegularGridInterpolator((self.x, self.y), relative, bounds_error=False, fill_value=0)
 
@@ -186,7 +190,11 @@ def relative_intensity(height: float) -> float:
         raise ValueError(
             f"height = {1e3 * height:g} mm is outside {low}..{high} mm, where the array focuses"
         )
-    return float(_INTENSITY(1e3 * height))
+    if height == NOMINAL_HEIGHT:
+        return 1.0
+    from scipy.interpolate import PchipInterpolator  # which takes long to import
+
+    return float(PchipInterpolator(_HEIGHTS, _FORCES)(1e3 * height))
 
 
 def lobe_width(height: float) -> float:
@@ -293,8 +301,10 @@ def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
 
 
 @cache
-def _array_spot(height: float) -> RegularGridInterpolator:
+def _array_spot(height: float) -> "RegularGridInterpolator":
     """Intensity |p|^2 relative to the focus in one quadrant, as both axes are of symmetry."""
+    from scipy.interpolate import RegularGridInterpolator
+
     line = np.linspace(0, 60e-3, 121)
     x, y = np.meshgrid(line, line, indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)])

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from simple_model.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
 from simple_model.orthotropy import Orthotropy
@@ -220,13 +219,13 @@ class Material:
 
     @property
     def rayleigh_speed(self) -> float:
-        """Speed of surface waves without loss, m/s, the root of Rayleigh's equation."""
+        """Speed of surface waves without loss, m/s: of the squares of speeds over that of shear
+        waves, the root below 1 of Rayleigh's equation s^3 - 8 s^2 + (24 - 16 r) s - 16 (1 - r) = 0.
+        """
         ratio = self.shear_modulus / (self.first_lame + 2 * self.shear_modulus)
-
-        def rayleigh(x: float) -> float:
-            return (2 - x * x) ** 2 - 4 * sqrt(1 - x * x) * sqrt(1 - x * x * ratio)
-
-        return self.shear_speed * brentq(rayleigh, 0.5, 1 - 1e-12, xtol=1e-14)
+        roots = np.roots([1.0, -8.0, 24 - 16 * ratio, 16 * (ratio - 1)])
+        (below_one,) = roots[(roots.imag == 0) & (roots.real < 1)].real
+        return self.shear_speed * sqrt(below_one)
 
 
 def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
@@ -382,3 +381,5 @@ PRESETS: Mapping[str, Material] = {
         density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03
     ),
 }
+# Those whose motion no skin has: thresholds of detection are not theirs.
+NOT_SKIN = ("ecoflex", "bone", "paper", "paper-grain")

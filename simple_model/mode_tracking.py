@@ -4,7 +4,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from simple_model.material import Complex, Floats
 
@@ -53,6 +52,8 @@ def tracked(found: Found, omega: Floats, most: int) -> Found:
     -------
     Found, of at most so many
     """
+    from scipy.optimize import linear_sum_assignment  # which takes long to import
+
     count = len(omega)
     index = np.full((count, 0), -1)
     for f in range(count):

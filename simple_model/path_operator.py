@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from simple_model.compliance import Compliance
 from simple_model.focus import spot_width
@@ -90,6 +89,8 @@ def path_operator(
             "the steady lines of a path need a Gaussian focus and a path that is repeated; take "
             "finite elements, or motion from rest"
         )
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     load = load_lines(pressure, threshold)
     frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
     distinct, orders = np.unique(load.harmonics, return_inverse=True)

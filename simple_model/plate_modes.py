@@ -11,6 +11,8 @@ free edge asks follows from the energies. A clip holds a square: between its sid
 are their own, and products that would move it are left out. Where a plate is the same on both sides
 of its middle, even and odd modes are found apart. The second term of T is the air on both sides of
 a plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
+
+Tension has no loss, so that of bending couples the modes of a stretched plate, close ones most.
 """
 
 from collections.abc import Sequence
@@ -34,6 +36,7 @@ NEARLY = 0.01  # of a clip's radius: a side of it so near another, or an edge of
 LAYER = 0.1  # of a clip's radius, beside its sides
 SHIFT = 1e-12  # of the mean squared frequency
 MOST_DOFS = 6000  # of one symmetry: some minutes
+COUPLED = 1.5  # of a line's frequency: modes above it are almost what they are by themselves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,15 +103,24 @@ class Plate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Family:
-    """Modes of one symmetry: `squared` (m,) angular frequencies in rad2/s2, the `elastic` share
-    (m,) of their stiffness that is not tension, and coefficients `shapes` (i, j, m) on `x`, `y`.
+    """Modes of one symmetry: `squared` (m,) angular frequencies in rad2/s2, ascending; stiffness
+    of `bending` (m, m) between them in rad2/s2, None without tension, where it is `squared` alone;
+    and coefficients `shapes` (i, j, m) on `x`, `y`.
     """
 
     x: LineBasis
     y: LineBasis
     squared: Floats
-    elastic: Floats
+    bending: Floats | None
     shapes: Floats
+
+    @property
+    def elastic(self) -> Floats:
+        """Shares (m,) of the stiffness that are bending."""
+        if self.bending is None:
+            return np.ones(len(self.squared))
+        largest = np.maximum(self.squared, np.finfo(float).tiny)
+        return np.asarray(np.clip(np.diagonal(self.bending) / largest, 0.0, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -187,25 +199,69 @@ def steady_response(
     outputs: Floats,
     loss_factor: float | Floats,
 ) -> Complex:
-    """Steady displacement sum_m shape_m force_m / (w_m^2 (1 + i eta e_m) - w^2), e_m the elastic
-    share of the mode's stiffness; the mean, at 0 Hz, without loss.
+    """Steady displacement: the shapes of the modes times their `modal_motion`.
+
+    Parameters
+    ----------
+    modes, frequencies, forces, loss_factor : as of `modal_motion`
+    outputs : (p, m) shapes where it is read, of `PlateModes.at`
+
+    Returns
+    -------
+    (f, p) complex, metre
+    """
+    return np.asarray(modal_motion(modes, frequencies, forces, loss_factor) @ outputs.T)
+
+
+def modal_motion(
+    modes: PlateModes, frequencies: Floats, forces: Complex, loss_factor: float | Floats
+) -> Complex:
+    """Steady modal coordinates q of (diag(w_m^2) + i eta B - w^2) q = force, B the stiffness of
+    bending between the modes; the mean, at 0 Hz, without loss.
 
     Parameters
     ----------
     modes : PlateModes
     frequencies : (f,) Hz
     forces : (f, m) modal forces in N kg^-1/2
-    outputs : (p, m) shapes where it is read, of `PlateModes.at`
-    loss_factor : of bending; one, or one a frequency (f,)
+    loss_factor : eta of bending; one, or one a frequency (f,), the same where these are
 
     Returns
     -------
-    (f, p) complex, metre
+    (f, m) complex, metre kg^1/2
     """
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     loss = np.where(w > 0, np.reshape(loss_factor, (-1, 1)), 0.0)
-    dynamic = modes.squared * (1 + 1j * loss * modes.elastic) - w**2
-    return np.asarray((forces / dynamic) @ outputs.T)
+    found = np.array(forces / (modes.squared * (1 + 1j * loss * modes.elastic) - w**2))
+    first = 0
+    for family in modes.families:
+        own = slice(first, first := first + len(family.squared))
+        if family.bending is not None:
+            found[:, own] = _coupled(family, w[:, 0], loss[:, 0], forces[:, own], found[:, own])
+    return found
+
+
+def _coupled(family: Family, w: Floats, loss: Floats, forces: Complex, apart: Complex) -> Complex:
+    """Modal coordinates (f, m) of a stretched plate: the low ones together, and by one step of
+    Gauss and Seidel with the high ones, which are almost as they are `apart`.
+    """
+    assert family.bending is not None
+    found, elastic = apart.copy(), family.elastic
+    lossy = np.flatnonzero(loss)
+    _, first, which = np.unique(np.round(w[lossy], 6), return_index=True, return_inverse=True)
+    for each, k in enumerate(lossy[first].tolist()):
+        same = lossy[which == each]  # lines of one frequency, of several loads
+        n = int(np.searchsorted(family.squared, (COUPLED * w[k]) ** 2))
+        if not n:
+            continue
+        between, high = 1j * loss[k] * family.bending[:n, n:], apart[same, n:]
+        dynamic = 1j * loss[k] * family.bending[:n, :n]
+        dynamic[np.diag_indices(n)] += family.squared[:n] - w[k] ** 2
+        right = (forces[same, :n] - high @ between.T).T
+        low = linalg.solve(dynamic, right, assume_a="sym", check_finite=False).T
+        own = family.squared[n:] * (1 + 1j * loss[k] * elastic[n:]) - w[k] ** 2
+        found[same, :n], found[same, n:] = low, high - low @ between / own
+    return found
 
 
 def _symmetries(plate: Plate) -> tuple[bool, bool]:
@@ -268,12 +324,9 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
         held = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
         squared, shapes = _modes(*held)
         shapes = free @ shapes
-    elastic = np.ones(len(squared))
-    if stretching is not None:
-        of_bending = np.einsum("nm,nm->m", shapes, bending @ shapes)
-        elastic = np.clip(of_bending / np.maximum(squared, np.finfo(float).tiny), 0.0, 1.0)
+    between = None if stretching is None else np.asarray(shapes.T @ (bending @ shapes))
     return Family(
-        x=x, y=y, squared=squared, elastic=elastic, shapes=shapes.reshape(x.size, y.size, -1)
+        x=x, y=y, squared=squared, bending=between, shapes=shapes.reshape(x.size, y.size, -1)
     )
 
 

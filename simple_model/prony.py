@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -206,6 +205,8 @@ def _fitted(
     w: Floats, mu: Complex, times: Floats, rest: float | None, band: tuple[float, float]
 ) -> PronySeries:
     """Series of given times, by non-negative least squares of the relative deviation."""
+    from scipy.optimize import nnls  # which takes long to import
+
     turned = 1j * w[:, None] * times
     columns = np.hstack([np.ones((len(w), 1)), 1j * w[:, None], turned / (1 + turned)])
     lasting = rest or LEAST_MODULUS * abs(mu[0])

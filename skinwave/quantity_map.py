@@ -5,12 +5,14 @@ By wavenumber integrals where they stand for the body, else by finite elements.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 import fem
 from fem.load_and_probe import surface_frame
+from meshes import reading
 from meshes.tetmesh import Floats
 from simple_model.flat_body import field_lines
 from simple_model.load_spectrum import synthesise
@@ -102,6 +104,41 @@ def quantity_map(
     error = np.nanmax(np.abs(coarse - rms)) / (COARSER**ORDER - 1) / np.nanmax(rms)
     note = f"finite elements of {1e3 * size:.2g} mm"
     return QuantityMap(x=x, y=y, rms=rms, asked=asked, depth=depth, note=note, error=float(error))
+
+
+def map_of_motion(scene: Scene, moved: DrivenBody) -> QuantityMap:
+    """Map of the quantity of a meshed body whose motion is known, without an estimated error."""
+    x, y = grid(scene)
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    return QuantityMap(
+        x=x, y=y, rms=_element_rms(scene, moved, scene.depths[0], places),
+        asked=scene.reading.asked, depth=scene.depths[0], note="finite elements",
+    )  # fmt: skip
+
+
+def save(path: Path, found: QuantityMap) -> None:
+    """A map as one npz file."""
+    np.savez(path, x=found.x, y=found.y, rms=found.rms, depth=found.depth)
+
+
+def load(path: Path, scene: Scene) -> QuantityMap:
+    """A map of the quantity that a scene's probes read from its file.
+
+    Raises
+    ------
+    ValueError
+        If the file is none of these.
+    """
+    try:
+        arrays = reading.arrays(path)
+        x, y, rms = (np.asarray(arrays[name], np.float64) for name in ("x", "y", "rms"))
+        depth = float(arrays["depth"])
+        if x.ndim != 1 or rms.shape != (*y.shape, *x.shape) or not np.isfinite(rms).any():
+            raise ValueError(f"'rms' is of shape {rms.shape}, or nowhere a number")
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is no map ({error}); make it anew from its scene") from None
+    note = "finite elements"
+    return QuantityMap(x=x, y=y, rms=rms, asked=scene.reading.asked, depth=depth, note=note)
 
 
 def _flat_rms(scene: Scene, depth: float, places: Floats) -> Floats:

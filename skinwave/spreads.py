@@ -13,6 +13,7 @@ measured one).
     paper                    factor 2 [5]         factor 1.6 [5]
     paper-grain              factor 1.6 [5]       factor 1.6 [5]
     ecoflex                  none known: its constants are second-hand
+    bone                     none: ten times its modulus moves a fingertip by 2 %
 
 [1] No shear modulus of a palm in vivo is published: surface waves at which a moving focus is
     perceived as strongest run at 5 to 8 m/s (Frier et al., EuroHaptics 2018), those of fingers

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline, LinearNDInterpolator
 
 import fem
 from meshes.tetmesh import Floats
@@ -118,6 +117,8 @@ def element_map(moved: Waves, x: Floats, y: Floats) -> SurfaceMap:
     top = moved.mesh.points[np.unique(moved.mesh.facets["top"])]
     frequencies, amplitudes = line_amplitudes(moved, fem.probe_operator(moved.mesh, top))
     lines = frequencies, amplitudes
+    from scipy.interpolate import LinearNDInterpolator  # which takes long to import
+
     between = LinearNDInterpolator(top[:, :2], np.column_stack(_rms_and_level(lines, "m")))
     rms, level = np.moveaxis(between(*np.meshgrid(x, y)), -1, 0)  # not a number off the body
     return SurfaceMap(x=x, y=y, rms=rms, level=level, unit="m")
@@ -130,6 +131,8 @@ def _mapped(
     X, Y = np.meshgrid(x, y)
     radius = np.hypot(X, Y)
     if _is_round(pressure):
+        from scipy.interpolate import CubicSpline  # which takes long to import
+
         radii = np.arange(0, radius.max() + 2 * RADIAL, RADIAL)
         frequencies, along = answer(np.column_stack([radii, 0 * radii]))
         amplitudes = np.abs(CubicSpline(radii, np.abs(along), axis=1)(radius.ravel()))

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import hankel2
 
 from meshes.tetmesh import Floats
@@ -22,6 +21,7 @@ from simple_model import MovingPressure, Rhythm, Tacton
 from simple_model.dispersion import DispersionCurves
 from simple_model.focus import lobe_width
 from simple_model.material import Complex
+from simple_model.quantities import DISPLACEMENT
 from simple_model.response import Response, step
 from skinwave.load import PRESSURE
 from skinwave.scene import Scene
@@ -94,7 +94,14 @@ def pulse_scene(scene: Scene) -> Scene:
         tacton=tacton, drive="force_corrected", depth_of_modulation=0.0, height=height
     )
     probes = tuple((NEAREST + SPACING * n, 0.0) for n in range(count))
-    return replace(scene, pressure=pressure, probes=probes, load=PRESSURE)
+    return replace(
+        scene,
+        pressure=pressure,
+        probes=probes,
+        load=PRESSURE,
+        quantity=DISPLACEMENT.name,
+        depth=0.0,
+    )
 
 
 def transfer_functions(scene: Scene, response: Response, highest: float) -> LineOfProbes:
@@ -193,6 +200,8 @@ def _fits(r: Floats, motions: Complex) -> list[_Fit]:
 
 def _fitted(r: Floats, motion: Complex, start: Complex) -> _Fit:
     """Hankel functions that fit a motion (r,) best, from the wavenumbers (n,) of a start."""
+    from scipy.optimize import least_squares  # which takes long to import
+
     weights = np.sqrt(r)
 
     def projected(x: Floats) -> tuple[Complex, Complex]:

@@ -98,7 +98,7 @@ def browser():
 
 @pytest.fixture(scope="module")
 def address():
-    """The address of the interactive tool, served by a process of its own."""
-    process, found = served("--port", "0")
+    """The address of the interactive tool without bands, served by a process of its own."""
+    process, found = served("--port", "0", "--samples", "0")
     yield found
     ended(process)

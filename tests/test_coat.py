@@ -176,6 +176,28 @@ def test_moduli_of_a_coat_depend_on_frequency_as_those_of_a_body_do():
     assert abs(difference).max() < 1e-12 * abs(expected).max()
 
 
+@pytest.mark.parametrize("below", ["palm", "palm-zener"])
+@pytest.mark.parametrize("skin", ["epidermis", "palm-zener", "ecoflex"])
+def test_a_coated_body_has_its_damping_and_branches_as_those_of_the_body_but_at_its_surface(
+    below, skin
+):
+    """Of losses like the body's, of other losses, and of a law of its own."""
+    mesh = block()
+    coat = fem.Coat(materials=(fem.PRESETS[skin],), thicknesses=(0.4e-3,))
+    body, coated = (
+        fem.assemble(mesh, fem.PRESETS[below], fixed="bottom", absorbing="right", coat=each)
+        for each in (None, coat)
+    )
+    assert coated.laws.hold(coated.K, coated.C, coated.M, coated.branches)
+    alike = (below, skin) in [("palm", "epidermis"), ("palm-zener", "palm-zener")]
+    for own, part in zip(body.laws.parts, coated.laws.parts, strict=False):
+        assert (part.stiffness, part.mass) == (own.stiffness, own.mass)
+    if alike:  # one ratio of viscosity, or of the branch, to the modulus
+        damping, *branches = coated.laws.parts
+        assert damping.rest is coated.R
+        assert [part.rest for part in branches] == [None] * len(body.branches)
+
+
 def test_a_body_and_its_coat_share_branches_of_one_time():
     term = (PronyTerm(modulus=1e3, time=1e-3),)
     mesh, below = block(), fem.Material(density=1000, shear_modulus=2e4, poisson=0.3, prony=term)
@@ -294,6 +316,11 @@ def test_thin_layers_on_a_palm_are_a_coat_and_leave_its_elements_as_they_are():
     assert row.value == "epidermis of 0.3 mm"
     assert "thinner than half an element of 5 mm" in row.reason
     assert not coat_rows(BODIES["palm"], 5e-3)
+    assert coat_rows(BODIES["palm-layers"], 5e-3)[0].what == "layers"
+    fat = Layer(thickness=4e-3, material="fat")
+    _, row = coat_rows(palm(EPIDERMIS, fat), 5e-3)
+    assert (row.what, row.value) == ("layers", "fat of 4 mm")
+    assert "half an element of 5 mm or more" in row.reason
     assert "times as stiff" not in row.reason
     stiff = Layer(thickness=0.3e-3, material="forearm-epidermis")
     (row,) = coat_rows(replace(body, layers=(stiff,), material="forearm-dermis"), 5e-3)

@@ -93,7 +93,8 @@ def refused(capsys, *arguments):
 
 def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
-    run = ["run", str(scene), "--model", "fem", "--h", "15", "--quiet", "--overwrite"]
+    scene.write_text(GOOD)  # soon reduced
+    run = ["run", str(scene), "--model", "fem", "--h", "10", "--quiet", "--overwrite"]
     assert main([*run, "--no-cache"]) == 0
     assert not (tmp_path / "cache").exists()
     assert os.environ["SKINWAVE_CACHE"] == str(tmp_path / "cache")  # as before

@@ -384,6 +384,15 @@ def test_wavenumbers_in_the_motion_are_those_of_the_modes(driven):
     assert np.ptp(found.matched.modes.real[(f > 150) & (f < 200)]) > 80
 
 
+def test_wavenumbers_are_those_of_the_motion_whatever_a_scene_reads(driven):
+    from dataclasses import replace
+
+    from skinwave.wavenumbers import pulse_scene
+
+    below = replace(driven.scene, quantity="strain_zz", depth=(7e-4,) * len(driven.scene.probes))
+    assert pulse_scene(below) == pulse_scene(driven.scene)
+
+
 def test_only_wavenumbers_that_the_line_resolves_are_reported():
     """Two waves in noise, one of which fades ever sooner: errors are standard."""
     from scipy.special import hankel2

@@ -39,7 +39,7 @@ KNOWN = {
     ),
     "rigid-body drift": (
         f'{AM}[body]\n{SMALL}base = "absorbing"\nsides = "absorbing"\n{PROBES}',
-        {"model": "fem", "h": 0.01},
+        {"model": "fem", "h": 0.02},
         "this body is unconstrained",
     ),
     "damping misfit": (
@@ -115,8 +115,8 @@ def test_run_and_simulate_say_the_same(name, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "name", ["coarse elements", "rigid-body drift", "sides that reflect", "no waves",
-             "sheet beyond linear bending", "no start"]
+    "name", ["coarse elements", "sides that reflect", "no waves", "sheet beyond linear bending",
+             "no start"]
 )  # fmt: skip
 def test_a_row_of_a_sweep_says_the_same(name, tmp_path, monkeypatch):
     text, arguments, part = KNOWN[name]

@@ -28,7 +28,7 @@ PALM = slab(PRESETS["palm"], 0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
 TIMES = np.arange(4000) / 1e4
 LATE = slice(2500, 3800)  # the transient has died out, and the end has no effect yet
-SKIN = Body(width=0.06, height=0.06)
+SKIN = Body(width=0.06, height=0.06, sides="clamped")
 
 
 def circling(size, speed, am=0.0, **load):

@@ -99,7 +99,8 @@ def test_bodies_answer_them_by_lines_as_by_time_steps(more):
              for p in STRAIGHT[:3]]  # fmt: skip
     scene = Scene(
         pressure=together(small, duration=0.02, **more),
-        body=Body(width=0.03, height=0.03, depth=0.01), probes=((0.0, 0.0), (0.005, 0.001)),
+        body=Body(width=0.03, height=0.03, depth=0.01, sides="clamped"),
+        probes=((0.0, 0.0), (0.005, 0.001)),
     )  # fmt: skip
     x = compute(scene, "fem", h=0.01).displacement
     y = compute(scene, "fem-transient", h=0.01, dt=2.5e-5).displacement

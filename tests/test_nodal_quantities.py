@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.load_spectrum import pressure_lines, synthesise
 from simple_model.tensors import hooke
-from skinwave import exports
+from skinwave import exports, quantity_map
 from skinwave.bodies.build import build, operators
 from skinwave.cli import main
 from skinwave.effort import silent
@@ -19,7 +19,10 @@ from skinwave.pictures import films, motion, render, views
 from skinwave.pictures.nodal import shade
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import style
+from skinwave.reports import album, scene_report
 from skinwave.reports.album import coloured
+from skinwave.reports.gallery import Gallery
+from skinwave.run import Run
 from skinwave.scene import Body, Layer, Scene
 from skinwave.scene_file import dumps
 from skinwave.simulation import compute
@@ -195,3 +198,41 @@ def test_a_report_of_a_folder_has_the_quantity(compared, tmp_path):
     page = (tmp_path / "r" / "index.html").read_text()
     assert "they read" in page
     assert "Probes read strain zz at a depth of 0.7 mm, in µm/m" in page
+
+
+@pytest.mark.parametrize("quantity", ["strain_zz", "largest_shear_strain"])
+def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(
+    quantity, view, moved, tmp_path
+):
+    """Where a probe is, the map is the RMS of the lines that the probe reads."""
+    scene = replace(SCENE, quantity=quantity, depth=0.7e-3)
+    album.keep_view(replace(view, scene=scene), tmp_path)
+    found = quantity_map.load(tmp_path / "map.npz", scene)
+    assert found.depth == 0.7e-3
+    if quantity == "strain_zz":
+        seen = motion.probe_lines(scene, moved)
+        rms = np.sqrt((np.abs(seen.lines[seen.frequencies > 0]) ** 2).sum(axis=0) / 2)
+        at = np.searchsorted(found.x, -1e-9), np.searchsorted(found.y, -1e-9)
+        assert found.rms[at[1], at[0]] == pytest.approx(rms[0], rel=1e-6)
+    run = Run(
+        tacton="", body="slab", scene=scene,
+        response=Response(
+            model="fem", times=np.arange(2.0), probes=scene.probe_points, quantity=quantity,
+            values=np.zeros((2, 3)),
+        ),
+    )  # fmt: skip
+    kept = album.Album(
+        title="", scene=scene, runs=[run], views={}, planned=None, trust=None, maps={"slab": found}
+    )
+    gallery = Gallery(folder=tmp_path, style=style("report"))
+    (section,) = scene_report.mapped(kept, gallery)
+    assert f"The RMS of the {scene.reading.words} is largest at" in section
+    assert (tmp_path / "quantity-slab.png").stat().st_size > 10_000
+
+
+def test_a_report_of_motion_keeps_no_map(view, tmp_path):
+    album.keep_view(view, tmp_path)
+    assert not (tmp_path / "map.npz").exists()
+    (tmp_path / "map.npz").write_bytes(b"none")
+    with pytest.raises(ValueError, match="is no map"):
+        quantity_map.load(tmp_path / "map.npz", SCENE)

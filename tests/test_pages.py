@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+from contextlib import contextmanager
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
@@ -129,15 +130,19 @@ def compared(folder):
 WRITERS = (relaxed, traded, verified, mechanised, ran, reported, compared)
 
 
+@contextmanager
 def opened(browser, path, obeyed=False):
-    """A page and what its console said; without its policy if the page is to be `obeyed`."""
+    """A page and what its console said; without its policy if the page is to be `obeyed`. It is
+    closed in the end: the pictures of reports move as long as they are open.
+    """
     context = browser.new_context(bypass_csp=obeyed)
     tab, said = context.new_page(), []
     tab.on("console", lambda message: said.append(message.text))
     tab.on("pageerror", lambda error: said.append(str(error)))
     tab.goto(f"file://{path}")
     tab.wait_for_timeout(300)
-    return tab, said
+    yield tab, said
+    context.close()
 
 
 class Tags(HTMLParser):
@@ -173,12 +178,12 @@ def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
     assert pages
     for path in pages:
         for obeyed in (False, True):  # escaped, whatever the policy would stop
-            tab, said = opened(browser, path, obeyed)
-            assert said == []
-            assert tab.evaluate(RAN) == 0
-            assert HOSTILE[:40] in tab.inner_text("body")
-            policy = tab.evaluate("document.querySelector('meta[http-equiv]').content")
-            assert policy == document.POLICY
+            with opened(browser, path, obeyed) as (tab, said):
+                assert said == []
+                assert tab.evaluate(RAN) == 0
+                assert HOSTILE[:40] in tab.inner_text("body")
+                policy = tab.evaluate("document.querySelector('meta[http-equiv]').content")
+                assert policy == document.POLICY
 
 
 @pytest.mark.slow
@@ -187,11 +192,11 @@ def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
     """The second line of defence, by itself."""
     page = document.page("t", Markup(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
-    tab, said = opened(browser, tmp_path / "index.html")
-    assert not tab.evaluate("window.ran")
-    assert any("Content Security Policy" in text for text in said)
-    tab, _ = opened(browser, tmp_path / "index.html", obeyed=True)
-    assert tab.evaluate("window.ran")  # it would run otherwise
+    with opened(browser, tmp_path / "index.html") as (tab, said):
+        assert not tab.evaluate("window.ran")
+        assert any("Content Security Policy" in text for text in said)
+    with opened(browser, tmp_path / "index.html", obeyed=True) as (tab, _):
+        assert tab.evaluate("window.ran")  # it would run otherwise
 
 
 @pytest.mark.slow
@@ -203,15 +208,15 @@ def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
     )
     page = document.page("t", document.inner_page(inner, HOSTILE), document.paragraph(HOSTILE))
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
-    tab, said = opened(browser, tmp_path / "index.html")
-    assert said == []
-    assert tab.frames[1].inner_text("body") == "drawn alone"
-    assert tab.evaluate(RAN) == 0
+    with opened(browser, tmp_path / "index.html") as (tab, said):
+        assert said == []
+        assert tab.frames[1].inner_text("body") == "drawn alone"
+        assert tab.evaluate(RAN) == 0
     changed = page.replace("drawn", "changed")
     (tmp_path / "changed.html").write_text(changed, encoding="utf-8")
-    tab, said = opened(browser, tmp_path / "changed.html")
-    assert tab.frames[1].inner_text("body").strip() == "alone"
-    assert len(said) == 1
+    with opened(browser, tmp_path / "changed.html") as (tab, said):
+        assert tab.frames[1].inner_text("body").strip() == "alone"
+        assert len(said) == 1
 
 
 def test_only_html_made_here_is_taken_as_it_is():

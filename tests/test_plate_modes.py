@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 from scipy.linalg import eigh
+from scipy.sparse.linalg import eigsh
 
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load_spectrum import load_lines, reduced_lines
@@ -50,6 +52,44 @@ def test_simply_supported_orthotropic_stretched_plates_have_their_closed_form():
     exact = np.sort(np.sqrt(stiffness / MASS).ravel()) / (2 * np.pi)
     found = plate_modes(SIMPLY).frequencies
     np.testing.assert_allclose(found[:20], exact[:20], rtol=1e-8)
+
+
+def hermite_line(length, n):
+    """Matrices of cubic Hermite elements of a clamped line: mass, slope, curvature, int N'' N."""
+    h, (x, w) = length / n, np.polynomial.legendre.leggauss(4)
+    s, w = (x + 1) / 2, w * length / n / 2
+    N = np.array([1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3),
+                  3 * s**2 - 2 * s**3, h * (s**3 - s**2)])  # fmt: skip
+    slope = np.array([6 * s**2 - 6 * s, h * (1 - 4 * s + 3 * s**2),
+                      6 * s - 6 * s**2, h * (3 * s**2 - 2 * s)]) / h  # fmt: skip
+    curvature = np.array([12 * s - 6, h * (6 * s - 4), 6 - 12 * s, h * (6 * s - 2)]) / h**2
+    found = np.zeros((4, 2 * n + 2, 2 * n + 2))
+    for k in range(0, 2 * n, 2):
+        for G, (a, b) in zip(found, ((N, N), (slope, slope), (curvature, curvature),
+                                     (curvature, N)), strict=True):  # fmt: skip
+            G[k : k + 4, k : k + 4] += (a * w) @ b.T
+    return [sparse.csr_array(G[2:-2, 2:-2]) for G in found]
+
+
+def test_clamped_orthotropic_stretched_plates_are_those_of_conforming_elements():
+    plate = Plate(
+        size_x=0.096, size_y=0.08, d11=8e-4, d22=3e-4, d12=0.9e-4, d66=1.9e-4, mass_per_area=MASS,
+        tension_x=12.0, tension_y=45.0, air_density=0.0,
+    )  # fmt: skip
+    found, errors = plate_modes(plate).frequencies[:8], []
+    for n in (12, 24):
+        (M, S, C, X), (m, s, c, x) = hermite_line(plate.size_x, n), hermite_line(plate.size_y, n)
+        cross = sparse.kron(X, x.T)
+        K = plate.d11 * sparse.kron(C, m) + plate.d22 * sparse.kron(M, c)
+        K = K + plate.d12 * (cross + cross.T) + 4 * plate.d66 * sparse.kron(S, s)
+        K = K + plate.tension_x * sparse.kron(S, m) + plate.tension_y * sparse.kron(M, s)
+        squared = eigsh(K.tocsc(), 8, MASS * sparse.kron(M, m).tocsc(), sigma=0.0,
+                        return_eigenvectors=False)  # fmt: skip
+        errors.append(np.sqrt(np.sort(squared)) / (2 * np.pi) / found - 1)
+    assert np.abs(errors[1]).max() < 4e-4
+    order = np.log2(errors[0] / errors[1])
+    assert (order > 3.4).all()
+    assert (order < 4.3).all()
 
 
 def test_a_membrane_is_a_string_along_its_tension():
@@ -111,6 +151,33 @@ def test_loss_is_of_bending_and_not_of_tension():
     pulled = SIMPLY.tension_x * a[0, 0] ** 2 + SIMPLY.tension_y * b[0] ** 2
     first = np.argmin(modes.squared)
     assert modes.elastic[first] == pytest.approx(1 - pulled / stiffness[0, 0], rel=1e-8)
+
+
+def clamped_beam(tension, loss, frequency):
+    """Deflection of the middle of a clamped, stretched beam under 1 Pa: its characteristic roots
+    D (1 + i eta) k^4 - T k^2 - m w^2 = 0 and the two conditions of an end.
+    """
+    stiff, inertia = D * (1 + 1j * loss), MASS * (2 * np.pi * frequency) ** 2
+    k = np.sqrt(np.roots([stiff, -tension, -inertia]))
+    end = np.cosh(k * SIDE / 2), k * np.sinh(k * SIDE / 2)
+    return -1 / inertia + np.linalg.solve(end, [1 / inertia, 0]).sum()
+
+
+def test_the_loss_of_bending_couples_modes_of_a_stretched_strip():
+    tension, loss, width = 20.0, 0.1, 0.02
+    strip = isotropic(SIDE, width, nu=0.0, tension_x=tension,
+                      **edges("clamped", "clamped", "free", "free"))  # fmt: skip
+    modes = plate_modes(strip)
+    x, weights = np.polynomial.legendre.leggauss(60)
+    shapes = modes.on_grid(x * SIDE / 2, x * width / 2)
+    f = np.array([60.0, 150.0, 240.0, 300.0, 380.0, 430.0])
+    of_pressure = SIDE * width / 4 * np.outer(weights, weights).ravel() @ shapes
+    forces, at = np.tile(of_pressure, (len(f), 1)), modes.at([[0.0, 0.0]])
+    exact = [clamped_beam(tension, loss, hz) for hz in f]
+    found = steady_response(modes, f, forces, at, loss)[:, 0]
+    np.testing.assert_allclose(found, exact, rtol=4e-3)
+    apart = modes.squared * (1 + 1j * loss * modes.elastic) - (2 * np.pi * f[:, None]) ** 2
+    assert np.abs((forces / apart @ at.T)[:, 0] / exact - 1).max() > 0.05
 
 
 def test_air_is_rayleighs_integral():

@@ -25,6 +25,16 @@ THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich",
          "trame", "trame_pyvista", "packaging", "pooch", "tornado", "aiohttp")  # fmt: skip
 OURS = ("fem", "meshes", "simple_model")
 MARK = "with open({0!r}, 'a') as file:\n    file.write(__name__ + chr(10))\n"
+# An extension: the program itself, as it was started, does these commands before its own.
+IN_TURN = """
+import os
+import sys
+from skinwave.cli import main
+del os.environ["SKINWAVE_EXTENSIONS"]
+for words, code in {0!r}:
+    assert main(words) == code, words
+    assert os.getcwd() not in map(os.path.abspath, sys.path), words
+"""
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 LOOKED_UP = pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="looks processes up")
@@ -103,28 +113,30 @@ def test_nothing_of_a_hostile_folder_is_imported_or_set(hostile):
     settle(hostile)
     run_there(hostile, "--version")
     said = run_there(hostile, "compare", "small.toml", "--h", "10", "--out", "both", "--quiet")
-    said += run_there(hostile, "run", "small.toml", "--h", "10", "--out", "out", "--quiet")
     assert "no_such_key" not in said
     run_there(hostile, "run", "nothing.toml", code=2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hostile", [as_module], indirect=True)
-def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
-    """Those that take minutes are told to end when a process of their own works."""
+def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_path, monkeypatch):
+    """Those that take minutes are told to end when a process of their own works; those that start
+    none are in one process.
+    """
     from skinwave.cli import COMMANDS
 
     settle(hostile)
     run_there(hostile, "--version")
     run_there(hostile, "run", "nothing.toml", code=2)
+    (beside := tmp_path / "beside").mkdir()
     small = ["small.toml", "--h", "10", "--quiet"]
     hand(hostile[1] / "body.stl", 6e-3)
     (hostile[1] / "wave.csv").write_text("t [s], v(0,0) [m/s]\n0, 1\n1, 2\n")
     asked = {
         "run": [*small, "--out", "out"],
         "plan": ["small.toml"],
+        "same": ["out", "out"],
         "rerun": ["out", "--quiet"],
-        "same": ["out", "out-rerun"],
         "compare": [*small, "--out", "both"],
         "sweep": [*small, "--vary", "tacton.am_frequency_hz=100,150", "--model", "fem", "--out",
                   "swept", "--workers", "1"],
@@ -146,17 +158,22 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile):
         "validate": ["--quiet"],
     }  # fmt: skip
     assert set(COMMANDS) == {*asked, "web"}  # which has a test of its own
-    for name, arguments in asked.items():
+    until = {
+        "compare": None, "rerun": None, "infer": itself, "relax": below, "tradeoff": below,
+        "validate": itself, "verify": itself,
+    }  # fmt: skip
+    refused = ("film", "fit")  # no report is there, and no motion measured
+    in_turn = [([name, *asked[name]], 2 if name in refused else 0)
+               for name in asked if name not in until]  # fmt: skip
+    monkeypatch.setenv("SKINWAVE_EXTENSIONS", "in_turn")
+    monkeypatch.setenv("PYTHONPATH", str(beside), prepend=os.pathsep)
+    (beside / "in_turn.py").write_text(IN_TURN.format(in_turn))
+    said = run_there(hostile, "doctor")
+    monkeypatch.undo()
+    assert "no_such_key" not in said
+    for name, end in until.items():
         threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
-        code = 2 if name in ("film", "fit") else 0  # no report is there, and no motion measured
-        until = {
-            "infer": itself,
-            "relax": below,
-            "tradeoff": below,
-            "validate": itself,
-            "verify": itself,
-        }.get(name)
-        said = run_there(hostile, name, *arguments, threads=threads, code=code, until=until)
+        said = run_there(hostile, name, *asked[name], threads=threads, until=end)
         assert "no_such_key" not in said, name
 
 

@@ -153,7 +153,7 @@ def scenes(draw):
     return Scene(name=draw(st.text()), pressure=draw(pressures), body=body, probes=probes)
 
 
-SMALL = Body(width=0.03, height=0.03, depth=0.006)
+SMALL = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
 SHEET = replace(BODIES["paper-sheet"], width=0.03, height=0.03)
 WATCHED = ((0.0, 0.0), (0.006, 0.003))
 

@@ -12,14 +12,17 @@ from test_stress import boussinesq
 from fem.coat import Coat
 from simple_model import lines
 from simple_model.focus import spot_width
+from simple_model.material import PRESETS
 from simple_model.quantities import QUANTITIES, Quantity, register
 from simple_model.tensors import energy_root, largest_shear, von_mises
+from skinwave.bodies.parts import Layer
 from skinwave.cli import main
 from skinwave.models import check_reading, named
 from skinwave.models.loads import probe_rows
 from skinwave.models.prepared import sample_times
 from skinwave.reports.album import open_album
 from skinwave.run import Run
+from skinwave.scene import BODIES, Body
 from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
 from skinwave.sweeps.measures import columns, measured
@@ -220,6 +223,18 @@ def test_a_layer_has_its_own_strain_and_the_traction_of_its_neighbour():
     np.testing.assert_allclose(above, below, rtol=1e-4)
     stiff, soft = (read("strain_xz", [z, z]) for z in (1 - 1e-6, 1 + 1e-6))
     assert 0.2 < np.abs(stiff).max() / np.abs(soft).max() < 0.8  # moduli of 45 and 25 kPa, and 35
+
+
+def test_silicone_is_no_skin_but_layers_of_skin_and_own_materials_are():
+    slab = Body()
+    assert slab.is_skin
+    dermis = Layer(thickness=1e-3, material="dermis")
+    assert replace(slab, material="ecoflex", layers=(dermis,)).is_skin
+    assert replace(slab, material=replace(PRESETS["palm"], viscosity=3.0)).is_skin
+    for body in (BODIES["silicone-disc"], replace(slab, material=PRESETS["ecoflex"])):
+        assert body.is_solid
+        assert not body.is_skin
+    assert not BODIES["paper-sheet"].is_solid
 
 
 def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):

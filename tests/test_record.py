@@ -71,7 +71,8 @@ sys.exit(any([main(command) for command in json.loads(sys.argv[1])]))
 
 def on_threads(count, *commands):
     """Commands in one process with so many threads, which keep nothing and find nothing."""
-    limits = dict.fromkeys(THREADS, str(count))
+    # Threads that wait for each other, as they do where others compute, take no time then.
+    limits = dict.fromkeys(THREADS, str(count)) | {"OMP_WAIT_POLICY": "PASSIVE"}
     words = [[*map(str, command), "--quiet", "--no-cache"] for command in commands]
     subprocess.run(
         [sys.executable, "-c", EACH, json.dumps(words)], check=True, env=os.environ | limits
@@ -91,9 +92,8 @@ def test_a_slab_is_the_same_on_one_and_on_two_threads(scene):
         assert same(f"{model}-1", f"{model}-2") == 0
         assert record_of(scene.parent / f"{model}-2")["threads"]["OMP_NUM_THREADS"] == "2"
     scene.unlink()  # the record is enough
-    for count in (1, 2):
-        on_threads(count, ["rerun", f"fem-{count}", "--out", f"again-{count}"])
-        assert same(f"fem-{count}", f"again-{count}") == 0
+    on_threads(2, ["rerun", "fem-2", "--out", "again"])
+    assert same("fem-2", "again") == 0
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ CIRCLING = Tacton(
 @pytest.fixture(scope="module")
 def stiff():
     """A small dynamic stiffness and a right-hand side."""
-    mesh = meshes.block((0.03, 0.03, 0.01), 0.004)
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
     ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     A = ops.K + 1e3 * ops.C + 1e6 * ops.M
     return ops, A, np.random.default_rng(0).standard_normal((A.shape[0], 3))
@@ -176,7 +176,7 @@ def test_the_reduced_model_follows_the_transient_from_rest():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "h"), [("skin", 0.0065), ("sheet", 0.005)])
+@pytest.mark.parametrize(("kind", "h"), [("skin", 0.0065), ("sheet", 0.1 / 16)])
 def test_reduction_alone_costs_less_than_a_thousandth(kind, h):
     """Both marched by the same scheme at the same step, so that only the reduction differs."""
     ops, P, points, S, load, model = reduced_for_circling(kind, h)
@@ -243,7 +243,7 @@ def test_probes_in_one_element_are_no_more_than_what_moves_it():
 
 def test_poles_answer_like_the_model(stiff):
     ops, _, _ = stiff
-    mesh = meshes.block((0.03, 0.03, 0.01), 0.004)
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
     S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
     model = fem.reduce(ops, S, 500.0, 1e-2)
     assert (np.linalg.eigvalsh(model.K) > 0).all()
@@ -318,9 +318,9 @@ def test_a_field_is_the_transients_everywhere():
     body = skinwave.Body(width=0.04, height=0.04, depth=0.01)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path))
     scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0),))
-    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 5 mm"):
-        found = field(scene, np.arange(6) * 3e-3, tolerance=5e-3, h=0.005)
-    build = build_body(body, 0.005)
+    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 6 mm"):
+        found = field(scene, np.arange(6) * 3e-3, tolerance=5e-3, h=0.006)
+    build = build_body(body, 0.006)
     ops = operators(build)
     P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
     states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 5e-5), 0, 301, 60)
@@ -341,7 +341,7 @@ def test_an_unreachable_tolerance_is_said(monkeypatch):
 @pytest.mark.parametrize("name", ["paper-sheet", "skin-slab"])
 def test_fem_and_fem_transient_agree_on_a_scene(name):
     scene = scenes("short", Tacton(am_frequency=210, duration=0.012))[name]
-    scene = replace(scene, body=replace(scene.body, width=0.05, height=0.05))
+    scene = replace(scene, body=replace(scene.body, width=0.05, height=0.05, sides="clamped"))
     h = 0.008 if name == "skin-slab" else 0.005
     reduced = compute(scene, "fem", h=h)
     full = compute(scene, "fem-transient", h=h, dt=2.5e-5)
@@ -358,7 +358,7 @@ def test_preparing_says_what_it_cost(monkeypatch):
     scene = scenes("short", Tacton(am_frequency=210, duration=0.02))["skin-slab"]
     phases = []
     prepared = prepare(
-        scene.body, scene.probe_points, lambda phase, fraction: phases.append(phase), h=0.006
+        scene.body, scene.probe_points, lambda phase, fraction: phases.append(phase), h=0.01
     )
     assert list(dict.fromkeys(phases)) == ["mesh", "assemble", "factorise", "reduce"]
     assert prepared.effort.solver == fem.available()[0]

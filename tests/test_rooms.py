@@ -33,7 +33,17 @@ INNER = {
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"bodies", "models", "planning", "pictures"},
     "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
-    "web": {"bodies", "models", "planning", "pictures", "reports", "studies", "uncertainty"},
+    "web": {
+        "bodies",
+        "measurements",
+        "models",
+        "patterns",
+        "planning",
+        "pictures",
+        "reports",
+        "studies",
+        "uncertainty",
+    },
     "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }
 
@@ -161,6 +171,18 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
     }
     assert not loaded & heavy
     assert {"numpy"} <= loaded
+
+
+@pytest.mark.parametrize("module", ["simulation", "sweeps.sweep", "web.layout"])
+def test_what_few_commands_need_is_loaded_by_these_alone(module):
+    """Each takes a tenth of a second of every process that is started."""
+    if module == "web.layout":
+        pytest.importorskip("trame_vuetify")
+    code = f"import sys, skinwave.{module}\n"
+    code += (
+        "assert not {'scipy.interpolate', 'scipy.optimize', 'matplotlib.figure'} & {*sys.modules}"
+    )
+    subprocess.check_call([sys.executable, "-c", code])
 
 
 def test_help_loads_nothing_heavy():

@@ -277,6 +277,7 @@ def test_a_layers_own_loss_factor_is_warned_of_too():
 def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
     """However long the body has been pushed."""
     text = SHORT.replace("size_x_mm = 60", 'size_x_mm = 30\nbase = "free"\nsides = "absorbing"')
+    text = text.replace("size_y_mm = 60", "size_y_mm = 30")
     scenes = [loads(text.replace("0.05", seconds)) for seconds in ("0.1", "1")]
     found = [refined(scene, scene.body, 0.05, h=0.0075).error for scene in scenes]
     assert found[0] == pytest.approx(found[1], rel=0.02)

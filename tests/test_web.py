@@ -709,7 +709,7 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
         def recv(self):
             if (number := next(questions, None)) is None:
                 raise EOFError
-            return number, None, False
+            return number, None, False, ()
 
         def send(self, content):
             sent.append(content)
@@ -910,16 +910,17 @@ def test_the_first_sentences_say_what_each_difference_changes(session):
     answer = waves.BodyResponses()(session.scene, nothing)
     with session.state:
         told(session, "answer", session.number, answer)
-    propagation, drive, threshold = session.state.summary
+    above, propagation, drive = session.state.summary
     share = float(re.search(r"carry (\d+) %", propagation)[1])
     exact = share_outside(model.kernel_map(session.scene.pressure).rms, answer.map.rms)
     assert share == round(100 * exact)
     assert 5 < share < 60
     assert "not propagation, adds f_" in drive
-    assert "dB re threshold" in threshold
+    assert re.match(r"Above threshold at the point: yes, \+\d+ dB SL at \d+ Hz", above)
     with session.state:
         session.state.body = "none"
-    assert session.state.summary == [drive]
+    assert session.state.summary[1:] == [drive]
+    assert "kernel:" not in session.state.summary[0]
 
 
 def test_answers_carry_the_warnings_of_the_command_line(scene):

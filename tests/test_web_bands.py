@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from simple_model import sensation_level
+from skinwave.cli import main
 from skinwave.scene import BODIES
 from skinwave.scene_file import dumps
 from skinwave.simulation import compute
@@ -27,20 +28,15 @@ def answer(scene):
     return waves.BodyResponses()(scene, lambda *_: None)
 
 
-def all_of(scene, central):
-    return [found for found in Sampler()(scene, central) if found is not None]
+def all_of(scene, central, count=6):
+    return [found for found in Sampler(count)(scene, central) if found is not None]
 
 
-@pytest.fixture
-def few(monkeypatch):
-    monkeypatch.setattr(bands, "SAMPLES", 6)
-    monkeypatch.setattr(bands, "FIRST", 3)
-
-
-def test_samples_are_those_of_the_command_line(few, monkeypatch):
+def test_samples_are_those_of_the_command_line(monkeypatch):
     """Waveforms by tables, from rest, have the lines of steady wavenumber integrals."""
     scene, seen = scene_of(duration=0.4), []
     kept = bands._seen
+    monkeypatch.setattr(bands, "FIRST", 3)
     monkeypatch.setattr(bands, "_seen", lambda *given: seen.append(kept(*given)) or seen[-1])
     first, second, last = all_of(scene, compute(scene, "flat-body"))
     ensemble = propagate(scene, 6)
@@ -68,7 +64,7 @@ def test_motion_is_in_proportion_to_the_pressure(body):
     scene = scene_of(body=body)
     central = compute(scene, "point-kernel")
     central = replace(central, effort=replace(central.effort, seconds={"reduce": 30.0}))
-    last = all_of(scene, central)[-1]
+    last = all_of(scene, central, 64)[-1]
     for k, factor in enumerate((0.5, 2.0)):
         middle = np.abs(central.values[:, 0])
         assert np.abs(last.waveform[k if body else 0]) == pytest.approx(
@@ -79,7 +75,7 @@ def test_motion_is_in_proportion_to_the_pressure(body):
     assert all("about 32 min; skinwave run --samples 64" in said for said in costly)
 
 
-def test_sheets_are_sampled_by_their_modes(few):
+def test_sheets_are_sampled_by_their_modes():
     scene = scene_of(body="paper-sheet")
     last = all_of(scene, compute(scene, "plate-modes-transient"))[-1]
     spreads = spreads_of(scene)
@@ -143,7 +139,7 @@ def test_only_the_newest_request_is_sampled_and_a_change_ends_it(monkeypatch, at
     monkeypatch.setattr(Sampler, "__call__", sampler)
     pipe = Pipe((1, "old", None), (2, "a", None), "later", "later", (3, "b", None), None, "later",
                 (4, "wrong", None), "later", (5, "c", None))  # fmt: skip
-    band_worker.sample_forever(pipe)
+    band_worker.sample_forever(pipe, 6)
     assert begun == ["a", "wrong", "c"], "the old one, and that which was cancelled, are not begun"
     assert pipe.sent == [
         ("bands", 2, "a some"), ("no bands", 4, "no bands: no scene"),
@@ -158,7 +154,7 @@ def session(request):
 
     from skinwave.web.serve import session_of
 
-    made = session_of(get_server(request.node.name, client_type="vue3"))
+    made = session_of(get_server(request.node.name, client_type="vue3"), samples=6)
     made.state.ready()
     made.worker, made.sampler = Mock(), Mock()
     return made
@@ -206,6 +202,19 @@ def test_bands_are_asked_for_after_the_waves_and_go_with_the_next_change(session
     assert session.sampler.cancel.called
     assert session.bands is None
     assert "low" not in session.state.waveform_plot["data"][0]
+
+
+def test_a_page_of_no_samples_asks_for_no_bands(session):
+    session._loop, session.samples = Mock(), 0
+    with session.state:
+        told(session, "answer", session.number, answer(session.scene))
+    assert not session.sampler.ask.called
+
+
+@pytest.mark.parametrize("count", ["-1", "1", "1001"])
+def test_a_number_of_samples_without_bands_is_refused(capsys, count):
+    assert main(["web", "--port", "0", "--samples", count]) == 2
+    assert f"--samples = {count} is outside 2..1000; give 0 for" in capsys.readouterr().err
 
 
 def test_a_band_beyond_all_others_does_not_hide_the_curve(session):

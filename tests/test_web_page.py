@@ -699,8 +699,9 @@ def test_themes_about_and_a_tablet(page):
     assert wide <= 820
 
 
-def test_bands_come_when_nothing_is_changed_and_go_with_the_next_change(bare):
-    page = bare
+def test_bands_come_when_nothing_is_changed_and_go_with_the_next_change(browser):
+    process, address = served("--port", "0")
+    page, _ = opened(browser, address, "?body=none")
     done = "() => window.trame.state.get('uncertainty').some(said => said.includes('numerical'))"
     page.wait_for_function(done)
     band, kernel = drawn(page, "waveform_plot")
@@ -719,7 +720,8 @@ def test_bands_come_when_nothing_is_changed_and_go_with_the_next_change(bare):
     query_has(page, "am=141")
     page.wait_for_function("() => !window.trame.utils.plots.shown.waveform_plot.figure.data[0].low")
     assert ink(page, "waveform_plot").get(shade, 0) < 50
-    page.locator("#uncertainty summary").click()
+    page.close()
+    ended(process)
 
 
 def test_on_a_narrow_screen_all_of_the_bar_is_there_and_the_panel_is_not(page):
@@ -771,7 +773,7 @@ def test_two_pages_do_not_disturb_each_other_and_ask_nothing_of_the_network(
 
 
 def test_a_lost_connection_is_said_and_comes_back(browser):
-    process, address = served("--port", "0")
+    process, address = served("--port", "0", "--samples", "0")
     context = browser.new_context()
     page = context.new_page()
     page.set_default_timeout(PATIENCE)
@@ -779,7 +781,7 @@ def test_a_lost_connection_is_said_and_comes_back(browser):
     page.wait_for_function(READY)
     ended(process)
     page.wait_for_selector("#sw-lost")
-    again, new = served("--port", re.search(r":(\d+)/", address)[1])
+    again, new = served("--port", re.search(r":(\d+)/", address)[1], "--samples", "0")
     page.get_by_text("open the address that `skinwave web` has printed").wait_for()
     context.new_page().goto(new)  # as --open does: it brings the new token
     page.wait_for_function(READY)

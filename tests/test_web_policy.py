@@ -32,7 +32,7 @@ FEW = """
 from skinwave.web import turns
 turns.MOST, turns.AT_ONCE = 2, 1
 from skinwave.cli import main
-main(["web", "--port", "0"])
+main(["web", "--port", "0", "--samples", "0"])
 """
 WAITING = "() => document.querySelector('#sw-waiting')?.innerText.includes('as many as')"
 RAN = "() => [window.ran, document.querySelectorAll('[onerror], [onload], img[src=x]').length]"
@@ -206,7 +206,7 @@ def test_the_token_is_not_on_the_command_line_of_the_browser(browser, tmp_path, 
     monkeypatch.setenv("BROWSER", str(opener))
     scene = tmp_path / "none.toml"
     scene.write_text("[body]\nkind = 'none'\n")
-    process, address = served("--port", "0", "--open", str(scene))
+    process, address = served("--port", "0", "--samples", "0", "--open", str(scene))
     for _ in range(PATIENCE // 100):
         if told.exists():
             break

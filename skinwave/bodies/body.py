@@ -13,6 +13,7 @@ from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.compliance import Compliance
 from simple_model.dispersion import DispersionCurves
+from simple_model.material import NOT_SKIN, PRESETS
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
@@ -236,7 +237,16 @@ class Body:
 
     @property
     def is_skin(self) -> bool:
-        """Whether it is skin: a plate is paper."""
+        """Whether its surface is skin: a plate is paper, and presets such as silicone are none. A
+        material of one's own counts as skin.
+        """
+        top = self.layers[0].material if self.layers else self.material
+        others = [PRESETS[name] for name in NOT_SKIN]
+        return self.is_solid and solid_of(top) not in others
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether it is a solid with waves on its surface, which neither a plate nor "none" is."""
         return self.of_kind.discretise is not None and not self.of_kind.is_plate
 
 

@@ -5,6 +5,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+SAMPLES, MOST = 64, 1000  # of bands
+
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
@@ -12,6 +14,11 @@ def options(parser: argparse.ArgumentParser) -> None:
         "scene", nargs="?", type=Path, metavar="SCENE", help="scene file (TOML) to begin with"
     )
     parser.add_argument("--port", type=int, default=8080, help="0 is any (default: 8080)")
+    parser.add_argument(
+        "--samples", type=int, default=SAMPLES, metavar="N",
+        help="samples of the scene's uncertain numbers, for bands; 0 is no bands "
+        f"(default: {SAMPLES})",
+    )  # fmt: skip
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     parser.add_argument("--debug", action="store_true", help="traceback of an error")
 
@@ -22,6 +29,10 @@ def run(options: argparse.Namespace) -> int:
 
     if not 0 <= options.port <= 65535:
         raise ValueError(f"port = {options.port} is outside 0..65535; leave it out for 8080")
+    if options.samples and not 2 <= options.samples <= MOST:
+        raise ValueError(
+            f"--samples = {options.samples} is outside 2..{MOST}; give 0 for a page without bands"
+        )
     check_extra()
     from skinwave.scene_file import dumps, read
     from skinwave.web import front, scenes
@@ -38,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
                 open_unseen(address, Path(private))
 
         try:
-            front.run(options.port, dumps(scene) if scene is not None else "", ready)
+            text = dumps(scene) if scene is not None else ""
+            front.run(options.port, options.samples, text, ready)
         except KeyboardInterrupt:
             return 0
         except OSError as error:

@@ -93,16 +93,27 @@ def responses(
     candidate: Candidate, modes: PlateModes
 ) -> Iterator[tuple[str, tuple[Floats, Complex]]]:
     """Name of each Tacton, and frequencies (f,) in Hz and displacement (f, p) in metre."""
-    paths: dict[Trajectory, Complex] = {}
+    forces = dict(_modal_forces(candidate, modes))
+    every = [np.concatenate(each) for each in zip(*forces.values(), strict=True)]
     outputs = modes.at(probes(candidate) - middle(candidate))
+    u = steady_response(modes, every[0], every[1], outputs, candidate["loss_factor"])
+    ends = np.cumsum([len(f) for f, _ in forces.values()])[:-1]
+    for (tacton, (f, _)), part in zip(forces.items(), np.split(u, ends), strict=True):
+        yield tacton, (f, part)
+
+
+def _modal_forces(
+    candidate: Candidate, modes: PlateModes
+) -> Iterator[tuple[str, tuple[Floats, Complex]]]:
+    """Name of each Tacton, and frequencies (f,) in Hz and modal forces (f, m)."""
+    paths: dict[Trajectory, Complex] = {}
     for each, tacton in tactons():
         load = pressure(candidate, tacton)
         if tacton.trajectory not in paths:
             paths[tacton.trajectory] = modal_path_forces(modes, load, middle(candidate))
         f, forces = load_lines(load).gather(paths[tacton.trajectory])
         heard = f < 0.5 / TIMES[1]
-        u = steady_response(modes, f[heard], forces[heard], outputs, candidate["loss_factor"])
-        yield each, (f[heard], u)
+        yield each, (f[heard], forces[heard])
 
 
 def as_run(candidate: Candidate, tacton: str, f: Floats, u: Complex) -> Run:

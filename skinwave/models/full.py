@@ -8,7 +8,6 @@ from math import ceil
 
 import numpy as np
 from scipy import sparse
-from scipy.interpolate import CubicSpline
 
 import fem
 from meshes import cache
@@ -167,6 +166,8 @@ def in_time(
     -------
     (t, p) float, in the unit of the quantity
     """
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     asked = scene.reading.asked
     if asked.relaxes:
         each = np.split(stepped, len(solids), axis=1)

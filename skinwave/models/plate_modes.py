@@ -13,7 +13,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.compliance import AIR_DENSITY
 from simple_model.load_spectrum import Complex, load_lines, synthesise
-from simple_model.plate_modes import Plate, PlateModes, plate_modes, steady_response
+from simple_model.plate_modes import Plate, PlateModes, modal_motion, plate_modes
 from simple_model.plate_response import modal_path_forces
 from simple_model.sampling import shown
 from skinwave.bodies.body import Body
@@ -70,14 +70,15 @@ class Driven:
 def steady_answer(scene: Scene, request: Request) -> Response:
     """Steady state of the modes under every line of the load below half the sampling rate."""
     started, driven = time.perf_counter(), _driven(scene, request)
-    values = _steady(scene, driven, request.times)
+    values = _steady(scene, driven, _motion(scene, driven), request.times)
     return _response(scene, request, MODES.name, driven, values, started)
 
 
 def answer_from_rest(scene: Scene, request: Request) -> Response:
     """The steady state and the free vibration that a start from rest leaves."""
     started, driven = time.perf_counter(), _driven(scene, request)
-    values = _steady(scene, driven, request.times) + _transient(scene, driven, request.times)
+    motion, times = _motion(scene, driven), request.times
+    values = _steady(scene, driven, motion, times) + _transient(scene, driven, motion, times)
     return _response(scene, request, FROM_REST.name, driven, values, started)
 
 
@@ -108,26 +109,31 @@ def _response(
     )  # fmt: skip
 
 
-def _steady(scene: Scene, driven: Driven, times: Floats) -> Floats:
+def _motion(scene: Scene, driven: Driven) -> Complex:
+    """Steady modal coordinates (f, m) of all lines."""
+    eta = loss_factor(scene.body, driven.frequencies)
+    return modal_motion(driven.modes, driven.frequencies, driven.forces, eta)
+
+
+def _steady(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
     """Steady state (t, p)."""
     f = driven.frequencies
-    lines = steady_response(
-        driven.modes, f, driven.forces, driven.outputs, loss_factor(scene.body, f)
-    )
-    return synthesise(f, lines * scene.reading.asked.factor(2j * np.pi * f)[:, None], times)
+    rates = scene.reading.asked.factor(2j * np.pi * f)[:, None]
+    return synthesise(f, motion @ driven.outputs.T * rates, times)
 
 
-def _transient(scene: Scene, driven: Driven, times: Floats) -> Floats:
-    """Free vibration (t, p) that ends the state of rest before t = 0: of each mode, at its pole
-    s = w (i sqrt(1 - (eta/2)^2) - eta/2) with the loss factor that it has at its own frequency.
+def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
+    """Free vibration (t, p) that ends the state of rest before t = 0: of each mode Re a exp(s t),
+    at its pole s = w (i sqrt(1 - (eta/2)^2) - eta/2) with the loss factor that it has at its own
+    frequency.
     """
     w = np.sqrt(driven.modes.squared)
     half = loss_factor(scene.body, w / (2 * np.pi)) * driven.modes.elastic / 2
     poles = w * (1j * np.sqrt(np.maximum(1 - half**2, EPSILON)) - half)
-    iw = 2j * np.pi * driven.frequencies[:, None]
-    # As in `fem.line_response`; the impulse response of a mode is 2 Re(exp(s t) / (s - s*)).
-    start = driven.forces / (iw - poles) + driven.forces.conj() / (-iw - poles)
-    start = -start.sum(axis=0) / (2j * poles.imag) * scene.reading.asked.factor(poles)
+    rates = 2j * np.pi * driven.frequencies
+    place, speed = motion.real.sum(axis=0), (rates @ motion).real
+    start = -place + 1j * (speed - poles.real * place) / poles.imag
+    start = start * scene.reading.asked.factor(poles)
     return fem.exponential_sum(poles, start[:, None] * driven.outputs.T, times)
 
 

@@ -16,7 +16,7 @@ from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.numbers import significant
-from skinwave.pictures.styles import LABELS, NARROW, STYLES, TEXT, Style
+from skinwave.pictures.styles import LABELS, NARROW, SHOWN, STYLES, TEXT, Style
 from skinwave.run import Run
 
 # Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
@@ -39,7 +39,6 @@ IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
 SETTLE = 0.25  # of the response, before which it is not looked at
-SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
 
 
 def png(figure: Figure, dpi: int = 110) -> bytes:

@@ -15,6 +15,7 @@ LABELS = {
 }
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
+SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
 NARROWEST, WIDEST = 2.0, 15.0  # inch of a figure
 NARROW = 5.0  # inch: narrower figures have one column of panels
 ONE_COLUMN = 6.5  # inch of letters of 10 points: wider figures take two columns in print

@@ -7,7 +7,7 @@ import numpy as np
 from fem.coat import Coat
 from simple_model.focus import spot_width
 from skinwave.bodies.analytic import is_flat_layer
-from skinwave.bodies.coat import AT, layer_name
+from skinwave.bodies.coat import AT, layer_name, thicknesses
 from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import air_mass
@@ -88,10 +88,10 @@ def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[P
 
 
 def coat_rows(body: Body, h: float) -> list[PlanRow]:
-    """Top layers that are a coat, and why."""
+    """Top layers that are a coat, those that have elements, and why."""
     coat = coat_of(body, h)
     if coat is None:
-        return []
+        return _volume_rows(body, h, 0)
     return [
         PlanRow(
             what="coat",
@@ -102,6 +102,23 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
             reason=f"a Kirchhoff shell on the surface: thinner than half an element of "
             f"{1e3 * h:.3g} mm, and than a tenth of a shear wavelength at {AT:g} Hz"
             + _of_stiffness(body, coat),
+        ),
+        *_volume_rows(body, h, len(coat.materials)),
+    ]
+
+
+def _volume_rows(body: Body, h: float, coated: int) -> list[PlanRow]:
+    """Layers below a coat of so many, which have elements, and why."""
+    layers = list(zip(body.strata, thicknesses(body.strata), strict=True))[coated:-1]
+    if not layers:
+        return []
+    why = "those of a slab are as flat as its layers are thin"
+    return [
+        PlanRow(
+            what="layers",
+            value=" and ".join(f"{layer_name(body, m)} of {1e3 * t:g} mm" for (_, m), t in layers),
+            reason="elements of their own: "
+            + (why if body.of_kind.conforming else f"half an element of {1e3 * h:.3g} mm or more"),
         )
     ]
 

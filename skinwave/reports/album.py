@@ -1,12 +1,12 @@
 """A scene's responses by all models that pictures show side by side, in a folder.
 
 scene.toml  plan.json  trust.json  lines.csv
-COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz
+COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz  map.npz
 """
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,9 @@ from skinwave.pictures.views import (
     shaded,
 )
 from skinwave.planning.plan import Plan, plan
+from skinwave.quantity_map import QuantityMap, map_of_motion
+from skinwave.quantity_map import load as load_map
+from skinwave.quantity_map import save as save_map
 from skinwave.run import Run
 from skinwave.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.scene_file import dumps, read
@@ -53,7 +56,8 @@ CASES = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a seco
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Album:
     """Contents of a folder: runs; views by body, where there are any; the plan, how far its
-    response agrees with the pictures, and the command that made it, where these were saved.
+    response agrees with the pictures, and the command that made it, where these were saved; maps
+    by body, of another quantity than the displacement of the surface.
     """
 
     title: str
@@ -62,6 +66,7 @@ class Album:
     views: Mapping[str, View]
     planned: Mapping[str, Any] | None
     trust: Mapping[str, Any] | None
+    maps: Mapping[str, QuantityMap] = field(default_factory=dict)
 
 
 def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
@@ -126,7 +131,7 @@ def make(
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs = []
     for view, run in answers(scene, shown, progress, h=h, solver=solver, frames=frames):
-        also = None if view is None else partial(_keep_view, view)
+        also = None if view is None else partial(keep_view, view)
         write_run(folder / run.column, run, by="waves", also=also)
         runs.append(run)
     write_lines(folder / "lines.csv", runs)
@@ -134,8 +139,11 @@ def make(
     return worst_warnings((run.body, run.response.effort) for run in runs)
 
 
-def _keep_view(view: View, folder: Path) -> None:
+def keep_view(view: View, folder: Path) -> None:
+    """A view in a file, and the map of another quantity that its probes read."""
     save(folder / "view.npz", view)
+    if view.moved is not None and not (scene := view.scene).reading.is_plain:
+        save_map(folder / "map.npz", map_of_motion(scene, view.moved.driven))
 
 
 def answers(
@@ -239,12 +247,14 @@ def open_album(folder: Path) -> Album:
         missing = f"{folder} holds no {record.RESPONSES[0]}"
         raise ValueError(f"{missing}; give a scene file or a result folder")
     views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
-    own = folder / "scene.toml"
+    own, scenes_of = folder / "scene.toml", {run.column: run.scene for run in runs}
+    kept = {path.parent.name: path for path in sorted(folder.glob("*/map.npz"), key=_order)}
     scene = read(own) if own.exists() else runs[-1].scene
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
         views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
         trust=_json(folder / "trust.json", TRUST),
+        maps={name: load_map(kept[name], scenes_of[name]) for name in kept if name in scenes_of},
     )  # fmt: skip
 
 

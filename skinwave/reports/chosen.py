@@ -24,4 +24,5 @@ def only(album: Album, columns: Sequence[str]) -> Album:
         album,
         runs=[run for run in album.runs if run.column in wanted],
         views={name: view for name, view in album.views.items() if name in wanted},
+        maps={name: found for name, found in album.maps.items() if name in wanted},
     )

@@ -29,6 +29,7 @@ from skinwave.studies.claims import claimed, evaluate
 from skinwave.studies.dispersion_page import page_parts
 from skinwave.studies.driven_modes import driven_modes
 from skinwave.studies.lines_table import lines_table
+from skinwave.studies.quantity_map_page import CAPTION, quantity_figure, sentences
 from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
 
 ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be assessed
@@ -70,6 +71,7 @@ def write_report(
         *map(document.paragraph, description.other_quantity(album.scene)),
         _asked(album),
         document.section("What was modelled, and what was left out", *_modelled(album)),
+        *mapped(album, gallery),
         document.section("What comes out", *views),
         document.section("What the probes see", *drawn, *map(lines_table, groups.values())),
         *_guided(album, gallery),
@@ -129,6 +131,17 @@ def _write_data(folder: Path, album: Album) -> None:
                 write_sound(folder, run.response, strongest_probe([run]))
     for view in album.views.values():
         write_field(folder, view)
+
+
+def mapped(album: Album, gallery: Gallery) -> list[str]:
+    """Maps of the quantity that the probes read, where it is not the motion of the surface."""
+    scenes = {run.column: run.scene for run in album.runs}
+    parts: list[str] = []
+    for name, found in album.maps.items():
+        caption = f"{label(name)}: {' '.join(sentences(scenes[name], found))} {CAPTION}"
+        figure = quantity_figure(scenes[name], found, gallery.style)
+        parts.append(gallery.figure(f"quantity-{folder_name(name)}", figure, caption))
+    return [document.section("Where the quantity is largest", *parts)] if parts else []
 
 
 def _asked(album: Album) -> str:

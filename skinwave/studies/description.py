@@ -211,6 +211,6 @@ def other_quantity(scene: Scene) -> list[str]:
     return [
         f"Probes read {scene.reading.words}, in {scene.reading.asked.shown}; "
         f"{without_kernel(scene)}: its columns are in Pa, and that of the quantity in lines.csv is "
-        "empty. Pictures of the surface show its motion; claims and sensation levels, which are of "
-        "displacement, are left out of bodies."
+        "empty. Pictures of the surface but for maps of the quantity show its motion; claims and "
+        "sensation levels, which are of displacement, are left out of bodies."
     ]

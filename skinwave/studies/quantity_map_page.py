@@ -15,7 +15,7 @@ from skinwave.pictures.maps import SEQUENTIAL, draw_path
 from skinwave.pictures.styles import Style
 from skinwave.plain_text import csv_table
 from skinwave.propagation import NEAR, distance_from_path
-from skinwave.quantity_map import QuantityMap
+from skinwave.quantity_map import QuantityMap, save
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
 
@@ -62,7 +62,7 @@ def write(folder: Path, scene: Scene, found: QuantityMap) -> None:
     )
     header = ("x_mm", "y_mm", f"rms_{found.asked.column}")
     (folder / "map.csv").write_bytes(csv_table(header, rows))
-    np.savez(folder / "map.npz", x=found.x, y=found.y, rms=found.rms, depth=found.depth)
+    save(folder / "map.npz", found)
     parts = [
         *map(document.paragraph, sentences(scene, found)),
         document.picture(drawn, CAPTION),

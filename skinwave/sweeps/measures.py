@@ -81,7 +81,7 @@ def commanded(case: DesignPoint) -> dict[str, Any]:
             "probe_x_mm": [1e3 * x for x, _ in case.scene.probes],
             "probe_y_mm": [1e3 * y for _, y in case.scene.probes],
         }
-        if body.is_skin:
+        if body.is_solid:
             row["rayleigh_speed_m_per_s"] = body.solid.rayleigh_speed
     return row
 

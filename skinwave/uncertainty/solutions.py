@@ -22,7 +22,7 @@ from skinwave.bodies.analytic import exact_waves
 from skinwave.models import named
 from skinwave.models.flat_body import HARMONIC
 from skinwave.models.prepared import sample_times
-from skinwave.pictures.figures import SHOWN
+from skinwave.pictures.styles import SHOWN
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.surface import REACH, SILENT, grid, has_wavenumber_integral

@@ -134,7 +134,7 @@ def exact_circles() -> Case:
 def circling_on_skin(solid: fem.Material = SKIN, name: str = "skin") -> Case:
     """AM and circling focus on a bonded layer, of forearm unless another law is given."""
     depth = 0.010
-    across = meshes.graded_axis(0.07, 0.0025, meshes.Grading(radius=0.02, growth=1.3))
+    across = meshes.graded_axis(0.07, 0.003, meshes.Grading(radius=0.02, growth=1.3))
     mesh = meshes.extrude(across, across, np.linspace(-depth, 0, 5))
     load = circling(0.02, 12.0, am=140.0)
     return _beside_exact_waves(

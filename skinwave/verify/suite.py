@@ -33,13 +33,13 @@ from skinwave.verify.page import page
 FREE, DILATING = fields.divergence_free, fields.dilating
 FIELDS = {
     "divergence-free-0.3": (0.3, (4, 8, 12), {"divergence-free": (FREE, (1e-3, 2e-2))}),
-    "dilating-0.3": (0.3, (6, 10, 14), {"dilating": (DILATING, (5e-4, 1e-2))}),
+    "dilating-0.3": (0.3, (6, 9, 13), {"dilating": (DILATING, (5e-4, 1e-2))}),
     "fields-0.49": (
         0.49, (6, 10, 14),
         {"divergence-free": (FREE, (5e-4, 1e-2)), "dilating": (DILATING, (2e-3, 0.03))},
     ),
     "fields-0.4999": (
-        0.4999, (8, 12, 16),
+        0.4999, (6, 10, 15),
         {
             "divergence-free": (FREE, (5e-4, 1e-2)),
             "balanced": (fields.balanced, (5e-4, 1e-2)),

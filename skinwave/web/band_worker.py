@@ -5,6 +5,7 @@ lowest priority, and only as long as nothing is changed.
 import contextlib
 import os
 import threading
+from functools import partial
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import Any
@@ -18,9 +19,9 @@ BANDS, FAILED = "bands", "no bands"  # what is told
 END = object()  # of what is asked
 
 
-def sample_forever(pipe: Connection) -> None:
-    """Sample requests (number, scene, response), the newest alone, until the other end is closed;
-    None cancels. What is said to it ends what it is at after the sample at hand.
+def sample_forever(pipe: Connection, samples: int) -> None:
+    """So many samples of requests (number, scene, response), the newest alone, until the other end
+    is closed; None cancels. What is said to it ends what it is at after the sample at hand.
 
     Sends ("bands", number, Bands), or ("no bands", number, sentence).
     """
@@ -29,7 +30,7 @@ def sample_forever(pipe: Connection) -> None:
     end_with_parent()
     with contextlib.suppress(AttributeError, OSError):
         os.nice(LEAST_PRIORITY)
-    sampler = Sampler()
+    sampler = Sampler(samples)
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
             asked = pipe.recv()
@@ -56,8 +57,8 @@ class BandWorker:
     with what the other one tells.
     """
 
-    def __init__(self, told: Told) -> None:
-        self._told = told
+    def __init__(self, told: Told, samples: int) -> None:
+        self._told, self._samples = told, samples
         self._process: Any = None
         self._asked: SimpleQueue[Any] = SimpleQueue()
 
@@ -66,7 +67,7 @@ class BandWorker:
         was requested before.
         """
         if self._process is None or not self._process.is_alive():
-            self._process, pipe = started(sample_forever, threads=1)
+            self._process, pipe = started(partial(sample_forever, samples=self._samples), threads=1)
             self._asked = SimpleQueue()
             for work in (self._listen, self._send):
                 threading.Thread(target=work, args=(pipe, self._asked), daemon=True).start()

@@ -34,9 +34,7 @@ from skinwave.web.model import FAINTEST_LEVEL, HIGHEST
 from skinwave.web.slabs import Table, is_tabulated, lowest, tabulate, wavenumbers
 from skinwave.web.waves import flat_motion
 
-SAMPLES = 64
-FIRST = 16  # after which there are bands to be seen, which the others refine
-TABLES = SAMPLES + 1  # that are kept
+FIRST = 16  # samples after which there are bands to be seen, which the others refine
 EXACT = 2e-3  # relative error of a waveform by a table
 NOT_SAMPLED = "since nothing that can be sampled here is uncertain"
 FIXED = ("tacton.duration_s",)  # samples have one length
@@ -54,7 +52,7 @@ class Bands:
     times, frequencies : (t,) float, s, and (f,) float, Hz; empty if nothing is sampled
     waveform, spectrum : (2, t) and (2, f) float
     levels : the two of the sensation level in dB of each named line; none of what is no skin
-    done : samples so far, of `SAMPLES`
+    done : samples so far
     sentences : what is uncertain, and by how much
     """
 
@@ -77,9 +75,10 @@ class Sample:
 
 
 class Sampler:
-    """Bands of scenes; caches the tables of flat bodies."""
+    """Bands of so many samples of scenes; caches the tables of flat bodies."""
 
-    def __init__(self) -> None:
+    def __init__(self, samples: int) -> None:
+        self.samples = samples
         self._tables: dict[tuple[Body, float], Table] = {}
 
     def __call__(self, scene: Scene, central: Response) -> Iterator[Bands | None]:
@@ -90,21 +89,21 @@ class Sampler:
         spreads, left_out = _parted(spreads_of(scene), respond is not None)
         if all(spread.key == PRESSURE for spread in spreads):
             respond = None
-        said = (*_who(spreads), *_cost(left_out, central))
+        said = (*_who(spreads, self.samples), *_cost(left_out, self.samples, central))
         if not spreads:
             yield Bands(sentences=(f"Uncertainty: no bands, {NOT_SAMPLED}.", *said))
             return
         names = method_of(scene, central.model).lines
         keys, found = [spread.key for spread in spreads], list[Sample]()
         middle = _seen(scene, central, names)
-        for row in samples(spreads, SAMPLES):
+        for row in samples(spreads, self.samples):
             sample = with_values(scene, dict(zip(keys, map(float, row), strict=True)))
             found.append(
                 _seen(sample, respond(sample), names) if respond
                 else _scaled(middle, _pressure(sample) / _pressure(scene))
             )  # fmt: skip
-            first = f"Uncertainty: bands of {len(found)} of {SAMPLES} samples."
-            some = len(found) in (FIRST, SAMPLES)
+            first = f"Uncertainty: bands of {len(found)} of {self.samples} samples."
+            some = len(found) in (FIRST, self.samples)
             yield _bands(scene, central, found, names, (first, *said)) if some else None
         budget = error_budget(scene, _numerical(scene, central))
         if respond and isnan(budget.material):
@@ -129,7 +128,7 @@ class Sampler:
             table = tabulate(wavenumbers(key[0], lowest(key[1]), silent), key[1])
             table = replace(table, g=table.g.astype(np.complex64))
         self._tables[key] = table  # the newest is last
-        while len(self._tables) > TABLES:
+        while len(self._tables) > self.samples + 1:  # those of one scene
             del self._tables[next(iter(self._tables))]
         times, probes = sample_times(sample), sample.probe_points
         motion = flat_motion(table, sample.pressure, probes[0], times)
@@ -201,24 +200,24 @@ def _above(levels: Floats) -> tuple[str, ...]:
     )
 
 
-def _who(spreads: Sequence[Spread]) -> tuple[str, ...]:
+def _who(spreads: Sequence[Spread], count: int) -> tuple[str, ...]:
     """Sentence on what is uncertain."""
     if not spreads:
         return ()
     keys = ", ".join(f"{s.key} ({s.distribution.words})" for s in spreads)
-    return (f"The bands are 5 to 95 % of {SAMPLES} samples of {keys}.",)
+    return (f"The bands are 5 to 95 % of {count} samples of {keys}.",)
 
 
-def _cost(left_out: Sequence[Spread], central: Response) -> tuple[str, ...]:
+def _cost(left_out: Sequence[Spread], count: int, central: Response) -> tuple[str, ...]:
     """Sentence on what is uncertain and not in the bands, and what samples of it would cost."""
     if not left_out:
         return ()
-    seconds = SAMPLES * sum(central.effort.seconds.values())
+    seconds = count * sum(central.effort.seconds.values())
     time = f", about {significant(seconds / 60, 2)} min" if seconds else ""
     keys = ", ".join(s.key for s in left_out)
     return (
-        f"The spread of {keys} is not in the bands: each of {SAMPLES} samples would be computed "
-        f"anew{time}; skinwave run --samples {SAMPLES} does.",
+        f"The spread of {keys} is not in the bands: each of {count} samples would be computed "
+        f"anew{time}; skinwave run --samples {count} does.",
     )
 
 

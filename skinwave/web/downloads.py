@@ -12,11 +12,14 @@ from simple_model.choices import choose
 from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from skinwave.exports import sampled, waveform_table
+from skinwave.patterns import Options
+from skinwave.patterns.conversion import write_pattern
 from skinwave.processes import apart
 from skinwave.scene import BODIES, Scene, body_name, with_body
 from skinwave.scene_file import dumps
 from skinwave.web.model import REACH, Answer, drawn_paths, influenced
 
+PATTERNS = (".adaptics", ".py", ".csv")
 FORMATS = ("svg", "png", "pdf")  # matplotlib knows others, some of which start a program
 
 
@@ -46,9 +49,17 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
         "scene_toml": lambda: dumps(session.scene).encode(),
         "waveform_csv": lambda: csv_of(there()),
         "waveform_wav": lambda: wav_of(there()[-1]),
+        "pattern": lambda suffix: pattern_of(session.scene, suffix),
         "figure": figure,
         "report": report,
     }
+
+
+def pattern_of(scene: Scene, suffix: str) -> bytes:
+    """The Tacton for a device or its software, as `skinwave convert` writes it; raises a
+    ValueError if the format cannot express it.
+    """
+    return write_pattern(scene, choose("format of a pattern", str(suffix), PATTERNS), Options())[0]
 
 
 async def elsewhere(make: Callable[..., bytes], *given: Any) -> bytes:

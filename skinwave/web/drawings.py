@@ -13,6 +13,8 @@ from simple_model import Tacton
 from simple_model.joined import parted
 from skinwave.web.model import Answer, AreaMap
 
+DEEPEST = 30.0  # dB, of differences
+LEAST = 10 ** (-DEEPEST / 20)  # of the largest: what is less counts as that
 NO_BANDS: Mapping[str, tuple[float, float]] = {}
 # Of 255; red into the body and blue out of it, as in the pictures of a report. Also in body.js.
 INTO, OUT, STILL = (
@@ -22,12 +24,27 @@ INTO, OUT, STILL = (
 
 def picture(found: AreaMap) -> str:
     """RMS of a map as the address of a PNG, from dark (none) to light (its largest)."""
-    from PIL import Image
-
     largest = float(np.nanmax(found.rms, initial=0.0)) or 1.0
     relative = np.nan_to_num(found.rms / largest)
-    image = np.dstack([_shades()[np.round(255 * relative).astype(int)],
-                       np.where(np.isnan(found.rms), 0, 255)])  # fmt: skip
+    return _png(_shades()[np.round(255 * relative).astype(int)], np.isnan(found.rms))
+
+
+def difference(found: AreaMap, reference: AreaMap) -> str:
+    """Difference of the RMS levels of two maps, each re its own largest, as the address of a PNG:
+    blue where the first is less, red where it is more, by `DEEPEST` dB.
+    """
+    levels = [20 * np.log10(np.maximum(each.rms / (np.nanmax(each.rms, initial=0.0) or 1.0), LEAST))
+              for each in (found, reference)]  # fmt: skip
+    part = np.clip(np.nan_to_num(levels[0] - levels[1]) / DEEPEST, -1, 1)[..., None]
+    way = np.where(part > 0, INTO, OUT)
+    return _png(STILL + np.abs(part) * (way - STILL), np.isnan(found.rms))
+
+
+def _png(colours: Floats, outside: NDArray[np.bool_]) -> str:
+    """Colours (y, x, 3) of 0..255, transparent where it is outside, as the address of a PNG."""
+    from PIL import Image
+
+    image = np.dstack([colours, np.where(outside, 0, 255)])
     buffer = BytesIO()
     Image.fromarray(image[::-1].astype(np.uint8)).save(buffer, format="png")
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
@@ -114,4 +131,5 @@ def _signed_shades() -> str:
 
 
 SEQUENTIAL = _gradient(_shades()[::15], np.linspace(0, 1, 18))
+DIVERGING = _gradient(np.array([OUT, STILL, INTO]), np.array([0.0, 0.5, 1.0]))
 SIGNED = _signed_shades()

@@ -40,9 +40,12 @@ UNSTARTED = "The process of this page did not start; reload the page."
 
 
 class Front:
-    """Pages and the processes behind them; `scene` is the text of a scene that all begin with."""
+    """Pages and the processes behind them; `samples` are those of their bands, `scene` is the text
+    of a scene that all begin with.
+    """
 
-    def __init__(self, scene: str = "", token: str = "") -> None:
+    def __init__(self, samples: int = 0, scene: str = "", token: str = "") -> None:
+        self.samples = samples
         self.scene = scene
         self.token = token or secrets.token_urlsafe(24)
         self.turns = Turns()
@@ -86,7 +89,8 @@ class Front:
             return _refused(said, 503)
         self.turns.begin(name)
         page = None
-        opening = asyncio.create_task(self._opened({"scene": self.scene, "query": query}))
+        wanted = {"scene": self.scene, "query": query, "samples": self.samples}
+        opening = asyncio.create_task(self._opened(wanted))
         self._opening.add(opening)
         try:
             page = await opening
@@ -250,8 +254,15 @@ def served() -> tuple[dict[str, str], str]:
     return {**vuetify.serve, **STATIC_ROUTE}, str(client.www)
 
 
-def run(port: int, scene: str = "", ready: Callable[[str], None] = print) -> None:
-    """Serve pages at 127.0.0.1 until interrupted; `ready` is told the address.
+def run(port: int, samples: int, scene: str = "", ready: Callable[[str], None] = print) -> None:
+    """Serve pages at 127.0.0.1 until interrupted.
+
+    Parameters
+    ----------
+    port : 0 is any
+    samples : of each page's bands; 0 is none
+    scene : text of a scene that all pages begin with
+    ready : is told the address
 
     Raises
     ------
@@ -260,7 +271,7 @@ def run(port: int, scene: str = "", ready: Callable[[str], None] = print) -> Non
     """
 
     async def forever() -> None:
-        front, ended = Front(scene), asyncio.Event()
+        front, ended = Front(samples, scene), asyncio.Event()
         runner = web.AppRunner(
             front.app(*served()), shutdown_timeout=LAST, handler_cancellation=True,
             auto_decompress=False,

@@ -12,6 +12,8 @@ from trame_vuetify.module import v3
 from simple_model.drive import DRIVES
 from simple_model.quantities import QUANTITIES
 from skinwave.web import controls, drawings
+from skinwave.web.examples import EXAMPLES
+from skinwave.web.help import HELP
 from skinwave.web.plots import SPANS
 from skinwave.web.session import Session
 from skinwave.web.shown import HIGHEST, THIRD
@@ -66,7 +68,8 @@ def lay_out(session: Session) -> None:
         session.server.enable_module(module)
     text = PAGE.render(
         numbers=controls.NUMBERS, presets=controls.presets(),
-        sequential=drawings.SEQUENTIAL, signed=drawings.SIGNED,
+        sequential=drawings.SEQUENTIAL, signed=drawings.SIGNED, diverging=drawings.DIVERGING,
+        helps=HELP, examples=EXAMPLES,
     )  # fmt: skip
     session.state.update({
         **ITEMS, "trame__title": "skinwave", "trame__template_error": LOST,

@@ -48,10 +48,12 @@ SMOOTH = 16  # and of the fastest modulation, whose peaks are then within 2 %
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AreaMap:
     """A quantity over the area: `rms` (y, x) of it about its mean, in its unit, NaN outside the
-    body, and its detection contour, closed lines (k, 2) in metre.
+    body, the highest sensation `level` (y, x) in dB of its lines, and the detection contour, where
+    that is 0, closed lines (k, 2) in metre.
     """
 
     rms: Floats
+    level: Floats
     threshold: tuple[Floats, ...]
 
 
@@ -166,8 +168,8 @@ def kernel_map(pressure: MovingPressure) -> AreaMap:
     f, amplitudes = f[f > 1e-6], np.abs(amplitudes[f > 1e-6])
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
-    highest = level.max(axis=0, initial=-np.inf).reshape(SIDE, SIDE)
-    return AreaMap(rms=rms, threshold=borderline(np.maximum(highest, FAINTEST_LEVEL), 0.0))
+    highest = level.max(axis=0, initial=FAINTEST_LEVEL).reshape(SIDE, SIDE)
+    return AreaMap(rms=rms, level=highest, threshold=borderline(highest, 0.0))
 
 
 def mean_level(pressure: MovingPressure) -> float:

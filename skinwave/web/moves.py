@@ -10,14 +10,16 @@ from typing import Any
 
 from simple_model.choices import choose
 from skinwave.scene_file import loads
-from skinwave.web import controls, model, scenes, shown
+from skinwave.web import controls, measured, model, scenes, shown
 from skinwave.web.asked import numbers
 from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, Values
 from skinwave.web.downloads import offered
+from skinwave.web.examples import EXAMPLES
 from skinwave.web.history import History
 from skinwave.web.layer_values import text_of
+from skinwave.web.level_view import LEVELS
 from skinwave.web.paths import STARTS_AT, fitted
-from skinwave.web.session import Session, draw, put, refresh, solid, take
+from skinwave.web.session import Session, draw, put, refresh, solid, take, vary
 
 SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
 LIKE = 20.0  # mm: paths of several foci begin no larger, to have place beside each other
@@ -28,15 +30,16 @@ LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 def connect(session: Session) -> None:
     """Have a page's session follow what is done on it, and compute its first response."""
     watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
-        (controlled, KEYS), (hold, ("hold",)), (look, ("span", "highest", "third")),
+        (controlled, KEYS), (hold, ("hold",)),
+        (look, ("span", "highest", "third", "decibel", "against")),
         (phase, ("phase",)), (solid, ("solid",)), (opened, ("opened",)),
-        (published, ("published",)),
+        (published, ("published",)), (measurement, ("measured_file",)),
     )  # fmt: skip
     for answered, keys in watched:
         session.state.change(*keys)(_without_state(answered, session))
     for move in (
         entered, select, restart, zoom, follow, own_path, own_layer, preset, undo, redo, pin,
-        exchange, cancel,
+        exchange, cancel, highest_level, example,
     ):  # fmt: skip
         session.server.trigger(move.__name__)(partial(move, session))
     for name, made in offered(session).items():
@@ -172,6 +175,7 @@ def pin(session: Session) -> None:
     session.pinned = () if session.pinned else session.answers
     if session.pinned:
         session.state.pinned_query = controls.to_query(session.values)
+        session.state.pinned_path = session.state.path
     session.state.pinned = bool(session.pinned)
     draw(session)
 
@@ -180,7 +184,7 @@ def exchange(session: Session) -> None:
     """Go to what is pinned, and pin what was shown instead."""
     back, kept = session.state.pinned_query, controls.to_query(session.values)
     session.pinned = session.answers
-    session.state.pinned_query = kept
+    session.state.update({"pinned_query": kept, "pinned_path": session.state.path})
     take(session, controls.values_in(back))
 
 
@@ -228,6 +232,43 @@ def published(session: Session) -> None:
 def look(session: Session) -> None:
     """Another view of the same response is to be seen."""
     session.zoomed = None
+    before = session.variants
+    vary(session)
+    if session.variants and not before and session.scene.body.of_kind.discretise:
+        session.ask()
+    draw(session)
+
+
+def highest_level(session: Session) -> None:
+    """Set the control, over which levels are shown, to the value with the highest."""
+    if session.levels is not None and session.levels.best is not None:
+        key = LEVELS[session.levels.view][0]
+        turn(session, {key: round(session.levels.best, 2)})
+
+
+def example(session: Session, name: str) -> None:
+    """Take a worked example."""
+    choose("example", str(name), EXAMPLES)
+    restart(session, EXAMPLES[str(name)].query)
+
+
+def measurement(session: Session) -> None:
+    """A file of a measurement was chosen or dropped: shown beside the models, or taken away."""
+    given = session.state.measured_file
+    if not given:
+        if session.measured is not None and given is not None:
+            session.measured = None
+            draw(session)
+        return
+    one = given[0] if isinstance(given, list) else given
+    content = one.get("content", b"")
+    content = content if isinstance(content, bytes) else b"".join(content)
+    try:
+        session.measured = measured.read(str(one.get("name", "")), content)
+    except ValueError as error:
+        session.state.problem = f"the measurement cannot be read: {error}"
+        return
+    session.state.problem = ""
     draw(session)
 
 

@@ -5,7 +5,7 @@ and its `range`, curves in `data`, and `names` over lines. A curve's `role` give
 which is the page's own. Zooming is forgotten when `kept` changes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,12 +13,15 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, threshold
-from simple_model.quantities import DISPLACEMENT
+from simple_model.quantities import DISPLACEMENT, Quantity
 from simple_model.response import step
 from simple_model.threshold import BAND, HIGHEST, LOWEST, pressure_threshold
+from skinwave.measurements import Measurement
 from skinwave.pictures.styles import LABELS
+from skinwave.web import measured
 from skinwave.web.bands import Bands
 from skinwave.web.drawings import written
+from skinwave.web.levels import Levels
 from skinwave.web.model import Answer, commanded_curve, peaks, thinned
 
 DIGITS = 5  # of the largest number of a curve that are sent
@@ -28,6 +31,7 @@ SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (
          "all": (0.0, np.inf)}  # fmt: skip
 BESIDE = 2.5  # of the largest of the curves: what is seen of a band
 ROOM = 1.4  # of the tallest line of a spectrum, for names above it
+DYNAMIC = 80.0  # dB below the tallest line that are seen
 KERNEL = f"{LABELS['point-kernel']}, Pa"
 PlotlyFigure = dict[str, Any]
 
@@ -35,8 +39,8 @@ PlotlyFigure = dict[str, Any]
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
     """Responses in one plot: the `kernel` under the load of the `waves`, which are of other
-    controls while `stale`; the kernel as `published`; those that are `pinned`; and the `bands` of
-    the waves or, without any, of the kernel.
+    controls while `stale`; the kernel as `published`; those that are `pinned`; the `bands` of the
+    waves or, without any, of the kernel; `levels` over a control; and what was `measured`.
     """
 
     kernel: Answer
@@ -45,6 +49,8 @@ class Curves:
     pinned: Sequence[Answer] = ()
     bands: Bands | None = None
     stale: bool = False
+    levels: Levels | None = None
+    measured: Measurement | None = None
 
 
 def numbers(values: Floats) -> list[float]:
@@ -105,6 +111,7 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> PlotlyFigure:
         shown = (times >= span[0]) & (times <= span[1] + 0.5 * step(times))
         t, y = thinned(times[shown], answer.response.values[shown, 0])
         data.append({"x": numbers(1e3 * t), "y": numbers(_in_unit(answer) * y), **style})
+    data += _measured(curves, measured.waveform, 1e3, span)
     return {
         "title": "Waveform at the point", "data": data, "kept": f"{span}", "legend": True,
         "x": {"said": "time, ms", "range": [1e3 * float(end) for end in span]},
@@ -126,6 +133,7 @@ def spectrum_plot(
         shown = answer.frequencies <= highest
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
+    data += _measured(curves, measured.spectrum, 1.0, (0.0, highest))
     if with_threshold or waves is None:
         data.append(_threshold_curve(highest, of_waves=waves is not None))
     named = waves if waves is not None and not curves.stale else curves.kernel
@@ -135,6 +143,26 @@ def spectrum_plot(
         "names": _names(named, highest),
         **_axes(data, _second(curves), _tallest(curves, highest, with_threshold), ROOM),
     }  # fmt: skip
+
+
+def in_decibel(plot: PlotlyFigure) -> PlotlyFigure:
+    """A spectrum with both its axes in dB re their units, over the same range."""
+    spans, factors = {}, {"y": "Pa"} | ({"y2": plot["y2"]["said"].rpartition(", ")[2]}
+                                       if "y2" in plot else {})  # fmt: skip
+    for axis, unit in factors.items():
+        top = 20 * np.log10(max(plot[axis]["range"][1] / ROOM, 1e-30))
+        words = plot[axis]["said"].rpartition(", ")[0]
+        spans[axis] = {"said": f"{words}, dB re 1 {unit}",
+                       "range": [top - DYNAMIC, top + 0.2 * DYNAMIC]}  # fmt: skip
+
+    def level(axis: str, values: list[float]) -> list[float]:
+        least = 10 ** (spans[axis]["range"][0] / 20)
+        return np.round(20 * np.log10(np.maximum(np.abs(values), least)), 2).tolist()
+
+    data = [curve | {key: level(curve["axis"], curve[key]) for key in ("y", "low") if key in curve}
+            for curve in plot["data"]]  # fmt: skip
+    names = [name | {"y": level(name["axis"], [name["y"]])[0]} for name in plot["names"]]
+    return plot | {"data": data, "names": names, "kept": f"{plot['kept']} dB"} | spans
 
 
 def _band(curves: Curves, x: Floats, ends: Floats) -> dict[str, Any]:
@@ -149,10 +177,35 @@ def _band(curves: Curves, x: Floats, ends: Floats) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _measured(
+    curves: Curves,
+    read: Callable[[Measurement, int], tuple[Floats, Floats]],
+    per: float,
+    ends: tuple[float, float],
+) -> list[dict[str, Any]]:
+    """Curve of what was measured nearest the point, if it is of the quantity that is shown."""
+    found = curves.measured
+    if found is None or measured.refusal(found, _asked(curves)):
+        return []
+    place = measured.nearest(found, curves.kernel.response.probes[0, :2])
+    x, y = read(found, place)
+    within = (x >= ends[0]) & (x <= ends[1])
+    if not within.any():
+        return []
+    x, y = thinned(x[within], y[within])
+    name = measured.named(found, place)
+    return [{"role": "measured", "axis": "y2", "name": name, "width": 1.1,
+             "x": numbers(per * x), "y": numbers(_asked(curves).per_unit * y)}]  # fmt: skip
+
+
+def _asked(curves: Curves) -> Quantity:
+    """The quantity on the axis of waves."""
+    return curves.waves.response.record if curves.waves else DISPLACEMENT
+
+
 def _second(curves: Curves) -> str:
     """Words of the axis of waves."""
-    asked = curves.waves.response.record if curves.waves else DISPLACEMENT
-    return f"{asked.words}, {asked.shown}"
+    return f"{_asked(curves).words}, {_asked(curves).shown}"
 
 
 def _in_unit(answer: Answer) -> float:

@@ -74,7 +74,8 @@ async def started(folder: str) -> PageProcess:
 
 
 async def begun(page: PageProcess, asked: dict[str, Any]) -> PageProcess:
-    """The process once it shows what is asked: the text of a "scene", the "query" of an address.
+    """The process once it shows what is asked: the text of a "scene", the "query" of an address,
+    how many "samples" bands have.
 
     Raises
     ------

@@ -20,9 +20,11 @@ from skinwave.processes import environment
 STATIC_ROUTE = {"__skinwave": str(Path(__file__).with_name("static"))}
 
 
-def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None) -> Any:
+def session_of(
+    server: Any, scene: str = "", query: dict[str, str] | None = None, samples: int = 0
+) -> Any:
     """A session with its page; the address's values, if it has any, before the scene's. What of
-    either is out of range falls back to a control's start, and is said.
+    either is out of range falls back to a control's start, and is said. Bands have so many samples.
     """
     from skinwave.scene_file import loads
     from skinwave.web import controls, scenes
@@ -40,7 +42,7 @@ def session_of(server: Any, scene: str = "", query: dict[str, str] | None = None
     given = {key: value for key, value in (query or {}).items() if key in controls.KEYS}
     if given:
         start, refused = controls.from_query(urlencode(given), own is not None)
-    session = Session(server, start, own, spreads)
+    session = Session(server, start, own, spreads, samples)
     connect(session)
     lay_out(session)
     if refused:
@@ -106,7 +108,7 @@ def main() -> None:
 
     def assign(asked: dict[str, Any]) -> None:
         try:
-            session = session_of(server, asked["scene"], asked["query"])
+            session = session_of(server, asked["scene"], asked["query"], asked["samples"])
             session.attach(loop)
             with session.state:
                 pass

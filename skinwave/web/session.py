@@ -5,17 +5,22 @@ a browser. What a page can do beside turning controls is in `moves`, what it loo
 """
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
-from skinwave.scene import Body
-from skinwave.web import controls, model, plots, scenes, shown
+import numpy as np
+
+from skinwave.measurements import Measurement
+from skinwave.scene import Body, Scene
+from skinwave.web import controls, level_view, model, plots, scenes, shown
 from skinwave.web.band_worker import BANDS, FAILED, BandWorker
 from skinwave.web.bands import Bands
 from skinwave.web.controls import KEYS, STARTS, Values
 from skinwave.web.history import History
 from skinwave.web.layer_values import rows
+from skinwave.web.levels import Levels
 from skinwave.web.model import Answer
-from skinwave.web.worker import Worker
+from skinwave.web.worker import LEVELS, Worker
 
 
 class Session:
@@ -23,8 +28,9 @@ class Session:
 
     `good` are the values that the controls had last without a mistake, `number` counts the
     requests to the process that computes the response of a body, `own` is a body from a file,
-    `spreads` are those of a file, and `zoomed` is the part in s of the commanded Tacton, if it is
-    not the one that is chosen.
+    `spreads` are those of a file, `samples` how many bands are of, `levels` those over one of the
+    controls with its `variants`, if they are shown, and `zoomed` is the part in s of the commanded
+    Tacton, if it is not the one that is chosen.
     """
 
     def __init__(
@@ -33,24 +39,29 @@ class Session:
         values: Values | None = None,
         own: Body | None = None,
         spreads: scenes.FileSpreads = scenes.NO_SPREADS,
+        samples: int = 0,
     ) -> None:
         self.server, self.state, self.own = server, server.state, own
         self.good = dict(values or STARTS)
         self.history = History(self.good)
         self.spreads = spreads
         self.worker = Worker(self._told_elsewhere)
-        self.sampler = BandWorker(self._told_elsewhere)
+        self.samples = samples
+        self.sampler = BandWorker(self._told_elsewhere, samples)
         self.scene: Any = None
         self.kernel: Answer | None = None
         self.waves: Answer | None = None
         self.published: Answer | None = None
         self.bands: Bands | None = None
         self.pinned: tuple[Answer, ...] = ()
+        self.levels: Levels | None = None
+        self.variants: tuple[Scene, ...] = ()
+        self.measured: Measurement | None = None
         self.number = 0
         self.zoomed: tuple[float, float] | None = None
         self._loop: Any = None
         self.state.update({**self.good, **shown.first(own)})
-        self.state.client_only("draft")
+        self.state.client_only("draft", "helped", "hue")
 
     @property
     def values(self) -> Values:
@@ -74,11 +85,11 @@ class Session:
     def ask(self) -> None:
         """Have the other process compute the body's response, if there is a page to tell."""
         if self._loop:
-            self.worker.ask(self.number, self.scene, bool(self.state.solid))
+            self.worker.ask(self.number, self.scene, bool(self.state.solid), self.variants)
 
     def ask_bands(self) -> None:
         """Have the bands of what is shown computed, in a process that comes after all others."""
-        if self._loop and not self.state.stale:
+        if self._loop and self.samples and not self.state.stale:
             self.sampler.ask(self.number, self.scene, self.answers[-1].response)
 
     def _told_elsewhere(self, what: str, number: int, content: Any) -> None:
@@ -133,11 +144,20 @@ def refresh(session: Session) -> None:
         "left": state.left if waiting and state.busy else "",
     })  # fmt: skip
     state.body_layers = rows(scenes.body_of(session.good, session.own), session.good["layers"])
+    vary(session)
     draw(session)
     if waiting:
         session.ask()
     else:
         session.ask_bands()
+
+
+def vary(session: Session) -> None:
+    """Levels of the kernel over a control, if that is what the third plot shows."""
+    session.levels, session.variants = None, ()
+    if (view := session.state.third) in level_view.LEVELS:
+        given = session.good, session.own, session.spreads
+        session.levels, session.variants = level_view.variants(view, *given)
 
 
 def told(session: Session, what: str, number: int, content: Any) -> None:
@@ -160,6 +180,9 @@ def told(session: Session, what: str, number: int, content: Any) -> None:
         solid(session)  # which may have been asked for in the meantime
         if session.bands is None:
             session.ask_bands()
+    elif what == LEVELS and session.levels and len(content) == len(session.levels.at):
+        session.levels = replace(session.levels, waves=np.array(content))
+        draw(session)
     elif what == BANDS:
         session.bands = content
         draw(session)
@@ -181,6 +204,7 @@ def draw(session: Session) -> None:
         shown.answers(session.state, session.scene, plots.Curves(
             kernel=session.kernel, waves=session.waves, published=session.published,
             pinned=session.pinned, bands=session.bands, stale=bool(session.state.waves_stale),
+            levels=session.levels, measured=session.measured,
         ))  # fmt: skip
         session.state.differs = (
             shown.differs(controls.values_in(session.state.pinned_query), session.good)

@@ -7,17 +7,20 @@ import numpy as np
 
 from simple_model import MovingPressure, named_lines, published
 from simple_model.line_names import line_names
+from simple_model.quantities import DISPLACEMENT
 from skinwave.propagation import share_outside
 from skinwave.scene import Body, Scene
-from skinwave.web import drawings, guided, model, moving, plots
+from skinwave.web import drawings, guided, measured, model, moving, plots
 from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
+from skinwave.web.level_view import LEVELS, level_plot
+from skinwave.web.levels import above_threshold
 from skinwave.web.model import Answer
 from skinwave.web.plots import Curves
 
 NAMED = 3  # lines that a sentence names
 PRESENT = 1e-2  # of the strongest line of a load: one that is named
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
-THIRD = ("spectrum", "dispersion")  # what the third plot shows
+THIRD = ("spectrum", "dispersion", *LEVELS)  # what the third plot shows
 
 
 def bodies(own: Body | None) -> list[str]:
@@ -33,7 +36,8 @@ def first(own: Body | None) -> dict[str, Any]:
         "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "third": THIRD[0],
-        "dark": False, "solid": False,
+        "dark": False, "solid": False, "decibel": False, "against": False, "helped": "",
+        "measured_file": None, "measured_said": "", "pinned_path": "", "hue": 0,
         "summary": [], "uncertainty": [], "warnings": [], "expected": "", "published": False,
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
@@ -41,7 +45,8 @@ def first(own: Body | None) -> dict[str, Any]:
         "body_layers": [],
         "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
         "lines_unit": "µm",
-        "kernel_map": _map(None), "wave_map": _map(None), "body_shape": {}, "body_motion": {},
+        "kernel_map": _map(None), "wave_map": _map(None), "pinned_map": _map(None),
+        "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
 
@@ -56,10 +61,13 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         "lines_unit": scene.reading.asked.shown,
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
-        "kernel_map": _map(kernel), "wave_map": _map(waves),
+        "kernel_map": _map(kernel),
+        "wave_map": _against(waves, kernel) if waves and state.against else _map(waves),
+        "pinned_map": _map(next((a for a in curves.pinned if a.response.record.of_body), None)),
         "own_speeds": drawings.speeds(tacton) if tacton.trajectory.shape == "recorded" else "",
         "rows": drawings.rows(kernel, None if stale else waves, bands.levels if bands else {}),
         "uncertainty": list(bands.sentences) if bands else [],
+        "measured_said": _measured(curves),
         "unresolved": unresolved(
             len(model.unresolved_lines(scene, kernel.response)), tacton.duration
         ),
@@ -84,35 +92,32 @@ def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
             return guided.dispersion_plot(scene, state.highest)
         except ValueError as error:  # a body that is too deep, say
             state.problem = str(error)
+    if state.third in LEVELS and curves.levels is not None:
+        return level_plot(curves.levels, None if curves.stale else curves.waves)
     plain = scene.reading.is_plain
-    return plots.spectrum_plot(curves, state.highest, with_threshold=plain)
+    found = plots.spectrum_plot(curves, state.highest, with_threshold=plain)
+    return plots.in_decibel(found) if state.decibel else found
 
 
 def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
-    """Sentences on the effect of propagation, if a body's response follows the kernel's, on that of
-    drive law and focus, and on the line with the highest sensation level at the selected point.
+    """Sentences on what is above threshold, on the effect of propagation, if a body's
+    response follows the kernel's, and on that of drive law and focus.
     """
+    here = [sentence] if (sentence := above_threshold(scene, answers)) else []
     new = added_names(scene.pressure)[:NAMED]
     said = f"adds {', '.join(new)}, which the published load lacks" if new else "adds no component"
     load = f"{scene.pressure.drive}, {scene.pressure.profile_name}"
     drive = f"The load (drive law and focus: {load}), not propagation, {said}."
     kernel, waves = answers[0], answers[-1]
     if waves is kernel or not np.nansum(waves.map.rms):
-        return [drive]
+        return [*here, drive]
     share = 100 * share_outside(kernel.map.rms, waves.map.rms)
-    texts = [
+    return [
+        *here,
         f"Waves carry {share:.0f} % of the mean-square motion in this area to where the point "
         "kernel, under the same load, predicts less than a tenth of its largest.",
         drive,
     ]
-    levels = {line: line.sensation for line in waves.lines if line.sensation is not None}
-    if levels:
-        line = max(levels, key=lambda each: levels[each])
-        texts.append(
-            f"Highest sensation level at the selected point: {line.name}, {line.frequency:.0f} Hz, "
-            f"{levels[line]:+.0f} dB re threshold."
-        )
-    return texts
 
 
 def added_names(pressure: MovingPressure) -> list[str]:
@@ -164,6 +169,23 @@ def foci(state: Any, scene: Scene) -> None:
     part = state.phase / 100 / tacton.n_paths
     at = tacton.trajectory.at_phase([(part + phase) % 1 for phase in tacton.foci])
     state.foci_at = [[round(1e3 * float(x), 2), round(-1e3 * float(y), 2)] for x, y in at]
+
+
+def _measured(curves: Curves) -> str:
+    """Sentence on what is shown of a measurement, or why nothing is."""
+    found, waves = curves.measured, curves.waves
+    if found is None:
+        return ""
+    refused = measured.refusal(found, waves.response.record if waves else DISPLACEMENT)
+    place = measured.nearest(found, curves.kernel.response.probes[0, :2])
+    times = "from its first sample" if len(found.times) else "as a spectrum alone"
+    return refused or f"{measured.named(found, place)}: of {len(found.places)} places, {times}."
+
+
+def _against(waves: Answer, kernel: Answer) -> dict[str, Any]:
+    """Map of by how many dB the waves are above the kernel, each re its own largest."""
+    ends = [f"{end:+.0f} dB" if end else "0" for end in (-drawings.DEEPEST, 0, drawings.DEEPEST)]
+    return _map(waves) | {"picture": drawings.difference(waves.map, kernel.map), "ends": ends}
 
 
 def _map(answer: Answer | None) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, sparse
-from scipy.interpolate import CubicSpline
 
 import fem
 from meshes.tetmesh import Floats, Ints
@@ -50,6 +49,7 @@ from skinwave.models.reduction import (
 from skinwave.planning.assessment import sentences
 from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
+from skinwave.web.levels import level_of
 from skinwave.web.model import (
     FAINTEST_LEVEL,
     SIDE,
@@ -112,11 +112,27 @@ class BodyResponses:
             known = self._keep("known", wide, lambda: wavenumbers(*wide, progress))
             table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
             return warned_of(scene, flat_answer(table, scene, moving))
-        tacton = scene.tacton
-        places_only = at_any_speed(tacton.trajectory), tacton.n_paths
-        key = (scene.body, places_only, scene.pressure.height, scene.pressure.profile)
-        body = self._keep("reduced", key, lambda: self._reduce(scene, progress))
+        body = self._keep("reduced", _reduction(scene), lambda: self._reduce(scene, progress))
         return warned_of(scene, reduced_answer(body, scene, moving))
+
+    def level(self, scene: Scene) -> float:
+        """Level of a scene's probe as `levels.level_of`; nan where it would take another table of
+        wavenumbers or reduction, or the probe reads something else than the threshold is of.
+        """
+        if not (scene.body.is_skin and scene.reading.is_plain):
+            return float("nan")
+        if is_tabulated(scene.body):
+            known = self._kept["known"].get((scene.body, lowest(scene.pressure.height)))
+            kept = self._kept["table"].get((scene.body, scene.pressure.height))
+            if known is None:
+                return float("nan")
+            lines = flat_lines(kept or tabulate(known, scene.pressure.height), scene)
+        else:
+            body = self._kept["reduced"].get(_reduction(scene))
+            if body is None:
+                return float("nan")
+            lines = reduced_lines_at(body, scene)
+        return level_of(scene, *lines)
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
         clock = Clock()
@@ -133,6 +149,13 @@ class BodyResponses:
         while len(kept) > KEPT:
             del kept[next(iter(kept))]
         return found
+
+
+def _reduction(scene: Scene) -> tuple[Any, ...]:
+    """Key of a reduced body: all that it depends on."""
+    tacton, pressure = scene.tacton, scene.pressure
+    places_only = at_any_speed(tacton.trajectory), tacton.n_paths
+    return scene.body, places_only, pressure.height, pressure.profile
 
 
 def warned_of(scene: Scene, answer: Answer) -> Answer:
@@ -162,6 +185,8 @@ def gaussian_only(pressure: MovingPressure) -> None:
 
 def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     """Motion from rest of a scene's probe, and RMS motion of the area."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     pressure = scene.pressure
     response = _at_point(table, scene) if scene.reading.is_plain else compute(scene, "flat-body")
     f, w = path_amplitudes(_steady(pressure))
@@ -183,6 +208,16 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     return answer_of(scene, response, motion_map(scene, f, motion), seen)
 
 
+def flat_lines(table: Table, scene: Scene) -> tuple[Floats, fem.Complex]:
+    """Frequencies (f,) in Hz and steady lines (f,) in metre of a scene's probe."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
+    f, w = path_amplitudes(_steady(scene.pressure))
+    away = np.linalg.norm(scene.probe_points[0, :2] - path_samples(scene.pressure), axis=1)
+    g = CubicSpline(table.distances, table.g, axis=1)(away)
+    return f, (CubicSpline(table.frequencies, g, axis=0)(f) * w).sum(axis=1)
+
+
 def _at_point(table: Table, scene: Scene) -> Response:
     """Displacement of the surface at a scene's probe."""
     times, probes = sample_times(scene), scene.probe_points
@@ -194,6 +229,8 @@ def _at_point(table: Table, scene: Scene) -> Response:
 
 def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Floats) -> Floats:
     """Motion (t,) in metre of a probe (2,) from rest at times (t,) in s."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     dt, n = step(times), len(times)
     padded = fft.next_fast_len(n + round(TAIL / dt), real=True)
     t = np.arange(padded) * dt
@@ -242,7 +279,7 @@ def motion_map(scene: Scene, frequencies: Floats, motion: fem.Complex) -> AreaMa
     level = shown.max(axis=0, initial=FAINTEST_LEVEL)
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = np.where(np.isnan(rms), np.nan, level.reshape(SIDE, SIDE))
-    return AreaMap(rms=rms, threshold=borderline(level, 0.0))
+    return AreaMap(rms=rms, level=level, threshold=borderline(level, 0.0))
 
 
 def _steady(pressure: MovingPressure) -> MovingPressure:
@@ -295,6 +332,13 @@ def _at_probe(body: Reduced, scene: Scene, motion: ReducedResponse) -> Response:
         model="fem", times=times, probes=scene.probe_points, quantity=asked.name,
         values=asked.waveforms(from_rest(components, times), 1), effort=body.body.effort,
     )  # fmt: skip
+
+
+def reduced_lines_at(body: Reduced, scene: Scene) -> tuple[Floats, fem.Complex]:
+    """Frequencies (f,) in Hz and steady lines (f,) in metre of a scene's probe."""
+    motion = respond(body.body, _steady(scene.pressure))
+    rows, _ = probe_rows(scene.body, body.made, scene.probe_points, scene.reading)
+    return motion.frequencies, (motion.lines @ np.asarray(rows @ body.basis).T)[:, 0]
 
 
 def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:

@@ -4,7 +4,7 @@ import contextlib
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -14,13 +14,15 @@ from skinwave.steps import Step, follower
 
 Told = Callable[[str, int, Any], None]  # what, number of the request, content
 LEAST_STEP = 0.02  # of progress that is told
+LEVELS = "levels"  # what is told after a response
 
 
 def answer_forever(pipe: Connection) -> None:
-    """Compute requests (number, scene, moving) until the other end is closed.
+    """Compute requests (number, scene, moving, variants) until the other end is closed.
 
     Sends ("progress", number, Step), then the response with its number or ("failed", number,
-    sentence).
+    sentence); and after a response ("levels", number, values) of the variants of its scene, if
+    there is no other request before it has them.
     """
     from skinwave.web.waves import BodyResponses
 
@@ -30,7 +32,7 @@ def answer_forever(pipe: Connection) -> None:
     waves = BodyResponses()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
-            number, scene, moving = pipe.recv()
+            number, scene, moving, variants = pipe.recv()
             try:
                 found = waves(scene, _teller(pipe, number), moving)
             except MemoryError as error:
@@ -41,6 +43,18 @@ def answer_forever(pipe: Connection) -> None:
                 pipe.send(("failed", number, one_sentence(error) or type(error).__name__))
             else:
                 pipe.send(("answer", number, found))
+                _levels(waves, pipe, number, variants)
+
+
+def _levels(waves: Any, pipe: Connection, number: int, variants: Sequence[Any]) -> None:
+    """Sensation levels of the variants of a scene, until there is another request."""
+    found = []
+    for scene in variants:
+        if pipe.poll():
+            return
+        found.append(waves.level(scene))
+    if found:
+        pipe.send((LEVELS, number, found))
 
 
 def idle_cores() -> int:
@@ -108,18 +122,20 @@ class Worker:
         self._pipe: Any = None
         self._lock = threading.Lock()
         self._at: int | None = None
-        self._waiting: tuple[int, Any, bool] | None = None
+        self._waiting: tuple[int, Any, bool, Sequence[Any]] | None = None
 
-    def ask(self, number: int, scene: Any, moving: bool = False) -> None:
-        """Request a scene's response, with the motion of the whole body if `moving`; an older
-        request that still waits is forgotten.
+    def ask(
+        self, number: int, scene: Any, moving: bool = False, variants: Sequence[Any] = ()
+    ) -> None:
+        """Request a scene's response, with the motion of the whole body if `moving`, and the
+        sensation levels of its variants; an older request that still waits is forgotten.
         """
         with self._lock:
             if self._at is not None:
-                self._waiting = (number, scene, moving)
+                self._waiting = (number, scene, moving, variants)
                 return
             self._start()
-            self._send(number, scene, moving)
+            self._send(number, scene, moving, variants)
 
     def cancel(self) -> None:
         """Forget all requests, and end the process if it is at one."""
@@ -141,10 +157,10 @@ class Worker:
         self._process, self._pipe = started(answer_forever, idle_cores())
         threading.Thread(target=self._listen, args=(self._pipe,), daemon=True).start()
 
-    def _send(self, number: int, scene: Any, moving: bool) -> None:
+    def _send(self, number: int, *asked: Any) -> None:
         self._at = number
         with contextlib.suppress(OSError):  # it has ended: `_listen` is about to tell
-            self._pipe.send((number, scene, moving))
+            self._pipe.send((number, *asked))
 
     def _end(self) -> None:
         if self._process is not None:
@@ -159,7 +175,7 @@ class Worker:
             except (EOFError, OSError):
                 break
             self._told(what, number, content)
-            if what != "progress":
+            if what not in ("progress", LEVELS):
                 self._next(number)
         with self._lock:
             lost = None

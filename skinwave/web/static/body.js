@@ -5,9 +5,10 @@
   const VERTEX = `#version 300 es
     in vec3 place; in float before; in float after;
     uniform mat3 turn; uniform vec3 middle; uniform vec2 size; uniform float part, drawn;
-    out float motion; out vec3 seen;
+    out float motion, along; out vec3 seen;
     void main() {
       motion = mix(before, after, part);
+      along = place.y;
       vec3 at = turn * (place + vec3(0.0, 0.0, motion * drawn) - middle);
       seen = at;
       gl_Position = vec4(at.xy * size, -at.z * 0.004, 1.0);
@@ -16,16 +17,25 @@
   // Red into the body, blue out of it, as in the pictures of a report; drawings.py has them, too.
   const FRAGMENT = `#version 300 es
     precision highp float;
-    in float motion; in vec3 seen; uniform vec4 own; out vec4 colour;
+    in float motion, along; in vec3 seen; uniform vec4 own; uniform float cut, hue; out vec4 colour;
     void main() {
       if (own.a > 0.0) { colour = own; return; }
+      if (along > cut) discard;
       vec3 still = vec3(0.97), way = motion < 0.0 ? vec3(0.70, 0.09, 0.17) : vec3(0.13, 0.40, 0.67);
       vec3 facing = normalize(cross(dFdx(seen), dFdy(seen)));
       float light = 0.45 + 0.55 * max(0.0, dot(facing, normalize(vec3(-0.4, 0.5, 0.8))));
-      colour = vec4(mix(still, way, min(1.0, sqrt(abs(motion)))) * light, 1.0);
+      vec3 shown = mix(still, way, min(1.0, sqrt(abs(motion))));
+      if (hue > 0.5) { // cividis, by three of its colours
+        float part = 0.5 - 0.5 * motion;
+        shown = part < 0.5 ? mix(vec3(0.0, 0.13, 0.30), vec3(0.49, 0.48, 0.47), 2.0 * part)
+          : mix(vec3(0.49, 0.48, 0.47), vec3(1.0, 0.92, 0.28), 2.0 * part - 1.0);
+      }
+      colour = vec4(shown * light, 1.0);
     }`;
+  let shown = null; // the body that is drawn
   const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const view = { turned: -0.5, tipped: 0.95, near: 1, at: 0, playing: !still, last: null };
+  const view = { turned: -0.5, tipped: 0.95, near: 1, at: 0, playing: !still, last: null, cut: 1,
+                 hue: 0 };
 
   function program(gl) {
     const made = gl.createProgram();
@@ -65,6 +75,7 @@
       }
       return [low, high];
     });
+    at.along = ends[1];
     at.middle = ends.map(([low, high]) => (low + high) / 2);
     at.reach = Math.hypot(...ends.map(([low, high]) => (high - low) / 2));
   }
@@ -108,6 +119,9 @@
     gl.uniform1f(at.place.part, exact - Math.floor(exact));
     gl.uniform1f(at.place.drawn, motion.drawn);
     gl.uniform4f(at.place.own, 0, 0, 0, 0);
+    const [first, last] = at.along;
+    gl.uniform1f(at.place.cut, view.cut < 1 ? first + view.cut * (last - first) : 1e9);
+    gl.uniform1f(at.place.hue, view.hue);
     gl.bindBuffer(gl.ARRAY_BUFFER, at.points);
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
@@ -177,7 +191,25 @@
       view.at = event.target.value / 1000;
       draw(at);
     };
+    document.getElementById("body-clip").oninput = (event) => {
+      view.cut = event.target.value / 100;
+      draw(at);
+    };
     new ResizeObserver(() => draw(at)).observe(canvas);
+    shown = at;
+  }
+
+  // The body as it is at a time in ms, if it is seen.
+  function show(time) {
+    if (!shown?.motion || !shown.canvas.isConnected) return;
+    view.playing = false;
+    view.at = (time / shown.motion.period) % 1;
+    draw(shown);
+  }
+
+  function full() {
+    const whole = document.querySelector(".sw-body");
+    if (document.fullscreenElement) document.exitFullscreen(); else whole.requestFullscreen();
   }
 
   // Begin to draw on a canvas that has just come; all ends when it goes.
@@ -191,10 +223,14 @@
     const at = { canvas, gl, place: {}, count: 0 }, made = program(gl);
     gl.useProgram(made);
     gl.enable(gl.DEPTH_TEST);
-    for (const name of ["turn", "middle", "size", "part", "drawn", "own"])
+    for (const name of ["turn", "middle", "size", "part", "drawn", "own", "cut", "hue"])
       at.place[name] = gl.getUniformLocation(made, name);
     listen(at);
     const ends = [
+      state.watch(["hue"], (hue) => {
+        view.hue = hue || 0;
+        draw(at);
+      }),
       state.watch(["body_shape"], (shape) => shape?.points && shaped(at, shape)),
       state.watch(["body_motion"], (motion) => {
         if (!motion?.frames) return;
@@ -219,5 +255,5 @@
     requestAnimationFrame(next);
   }
 
-  window.trame.utils.body = { begin, view };
+  window.trame.utils.body = { begin, view, show, full };
 })();

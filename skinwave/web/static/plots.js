@@ -6,7 +6,8 @@
   const PALE = 0.25; // opacity of curves that are not of what the controls say
   const MODES = [1, 2, 3, 4, 5, 6].map((n) => `mode${n}`); // roles of dispersion curves
   const LEAST_DRAG = 6; // pixels that are no click any more
-  const shown = {}; // by id of the canvas: { canvas, figure, zoom, drag, at }
+  const SNAP = 9; // pixels
+  const shown = {}; // by id of the canvas: { canvas, figure, zoom, drag, value }
 
   // About `count` round numbers between two others.
   function ticks([low, high], count) {
@@ -232,9 +233,37 @@
     return placed;
   }
 
-  // The value of each curve where the pointer is.
+  // The value on the axis where the pointer is or, on a spectrum, of the peak that it is next to.
+  function snapped(plot, pixel) {
+    const { box, range, to } = scales(plot);
+    const back = (x) => range[0] + ((x - box.x) / box.w) * (range[1] - range[0]);
+    let best = null;
+    for (const curve of plot.figure.data) {
+      if (!plot.figure.names || curve.low || ["threshold", "pinned"].includes(curve.role)) continue;
+      for (let k = 1; k + 1 < curve.y.length; k++) {
+        if (!(curve.y[k] > curve.y[k - 1] && curve.y[k] >= curve.y[k + 1])) continue;
+        const away = Math.abs(to.x(xOf(curve, k)) - pixel);
+        const high = to[curve.axis](curve.y[k]); // pixels: less is higher
+        if (away <= SNAP && (!best || high < best.high)) best = { high, value: xOf(curve, k) };
+      }
+    }
+    return best ? best.value : back(pixel);
+  }
+
+  // A cursor at a value of a plot, and at the same time of the other plots over time.
+  function point(plot, value) {
+    for (const other of Object.values(shown)) {
+      const same = other === plot || other.figure?.x.said === plot.figure.x.said;
+      if (!other.figure || !same) continue;
+      other.value = value;
+      draw(other);
+    }
+  }
+
+  // The value of each curve where the cursor is.
   function readout(g, { box, range, to, w }, plot, ink, paper) {
-    const value = range[0] + ((plot.at - box.x) / box.w) * (range[1] - range[0]);
+    const value = plot.value, x = to.x(value);
+    if (value < range[0] || value > range[1]) return;
     const at = (c) => value >= xOf(c, 0) && value <= xOf(c, c.y.length - 1);
     const said = plot.figure.data.filter((c) => c.name && !c.mirrored && at(c)).map((curve) => {
       let low = 0, high = curve.y.length - 1;
@@ -247,10 +276,10 @@
       return `${curve.name} ${least}${curve.y[k].toPrecision(4)}`;
     });
     g.fillStyle = ink;
-    g.fillRect(plot.at, box.y, 1, box.h);
+    g.fillRect(x, box.y, 1, box.h);
     const all = `${value.toPrecision(5)}: ${said.join("; ")}`;
     g.font = `11px ${FONT}`;
-    const wide = g.measureText(all).width, left = Math.max(2, Math.min(plot.at + 6, w - wide - 6));
+    const wide = g.measureText(all).width, left = Math.max(2, Math.min(x + 6, w - wide - 6));
     g.fillStyle = paper;
     g.fillRect(left - 3, box.y + box.h - 18, wide + 6, 16);
     g.fillStyle = ink;
@@ -265,7 +294,7 @@
     const style = getComputedStyle(canvas), own = (name) => style.getPropertyValue(name).trim();
     const ink = own("--sw-ink"), faint = own("--sw-grid"), paper = own("--sw-paper");
     const colours = Object.fromEntries(
-      ["kernel", "published", "waves", "pinned", "threshold", ...MODES].map((role) => [role, own(`--sw-${role}`)]));
+      ["kernel", "published", "waves", "pinned", "threshold", "measured", ...MODES].map((role) => [role, own(`--sw-${role}`)]));
     const g = canvas.getContext("2d"), said = entries(g, figure, canvas.clientWidth);
     plot.top = said.top;
     const at = scales(plot), { box } = at;
@@ -287,7 +316,7 @@
     plot.named = names(g, at, figure, ink);
     [plot.box, plot.entries] = [box, said.placed];
     legend(g, said, figure, colours, ink);
-    if (plot.at !== null && !plot.drag) readout(g, at, plot, ink, paper);
+    if (plot.value !== null && !plot.drag) readout(g, at, plot, ink, paper);
     if (plot.drag) {
       g.fillStyle = faint;
       g.globalAlpha = 0.6;
@@ -324,9 +353,9 @@
       plot.drag = [within(event), within(event)];
     });
     canvas.addEventListener("pointermove", (event) => {
-      plot.at = within(event);
-      if (plot.drag) plot.drag[1] = plot.at;
-      draw(plot);
+      if (!plot.figure) return;
+      if (plot.drag) plot.drag[1] = within(event);
+      point(plot, snapped(plot, within(event)));
     });
     canvas.addEventListener("pointerup", () => {
       const { box, range } = scales(plot), drag = plot.drag && [...plot.drag].sort((a, b) => a - b);
@@ -336,7 +365,7 @@
         zoomed(plot, drag.map(back));
       } else draw(plot);
     });
-    canvas.addEventListener("pointerleave", () => { plot.at = null; draw(plot); });
+    canvas.addEventListener("pointerleave", () => plot.figure && point(plot, null));
     canvas.addEventListener("dblclick", () => zoomed(plot, null));
     const keys = { "+": [0.5, 0], "-": [2, 0], ArrowLeft: [1, -0.25], ArrowRight: [1, 0.25] };
     canvas.addEventListener("keydown", (event) => {
@@ -353,7 +382,7 @@
   function begin(state, keys) {
     for (const key of keys) {
       const canvas = document.getElementById(key);
-      const plot = (shown[key] = { canvas, figure: null, zoom: null, drag: null, at: null });
+      const plot = (shown[key] = { canvas, figure: null, zoom: null, drag: null, value: null });
       listen(plot);
       state.watch([key], (figure) => {
         if (!figure) return;
@@ -367,5 +396,5 @@
     state.watch(["dark"], () => setTimeout(() => Object.values(shown).forEach(draw), 50));
   }
 
-  window.trame.utils.plots = { begin, shown };
+  window.trame.utils.plots = { begin, shown, point };
 })();
