@@ -428,7 +428,7 @@ def motion(body, made):
 def test_a_hand_from_a_file_answers_alike_however_it_is_meshed(monkeypatch):
     monkeypatch.setenv("SKINWAVE_CACHE", "")  # the mesher differs from run to run
     body = Body(kind="mesh", file=str(HAND), up="-x")
-    one, other = (build(body, 0.006) for _ in range(2))  # at 7.5 mm some pairs differ by 3.2 %
+    one, other = (build(body, 0.006) for _ in range(2))  # at 7 mm some pairs differ by 3.6 %
     assert len(one.mesh.points) != len(other.mesh.points)
     first, second = motion(body, one), motion(body, other)
     assert (np.abs(second - first) / np.abs(first)).max() < 0.03
