@@ -168,8 +168,8 @@ def fill(seed):
 
 
 def test_several_processes_share_it(home):
-    with multiprocessing.get_context("spawn").Pool(3) as pool:
-        assert pool.map(fill, range(3)) == [0, 0, 0]
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        assert pool.map(fill, range(2)) == [0, 0]
     assert all(path.suffix == ".npz" for path in home.iterdir())
     cache.store(NAMES[0], {}, x=np.arange(1000.0))
     assert cache.contents().size <= 60_000  # two that were stored at once may both be kept

@@ -16,6 +16,8 @@ from corpus import GOOD, SILENT_GROUND, SMALL
 from skinwave.cli import main, parser
 from skinwave.commands.common import progress_of
 
+CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
+
 
 def table(path):
     return list(csv.DictReader(path.read_text().splitlines()))
@@ -38,6 +40,7 @@ def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
 
 @pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem-harmonic", "fem-transient"])
 def test_run_with_each_model(scene, model):
+    scene.write_text(CLAMPED)
     arguments = ["run", str(scene), "--model", model, "--h", "15", "--dt", "1e-4", "--quiet"]
     assert main(arguments) == 0
     rows = table(scene.parent / "short-out/lines.csv")
@@ -46,8 +49,11 @@ def test_run_with_each_model(scene, model):
     assert all(row[empty] == "" and float(row[filled]) >= 0 for row in rows)
 
 
+@pytest.mark.usefixtures("in_one_process")
 def test_compare_a_scene_of_ones_own(scene, capsys):
-    scene.write_text(SMALL.replace("duration_s = 0.05", "duration_s = 0.3"))  # to tell lines apart
+    scene.write_text(
+        CLAMPED.replace("duration_s = 0.05", "duration_s = 0.3")
+    )  # to tell lines apart
     assert main(["compare", str(scene), "--h", "6", "--out", "both"]) == 0
     assert "3 of 3 runs" in capsys.readouterr().out
     folder = scene.parent / "both"

@@ -21,7 +21,7 @@ from skinwave.simulation import answered, compute
 
 POINT = '[tacton]\nshape = "circle"\nsize_mm = 6\nspeed_m_per_s = 3\nduration_s = 0.05\n'
 AM = POINT + "am_frequency_hz = 140\n"
-SMALL = "size_x_mm = 40\nsize_y_mm = 40\nthickness_mm = 8\n"
+SMALL = "size_x_mm = 30\nsize_y_mm = 30\nthickness_mm = 6\n"
 PROBES = "[probes]\npoints_mm = [[0, 0], [5, 0]]\n"
 SLAB = f'{AM}[body]\n{SMALL}sides = "clamped"\n{PROBES}'
 PAPER = f'{AM}[focus]\npeak_pressure_pa = PRESSURE\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
@@ -151,7 +151,8 @@ def test_a_report_says_the_same(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SLAB)
     monkeypatch.setattr("skinwave.reports.album.shown_scenes", lambda scene, _: {"slab": scene})
-    monkeypatch.setattr("skinwave.reports.scene_report.pictures", lambda *given: [])
+    for drawn in ("pictures", "run_figures", "_guided"):
+        monkeypatch.setattr(f"skinwave.reports.scene_report.{drawn}", lambda *given: [])
     assert main(["report", "scene.toml", "--h", "8", "--quiet"]) == 0
     shown = on_the_page(tmp_path / "scene-report/index.html")
     assert [x.split(" (slab")[0] for x in shown] == list(said)

@@ -25,6 +25,7 @@ import pytest
 import meshes
 from meshes.shapes import palm
 from skinwave import read
+from skinwave.cli import main as skinwave
 
 pytestmark = [
     pytest.mark.slow,
@@ -73,8 +74,8 @@ def prepared(folder):
     (folder / "notes.partial").mkdir()
     (folder / "notes.partial/note.txt").write_text("mine")
     hand(folder / "hand.stl")
-    run = [*words("run")[:-1], "old"]
-    subprocess.run(run, cwd=folder, check=True, **QUIET)
+    run = ["run", str(folder / "good.toml"), *SMALL[1:], "--out", str(folder / "old")]
+    assert skinwave(run) == 0
 
 
 def hand(path, h=2e-3):

@@ -16,6 +16,10 @@ from skinwave.simulation import compute
 
 LONGEST = 10.0  # s of computing
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
+MORE_COMMANDS = [
+    ["run", "good.toml", "--model", "fem", "--h", "nan", "--out", "new/below"],
+    ["tradeoff", "none.toml"],
+]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="paths differ")
 
 
@@ -65,7 +69,7 @@ def test_a_damaged_scene_is_planned_or_refused(folder, capsys, content):
     assert "Traceback" not in said(capsys, folder, ["plan", "wrong.toml"], codes=(0, 2))
 
 
-@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda a: " ".join(a)[:60])
+@pytest.mark.parametrize("arguments", [*COMMANDS, *MORE_COMMANDS], ids=lambda a: " ".join(a)[:60])
 def test_no_command_is_refused_in_one_line(folder, capsys, arguments):
     said(capsys, folder, arguments)
 
@@ -109,8 +113,6 @@ def test_no_mesh_is_refused_in_one_line(name):
 REAL = [
     ["run", "wrong.toml"],
     ["compare", "good.toml", "--h", "1e-9"],
-    ["run", "good.toml", "--model", "fem", "--h", "nan", "--out", "new/below"],
-    ["tradeoff", "none.toml"],
 ]
 
 

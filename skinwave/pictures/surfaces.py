@@ -21,7 +21,9 @@ from skinwave.scene import Scene
 from skinwave.surface import SurfaceMap
 
 COLOURS = "cividis"  # distinct for every kind of colour vision
-SIDE = 3.1  # inch of a map
+SIDE = 3.1  # inch of a map with its title and its axis
+# Inch from the left and the bottom to a map, of the map, to its bar, of the bar, of what is beside.
+LEFT, BOTTOM, MAP, GAP, BAR, BESIDE_BAR = 0.65, 0.97, 2.52, 0.08, 0.14, 0.76
 MEASURED_EDGE = figures.COLOURS["measured"]
 
 
@@ -67,7 +69,8 @@ def _surfaces_figure(
     kernel, count, narrow = next(iter(surfaces.values())), len(surfaces), style.is_narrow
     size = style.size((SIDE + 0.75) * count, SIDE + 0.75)
     size = (size[0], 0.85 * size[0] * count + 0.5) if narrow else size
-    figure = Figure(figsize=size, layout="constrained")
+    fixed = style.columns is None  # margins: a computed layout takes as long as all the rest
+    figure = Figure(figsize=size, layout=None if fixed else "constrained")
     grid = (count, 1) if narrow else (1, count)
     axes = figure.subplots(*grid, sharex=True, sharey=True, squeeze=False).ravel()
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
@@ -86,8 +89,11 @@ def _surfaces_figure(
         beyond = _draw_measured(ax, surface, image, measured) if measured else "neither"
         ax.set_title(label(column) + f" ({surface.note})" * bool(surface.note), fontsize="medium")
         ax.set_xlabel("x, mm")
-        figure.colorbar(image, ax=ax, label=f"RMS about the mean, {unit}", shrink=0.85,
-                        extend=beyond)  # fmt: skip
+        where: dict[str, Any] = {"ax": ax, "shrink": 0.85}
+        if fixed:
+            where = {"cax": _placed(figure, ax, ax.get_subplotspec().colspan.start, count)}
+        bar = figure.colorbar(image, **where, label=f"RMS about the mean, {unit}", extend=beyond)
+        bar.ax.ticklabel_format(axis="y", scilimits=(-3, 4))  # labels of a few letters
     for ax in axes if narrow else axes[:1]:
         ax.set_ylabel("y, mm")
     inks = (("#ff9e4a", "dashed"), ("0.6", "solid"), ("0.6", "dotted"))
@@ -96,11 +102,19 @@ def _surfaces_figure(
     if measured:
         handles.append(Line2D([], [], ls="", marker="s", mfc="0.8", mec=MEASURED_EDGE, ms=8))
         labels.append("measured, in the map's colours")
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=1 if narrow else len(labels),
-        frameon=False,
-    )  # fmt: skip
+    where = {"loc": "lower center" if fixed else "outside lower center"}
+    figure.legend(handles, labels, **where, ncols=1 if narrow else len(labels), frameon=False)
     return figure
+
+
+def _placed(figure: Figure, ax: Axes, k: int, count: int) -> Axes:
+    """Place the axes of a map, the k-th of some in a row, and those of its bar, which are new."""
+    width, height = SIDE + 0.75, SIDE + 0.75  # of a map's part of the figure
+    last = width * count - MAP - GAP - BAR - BESIDE_BAR
+    left = LEFT + (last - LEFT) * k / max(count - 1, 1)
+    across, up, y = width * count, height, BOTTOM / height
+    ax.set_position((left / across, y, MAP / across, MAP / up))
+    return figure.add_axes(((left + MAP + GAP) / across, y, BAR / across, MAP / up))
 
 
 def _draw_measured(
