@@ -143,7 +143,8 @@ def circling_on_skin(
         f"Circling focus on {name}: finite elements against the wavenumber integral",
         "Bonded layer: Ewing, Jardetzky and Press, Elastic Waves in Layered Media (1957), chapter "
         "4; verified by the cases on flat-body",
-        f"sides fixed at {1e3 * half:g} mm, where the response is below a hundredth of that at the focus",
+        f"sides fixed at {1e3 * half:g} mm, where the response is below a hundredth of that at the "
+        "focus",
         mesh, solid, {"right": "xyz", "back": "xyz", "bottom": "xyz"},
         slab(solid, depth), load, 0.02,
     )  # fmt: skip

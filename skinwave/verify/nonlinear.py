@@ -269,8 +269,8 @@ def reduced_against_full() -> Case:
         title="A sheet in its bending modes against all of its dofs",
         source="the same equations without reduction; Hollkamp and Gordon, J Sound Vib 318:1139 "
         "(2008): implicit condensation",
-        mesh=f"a sheet of 60 mm in 8 by 8 by 1 cells, {full.effort.dofs:,} dofs, {modes.effort.reduced_dofs} "
-        f"modes; {full.effort.steps} steps",
+        mesh=f"a sheet of 60 mm in 8 by 8 by 1 cells, {full.effort.dofs:,} dofs, "
+        f"{modes.effort.reduced_dofs} modes; {full.effort.steps} steps",
         checks=tuple(checks),
         plot=Plot(
             x="time, ms", y="displacement of the centre, um", drawn=("all dofs",),

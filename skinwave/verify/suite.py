@@ -28,8 +28,8 @@ from skinwave.verify import manufactured as fields
 from skinwave.verify.case import Case, Entry, Result, yes
 from skinwave.verify.page import page
 
-# Poisson's ratio, cells along half a side, and fields with the largest errors in L2 and H1. The pressure of
-# the dilating one is lam times its divergence, and errors are as much larger.
+# Poisson's ratio, cells along half a side, and fields with the largest errors in L2 and H1. The
+# pressure of the dilating one is lam times its divergence, and errors are as much larger.
 FREE, DILATING = fields.divergence_free, fields.dilating
 FIELDS = {
     "divergence-free-0.3": (0.3, (2, 4, 7), {"divergence-free": (FREE, (1e-3, 2e-2))}),
