@@ -10,7 +10,7 @@ import pytest
 from skinwave import SkinwaveWarning, cli, dumps, loads
 
 ROOT = Path(__file__).parent.parent
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 
 
 def shown(language):
