@@ -17,7 +17,7 @@ from math import lcm
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import fft, sparse
 
 from simple_model.drive import DriveLaw
 from simple_model.focus import spot_detail, spot_reach
@@ -192,7 +192,7 @@ def path_fourier(values: Floats | Complex) -> Complex:
     """Fourier coefficients (..., n) of values (..., k) at `path_samples`; -n is harmonic -n."""
     k = values.shape[-1]
     shift = np.exp(-1j * np.pi * np.fft.fftfreq(k))
-    return np.asarray(np.fft.fft(values, axis=-1) / k * shift)
+    return np.asarray(fft.fft(values, axis=-1) * (shift / k))
 
 
 def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:

@@ -35,8 +35,8 @@ def counted(monkeypatch):
     return solved
 
 
-def sheet(thickness, fixed):
-    mesh = meshes.sheet(*A5, thickness, 14e-3)
+def sheet(thickness, fixed, h=14e-3):
+    mesh = meshes.sheet(*A5, thickness, h)
     fixed = dict.fromkeys(fixed, "xyz") or np.zeros(mesh.points.shape, bool)
     return fem.assemble(mesh, fem.PRESETS["paper"], fixed=fixed)
 
@@ -54,7 +54,7 @@ def test_modes_of_a_sheet_of_paper_held_at_two_edges(counted):
 
 @pytest.mark.slow
 def test_a_sheet_of_paper_that_floats_bends_a_tenth_as_fast_as_one_ten_times_as_thick(counted):
-    thin, thick = (fem.modes(sheet(thickness, ()), 10)[0] for thickness in (1e-4, 1e-3))
+    thin, thick = (fem.modes(sheet(thickness, (), 21e-3), 10)[0] for thickness in (1e-4, 1e-3))
     assert (thin[:6] < 0.2).all()
     np.testing.assert_allclose(thin[6:], thick[6:] / 10, rtol=0.01)
 

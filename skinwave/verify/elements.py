@@ -1,13 +1,15 @@
 """Element tests: patch tests on distorted meshes, and input that must be refused."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import fem
 import meshes
 from fem.assembly import element_stiffness
+from fem.boundary import fixed_dofs
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import EDGES
 from skinwave.verify.case import Case, Check, below, described, yes
@@ -161,19 +163,22 @@ def _followed(mesh: TetMesh, poisson: float, bar: float, where: str = "") -> Che
 
 def held_outside(mesh: TetMesh, poisson: float, field: Floats, force: Floats) -> Floats:
     """Displacement (3 n,) of the mesh with the field prescribed on its boundary."""
-    return solver_held_outside(mesh, poisson)(field, force)
-
-
-def solver_held_outside(mesh: TetMesh, poisson: float) -> Callable[[Floats, Floats], Floats]:
-    """The same for any field and force, by one factor."""
     fixed = np.zeros(mesh.points.shape, bool)
     fixed[np.unique(meshes.boundary_facets(mesh.tets))] = True
+    return solver_held(mesh, poisson, fixed)(field, force)
+
+
+def solver_held(
+    mesh: TetMesh, poisson: float, fixed: Mapping[str, str] | ArrayLike
+) -> Callable[[Floats, Floats], Floats]:
+    """The same for any field and force by one factor, where `fixed` is prescribed."""
+    held = fixed_dofs(mesh, fixed)
     K = fem.assemble(mesh, unit(poisson), fixed=np.zeros(mesh.points.shape, bool)).K
-    inner = np.flatnonzero(~fixed.ravel())
+    inner = np.flatnonzero(~held)
     factor = fem.factorise(K[inner][:, inner])
 
     def solve(field: Floats, force: Floats) -> Floats:
-        u = np.where(fixed.ravel(), field, 0.0)
+        u = np.where(held, field, 0.0)
         u[inner] = factor.solve((force - K @ u)[inner])
         return u
 

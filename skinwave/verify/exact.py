@@ -131,17 +131,20 @@ def exact_circles() -> Case:
     )
 
 
-def circling_on_skin(solid: fem.Material = SKIN, name: str = "skin") -> Case:
+def circling_on_skin(
+    solid: fem.Material = SKIN, name: str = "skin", *, half: float = 0.06, growth: float = 1.5
+) -> Case:
     """AM and circling focus on a bonded layer, of forearm unless another law is given."""
     depth = 0.010
-    across = meshes.graded_axis(0.07, 0.003, meshes.Grading(radius=0.02, growth=1.3))
+    across = meshes.graded_axis(half, 0.003, meshes.Grading(radius=0.02, growth=growth))
     mesh = meshes.extrude(across, across, np.linspace(-depth, 0, 5))
     load = circling(0.02, 12.0, am=140.0)
     return _beside_exact_waves(
         f"Circling focus on {name}: finite elements against the wavenumber integral",
         "Bonded layer: Ewing, Jardetzky and Press, Elastic Waves in Layered Media (1957), chapter "
         "4; verified by the cases on flat-body",
-        "sides fixed at 70 mm, where the response is below a hundredth of that at the focus",
+        f"sides fixed at {1e3 * half:g} mm, where the response is below a hundredth of that at the "
+        "focus",
         mesh, solid, {"right": "xyz", "back": "xyz", "bottom": "xyz"},
         slab(solid, depth), load, 0.02,
     )  # fmt: skip
@@ -156,14 +159,14 @@ def circling_on_paper() -> Case:
         density=mass / thickness, shear_modulus=young / 2.6, poisson=0.3,
         viscosity=lag * young / 2.6,
     )  # fmt: skip
-    grading = meshes.Grading(radius=0.025, growth=1.25, coarsest=0.01)
-    across = meshes.graded_axis(0.25, 0.002, grading)
+    grading = meshes.Grading(radius=0.025, growth=1.25, coarsest=0.013)
+    across = meshes.graded_axis(0.2, 0.0021, grading)
     mesh = meshes.extrude(across, across, [-thickness, 0])
     return _beside_exact_waves(
         "Circling focus on a lossy sheet: finite elements against the wavenumber integral",
         "Thin plate in vacuum: Cremer, Heckl and Petersson (2005); verified by the cases on "
         "flat-body",
-        "free edges at 250 mm; loss factor 0.7 at 190 Hz, so that they reflect nothing",
+        "free edges at 200 mm; loss factor 0.7 at 190 Hz, so that they reflect nothing",
         mesh, solid, {},
         thin_sheet(solid, thickness, air_density=0.0), circling(0.02, 12.0), 0.02,
     )  # fmt: skip

@@ -14,7 +14,7 @@ from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.scene import Body, Scene
 from skinwave.verify.case import Case, below, relative
 
-BODY = Body(width=0.06, height=0.06, depth=0.015)
+BODY = Body(width=0.06, height=0.06, depth=0.015, sides="clamped")
 PROBES = ((0.0, 0.0), (0.01, 0.0))
 H = 5e-3  # m
 LIMITS = "limit of the linear equation of motion: Graff, Wave Motion in Elastic Solids (1975)"

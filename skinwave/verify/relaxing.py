@@ -81,7 +81,7 @@ def half_space_that_relaxes() -> Case:
 
 def circling_on_skin_that_relaxes() -> Case:
     """AM and circling focus on a bonded layer."""
-    return circling_on_skin(SKIN, "skin as a standard linear solid")
+    return circling_on_skin(SKIN, "skin as a standard linear solid", half=0.07, growth=1.3)
 
 
 def _springs() -> fem.Operators:

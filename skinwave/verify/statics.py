@@ -103,7 +103,7 @@ def focus_at_rest_on_half_space(poisson: float) -> Case:
 def focus_at_rest_on_a_layer() -> Case:
     """Elements of 3 mm on a bonded layer, up to incompressibility."""
     depth, radii = 0.015, np.array([0.0, 0.01])
-    axis = meshes.graded_axis(0.10, 0.003, meshes.Grading(radius=0.024, growth=1.3))
+    axis = meshes.graded_axis(0.06, 0.003, meshes.Grading(radius=0.015, growth=1.5))
     mesh = meshes.extrude(axis, axis, np.linspace(-depth, 0, 6))
     answers, closed = [], []
     for poisson in RATIOS:
@@ -122,7 +122,7 @@ def focus_at_rest_on_a_layer() -> Case:
     return Case(
         title="Gaussian focus on a bonded layer of 15 mm, Poisson's ratio 0 to 0.49999",
         source="Vorovich, Aleksandrov and Babeshko (1974): kernel of a bonded layer",
-        mesh=described(mesh, "a quarter; 3 mm, sides fixed at 100 mm"),
+        mesh=described(mesh, "a quarter; 3 mm, sides fixed at 60 mm"),
         checks=tuple(checks),
         plot=Plot(
             x="1 / (1 - 2 nu)", y="error, %", log=True,

@@ -28,18 +28,18 @@ from skinwave.verify import manufactured as fields
 from skinwave.verify.case import Case, Entry, Result, yes
 from skinwave.verify.page import page
 
-# Poisson's ratio, cells a side, and fields with the largest errors in L2 and H1. The pressure of
-# the dilating one is lam times its divergence, and errors are as much larger.
+# Poisson's ratio, cells along half a side, and fields with the largest errors in L2 and H1. The
+# pressure of the dilating one is lam times its divergence, and errors are as much larger.
 FREE, DILATING = fields.divergence_free, fields.dilating
 FIELDS = {
-    "divergence-free-0.3": (0.3, (4, 8, 12), {"divergence-free": (FREE, (1e-3, 2e-2))}),
-    "dilating-0.3": (0.3, (6, 9, 13), {"dilating": (DILATING, (5e-4, 1e-2))}),
+    "divergence-free-0.3": (0.3, (2, 4, 7), {"divergence-free": (FREE, (1e-3, 2e-2))}),
+    "dilating-0.3": (0.3, (3, 5, 8), {"dilating": (DILATING, (5e-4, 1e-2))}),
     "fields-0.49": (
-        0.49, (6, 10, 14),
+        0.49, (3, 5, 9),
         {"divergence-free": (FREE, (5e-4, 1e-2)), "dilating": (DILATING, (2e-3, 0.03))},
     ),
     "fields-0.4999": (
-        0.4999, (6, 10, 15),
+        0.4999, (3, 5, 9),
         {
             "divergence-free": (FREE, (5e-4, 1e-2)),
             "balanced": (fields.balanced, (5e-4, 1e-2)),
@@ -47,7 +47,7 @@ FIELDS = {
         },
     ),
 }  # fmt: skip
-STEADY = ((80, 0.4999), (140, 0.4999), (210, 0.4999), (140, 0.49), (210, 0.49))  # Hz, nu
+STEADY = ((80, 0.4999), (140, 0.4999), (210, 0.49))  # Hz, nu
 TOPICS: Mapping[str, Mapping[str, Callable[[], Case]]] = {
     "Elements": {
         "patch": elements.patch,
@@ -62,7 +62,6 @@ TOPICS: Mapping[str, Mapping[str, Callable[[], Case]]] = {
     },
     "At rest": {
         "disc": statics.disc_on_half_space,
-        "focus-at-rest-0.49": partial(statics.focus_at_rest_on_half_space, 0.49),
         "focus-at-rest-0.4999": partial(statics.focus_at_rest_on_half_space, 0.4999),
         "poisson-ratios": statics.focus_at_rest_on_a_layer,
         "stiffness-contrast": statics.column_of_two_layers,
@@ -134,9 +133,8 @@ TOPICS: Mapping[str, Mapping[str, Callable[[], Case]]] = {
     },
 }
 SLOW = (
-    "dilating-0.3", "fields-0.49", "fields-0.4999", "no-locking", "disc", "focus-at-rest-0.49",
-    "focus-at-rest-0.4999", "navier-steel", "navier-soft", "focus-in-air", "lamb",
-    *(f"steady-focus-{hz}-{nu:g}" for hz, nu in STEADY), "circling-on-paper", "modes-or-all",
+    "disc", "focus-at-rest-0.4999", "focus-in-air", "lamb",
+    *(f"steady-focus-{hz}-{nu:g}" for hz, nu in STEADY), "circling-on-relaxing-skin",
 )  # fmt: skip
 
 
