@@ -55,7 +55,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def moved(scene):
-    return motion.waves(scene, h=0.015)
+    return motion.waves(scene, h=0.012)
 
 
 @pytest.fixture(scope="module")
@@ -189,9 +189,9 @@ def apparent_speed(distances, times, motion, frequency):
 def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
     """Slope of the x-t diagram outside the path, Rayleigh speed, and wavenumber integral."""
     soft = replace(PRESETS["palm"], viscosity=2.0)
-    body = Body(width=0.06, height=0.03, depth=0.01, material=soft)
+    body = Body(width=0.06, height=0.06, material=soft)
     scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
-    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.3, h=0.0045), (0.02, 4))
+    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.3, h=0.005), (0.02, 4))
     outside = (view.ray.distance > 0.005) & (view.ray.distance < 0.03)
     distance, times = view.ray.distance[outside], view.ray.times
     found = apparent_speed(distance, times, view.ray.motion[:, outside], 250.0)

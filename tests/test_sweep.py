@@ -345,17 +345,17 @@ def test_curves_of_many_values_have_a_colour_bar():
 
 def check_plots(kind):
     drawn = ["plot", "short-sweep", "--format", kind, "--quiet"]
-    assert main([*drawn, "--column", "f_AM_um[1]", "--column", "kernel_misfit"]) == 0
+    assert main([*drawn, "--column", "f_AM_um[1]"]) == 0
     assert main([*drawn, "--column", "spread_6db_mm", "--heat"]) == 0
     assert main([*drawn, "--preset", "speed"]) == 0
     files = list(Path("short-sweep/figures").glob(f"*.{kind}"))
-    assert len(files) == 4
+    assert len(files) == 3
     assert all(file.stat().st_size > 5000 for file in files)
     if kind == "pdf":
         assert not any(b"/Type3" in file.read_bytes() for file in files)
     if kind == "svg":
         text = "".join(file.read_text() for file in files)
-        assert text.count("<text") > 40
+        assert text.count("<text") > 30
         assert "drawing speed, m/s" in text
         assert "size of the path, mm" in text
 
