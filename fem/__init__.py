@@ -32,6 +32,7 @@ from fem.boundary import Support
 from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
+from fem.goal import goal_error
 from fem.harmonic import harmonic
 from fem.interior import displacement_operator, is_inside, locate
 from fem.linear_solver import Factor, available, factorise
@@ -96,6 +97,7 @@ __all__ = [
     "factorise",
     "finite_strain",
     "from_young",
+    "goal_error",
     "harmonic",
     "imbalance",
     "is_inside",

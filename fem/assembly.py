@@ -158,7 +158,10 @@ def assemble(
         found = _of_one_material(materials[0], volume, share, (beside, R), free, mesh.n_dofs)
     else:
         K, C, M, branches = viscoelastic(materials, *volume, share)
-        K, C, M = (restricted(A, free) for A in (K, C, M))
+        del volume  # whose parts, and then each whole matrix, free their memory
+        K = restricted(K, free)
+        C = restricted(C, free)
+        M = restricted(M, free)
         K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
         branches = on_free(branches, free)
         found = Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
@@ -223,6 +226,8 @@ def _volume(
         for m in np.flatnonzero(lam > direct).tolist()
     }
     beside: dict[int, Any] = {m: D[m].T @ D[m] for m in D}
+    for dilatation in beside.values():
+        dilatation.sort_indices()  # its blocks, so that no later sum has to sort their entries
     for m, added in directional_parts(materials).items():
         own = region == m
         part = replace(pattern, slot=pattern.slot[own])

@@ -66,8 +66,11 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     A.sort_indices()
     if not np.isfinite(A.data).all():
         raise ValueError("the matrix has entries that are not finite; check the material")
-    solve = {"pardiso": _pardiso, "cholmod": _cholmod_solve, "superlu": _superlu}[backend](A)
-    return Factor(solve=solve if np.iscomplexobj(A.data) else _by_parts(solve), backend=backend)
+    complex_valued, only = np.iscomplexobj(A.data), [A]
+    del A  # for PARDISO to free the whole of it, of which it needs half
+    solver = {"pardiso": _pardiso, "cholmod": _cholmod_solve, "superlu": _superlu}[backend]
+    solve = solver(only.pop())
+    return Factor(solve=solve if complex_valued else _by_parts(solve), backend=backend)
 
 
 def _by_parts(solve: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -166,6 +169,7 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     """
     n, kind = A.shape[0], 6 if np.iscomplexobj(A.data) else 2
     values, indices, indptr = _upper(A)
+    del A
     # PARDISO perturbs pivots below an absolute bound: entries of about 1 make it a relative one.
     scale = 2.0 ** np.round(np.log2(np.abs(values).max(initial=1e-300)))
     values /= scale
@@ -194,6 +198,8 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
         return x
 
     call(12)
+    if kind == 2:  # a Cholesky factor perturbs no pivots, and is solved with without the matrix
+        values, indices, indptr = values[:1].copy(), indices[:1].copy(), indptr[:1].copy()
 
     def solve(b: Array) -> Array:
         x = call(33, b)

@@ -134,8 +134,8 @@ def reduce(
         raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
     point, operators = _expansion(operators, added, band)
     laws = _laws(operators)
-    A = laws.at(factors_at(operators.branches, point))
-    factor = factorise(A.of(operators.K, operators.M), backend=solver)
+    factors = factors_at(operators.branches, point)
+    factor = factorise(laws.at(factors).of(operators.K, operators.M), backend=solver)
     report(0.0)
 
     independent = _independent(start_vectors)
@@ -166,6 +166,8 @@ def reduce(
             f"{tolerance:g}; raise the tolerance, narrow the band or add damping"
         )
 
+    backend = factor.backend
+    del factor  # whose memory the basis takes
     K, C, _, branches = space.model(size)
     basis = space.basis[:, :size]
     return ReducedModel(
@@ -176,7 +178,7 @@ def reduce(
         outputs=space.seen(size)[:, : start_vectors.shape[1]].T.copy(),
         moments=moments,
         estimate=errors[-1],
-        solver=factor.backend,
+        solver=backend,
         branches=branches,
     )
 

@@ -22,6 +22,7 @@ from simple_model.material import Material, PronyTerm
 from skinwave.cli import main
 from skinwave.scene import BODIES, Body, Layer, solid_of
 from skinwave.scene_file import dumps
+from skinwave.simulation import compute
 from skinwave.studies import mechanisms
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
@@ -331,6 +332,56 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
     assert found.steps[0].response is not None
     assert all("no such model" in step.error for step in found.steps[1:])
     assert found.effects() == []
+
+
+def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch):
+    small = Body(width=0.03, height=0.03, depth=0.004)
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
+        lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
+    )
+    monkeypatch.setattr("skinwave.studies.relax.apart", lambda work, *given: work(*given))
+    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    found = hierarchy_of(SKIN, lambda phase, done: None, h=4e-3).steps
+    first, *others = [step.response.effort.seconds for step in found]
+    reduction = {"assemble", "factorise and reduce"}
+    assert reduction <= set(first)
+    for step, own in zip(found[1:], others, strict=True):
+        assert not reduction & set(own)
+        assert step.seconds > first["factorise and reduce"]
+        assert (step.response.values == found[0].response.values).all()
+
+
+def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
+    asked = []
+
+    def not_reduced(scene, model, h=None):
+        asked.append(h)
+        if "fem" in model:
+            raise fem.NotReduced("200 moments leave an error")
+        return compute(scene, model)
+
+    monkeypatch.setattr("skinwave.studies.relax.compute", not_reduced)
+    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    monkeypatch.setattr("skinwave.studies.relax.apart", lambda work, *given: work(*given))
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "little loss", "flat")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
+        lambda scene, dropped, **device: (
+            scene, "fem" if set(dropped) == {"linear drive", "flat"} else "point-kernel",
+        ),
+    )  # fmt: skip
+    found = hierarchy_of(SKIN, lambda phase, done: None, h=5e-3)
+    (failed,) = [step for step in found.every if step.error]
+    assert failed.name == "all but: little loss"
+    assert "200 moments" in failed.error
+    assert asked.count(10e-3) == 1  # and never on the fine one
+    assert len([h for h in asked if h == 5e-3]) == len(found.every) - 1
 
 
 def test_line_changes_are_of_lines_that_count():

@@ -11,7 +11,7 @@ from test_how_tos import WRITTEN  # whose blocks are run there, one after the ot
 from skinwave import SkinwaveWarning, cli, dumps, loads
 
 ROOT = Path(__file__).parent.parent
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 
 
 def shown(language, pages=PAGES):

@@ -699,6 +699,62 @@ def test_themes_about_and_a_tablet(page):
     assert wide <= 820
 
 
+def test_a_spectrum_in_decibel_help_and_the_level_over_a_control(bare):
+    bare.locator("#decibel").click()
+    bare.wait_for_function(
+        "() => window.trame.utils.plots.shown.spectrum_plot.figure.y.said.includes('dB re 1 Pa')"
+    )
+    bare.locator("#decibel").click()
+    bare.locator("#help-speed").click()
+    assert "surface waves" in bare.locator("#speed-help").inner_text()
+    bare.locator("#help-speed").press("Enter")
+    assert bare.locator("#speed-help").count() == 0
+    bare.evaluate("() => window.trame.state.set('third', 'level by height')")
+    bare.locator("#highest-level").wait_for()
+    bare.locator("#highest-level").click()
+    bare.wait_for_function("() => window.trame.state.get('height') !== 200")
+    curve = drawn(bare, "spectrum_plot")[0]
+    best = curve["x"][int(np.argmax(curve["y"]))]
+    assert state(bare, "height") == pytest.approx(best, abs=0.01)
+    photographed(bare, "level")
+    bare.evaluate("() => window.trame.state.set('third', 'spectrum')")
+    bare.wait_for_function(READY)
+
+
+def test_one_button_plays_foci_and_cursors_and_cursors_are_shared(bare):
+    value = "plot => window.trame.utils.plots.shown[plot].value"
+    bare.locator("#play").click()
+    bare.wait_for_function("() => window.trame.utils.plots.shown.waveform_plot.value > 1")
+    bare.wait_for_function("() => window.trame.state.get('phase') > 0")
+    bare.locator("#play").click()
+    bare.wait_for_function(f"() => ({value})('waveform_plot') === null")
+    bare.locator("#commanded_plot").hover(position={"x": 200, "y": 60})
+    assert bare.evaluate(value, "waveform_plot") == bare.evaluate(value, "commanded_plot") > 0
+    line = next(row for row in state(bare, "spectrum_plot")["names"])
+    place = """x => { const plot = window.trame.utils.plots.shown.spectrum_plot, box = plot.box;
+        const [low, high] = plot.zoom || plot.figure.x.range;
+        return box.x + (x - low) / (high - low) * box.w }"""
+    near = bare.evaluate(place, line["x"]) + 4  # pixels beside the peak
+    bare.locator("#spectrum_plot").hover(position={"x": near, "y": 60})
+    assert bare.evaluate(value, "spectrum_plot") == pytest.approx(line["x"], abs=1)
+
+
+def test_a_measurement_is_shown_beside_the_models(bare, tmp_path):
+    t = np.arange(0, 0.2, 5e-4)
+    rows = "".join(f"{x:.4f},{np.sin(600 * x):.5f}\n" for x in t)
+    (tmp_path / "mine.csv").write_text("t [s],u(10,0) [um]\n" + rows)
+    bare.locator("#measurement").set_input_files(tmp_path / "mine.csv")
+    bare.locator("#measured-said").wait_for()
+    assert "measured at (10, 0) mm" in bare.locator("#measured-said").inner_text()
+    assert [c["name"] for c in drawn(bare, "waveform_plot") if c["role"] == "measured"]
+    (tmp_path / "bad.csv").write_text("a,b\n1,2\n")
+    bare.locator("#measurement").set_input_files(tmp_path / "bad.csv")
+    bare.locator("#problem").wait_for()
+    assert "bad.csv" in bare.locator("#problem").inner_text()
+    bare.evaluate("() => window.trame.state.set('measured_file', [])")
+    bare.locator("#measured-said").wait_for(state="detached")
+
+
 def test_bands_come_when_nothing_is_changed_and_go_with_the_next_change(browser):
     process, address = served("--port", "0")
     page, _ = opened(browser, address, "?body=none")

@@ -281,7 +281,6 @@ class BodyKind:
     actual_size : size in metre that a mesh of one asked for has, where cells come in whole numbers
     conforming : bool, whether elements follow its layers
     may_be_coated : bool, whether layers that elements do not resolve may be a coat
-    mesh_is_cached : bool, whether its mesh is one per machine, which no run has to wait for
     normal_patch : float, metre, standard deviation of the area about a probe whose mean normal is
         the direction of its motion; 0 for the normal at the probe
     """
@@ -308,7 +307,6 @@ class BodyKind:
     actual_size: Callable[["Body", float], float] | None = None
     conforming: bool = False
     may_be_coated: bool = False
-    mesh_is_cached: bool = False
     normal_patch: float = 0.0
 
 

@@ -95,6 +95,5 @@ PALM = register(
         named_sides=("front", "back"),
         may_be_coated=True,
         dispersion=stack_dispersion,  # of a slab as deep as the middle of the palm
-        mesh_is_cached=True,
     )
 )

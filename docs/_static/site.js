@@ -1,0 +1,13 @@
+// What scrolls is reached by the keyboard; links that are pictures have names.
+function reachable() {
+  for (const each of document.querySelectorAll("pre, .table-wrapper, .math"))
+    if (each.scrollWidth > each.clientWidth || each.scrollHeight > each.clientHeight) each.tabIndex = 0;
+    else each.removeAttribute("tabindex");
+}
+addEventListener("DOMContentLoaded", () => {
+  for (const link of document.querySelectorAll(".sphx-glr-thumbcontainer a"))
+    link.setAttribute("aria-label", link.textContent.trim());
+  reachable();
+});
+addEventListener("load", reachable);
+addEventListener("resize", reachable);
