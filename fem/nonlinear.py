@@ -113,6 +113,8 @@ def _newton(
         size = float(np.linalg.norm(u))
         if left <= ROUND_OFF and float(np.linalg.norm(step)) <= tolerance * size:
             return u + step
+        if float(step @ r) <= 0.0:  # nor is it for solvers that do not tell
+            break
         u = u + _line_search(unbalanced, u, step) * step
     raise _Stuck(left)
 

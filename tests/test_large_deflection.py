@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import sparse
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -162,6 +164,12 @@ def test_round_off_of_a_thin_strip_is_no_lack_of_convergence():
     u = nonlinear.static(body, 0.02 * stiffness * share.ravel()).reshape(-1, 3)
     tip = u[share[:, 2] != 0].mean(axis=0)
     assert -tip[2] == pytest.approx(elastica(0.02)[0], rel=1e-3)
+
+
+def test_newton_stops_at_an_indefinite_tangent_though_its_solver_does_not_tell():
+    body = SimpleNamespace(tangent=lambda u: -sparse.eye_array(2, format="csc"))
+    with pytest.raises(nonlinear._Stuck):
+        nonlinear._newton(body, lambda u: (np.ones(2), 1.0), np.zeros(2), 1e-8, "superlu")
 
 
 @pytest.mark.parametrize("iterations", [1, 3])

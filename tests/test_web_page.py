@@ -355,7 +355,7 @@ def test_foci_follow_paths_of_their_own(bare, tmp_path):
     state_becomes(page, "query", kept)
     page.locator("#redo").click()
     page.wait_for_function("() => !window.trame.state.get('paths')")
-    page.locator("input[type=file]").set_input_files(tmp_path / "own.toml")
+    page.locator("#open").set_input_files(tmp_path / "own.toml")
     state_becomes(page, "query", kept)
     page.locator("#foci-field").fill("3")
     page.wait_for_selector("#own-0-2")
@@ -659,7 +659,7 @@ def test_what_is_saved_opens_again(bare, tmp_path):
     page.locator("#am-field").fill("96")
     query_has(page, "am=96")
     (tmp_path / "again.toml").write_bytes((tmp_path / "scene-toml").read_bytes())
-    page.locator("input[type=file]").set_input_files(tmp_path / "again.toml")
+    page.locator("#open").set_input_files(tmp_path / "again.toml")
     query_has(page, "am=95")
 
 

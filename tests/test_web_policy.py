@@ -168,7 +168,7 @@ def test_a_script_in_a_scene_or_its_name_never_runs(page, tmp_path, text):
     )):  # fmt: skip
         path = tmp_path / f"{'<img src=x onerror=window.ran=1>' if k else 'a'}{k}.toml"
         path.write_text(scene)
-        page.locator("input[type=file]").set_input_files(path)
+        page.locator("#open").set_input_files(path)
         if k:
             page.locator("#problem").wait_for()
         never_ran(page)
