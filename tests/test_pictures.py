@@ -37,6 +37,7 @@ from skinwave.reports import album, gallery
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import dumps
 
+ONLY = "point-kernel-published,point-kernel,skin-slab"
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
 draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
 
@@ -74,9 +75,9 @@ def seen(folder):
 
 @pytest.fixture(scope="module")
 def page(folder, tmp_path_factory):
-    """The report's folder, from the command line, of two columns."""
+    """The report's folder, from the command line, of both kernels and one body."""
     out = tmp_path_factory.mktemp("page") / "report"
-    kinds = ["--format", "svg", "--format", "pdf", "--only", "point-kernel,skin-slab"]
+    kinds = ["--format", "svg", "--format", "pdf", "--only", ONLY]
     assert main(["report", str(folder), "--out", str(out), *kinds, "--quiet"]) == 0
     return out
 
