@@ -409,10 +409,11 @@ def test_patterns_of_loads_are_those_of_their_fourier_series():
 def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_not(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(mechanisms, "DURATION", 0.4)  # s; after half of it these bodies are steady
+    monkeypatch.setattr(mechanisms, "DURATION", 0.2)  # s; after half of it these bodies are steady
+    monkeypatch.setattr(mechanisms, "AMPLITUDES", (0.25, 1.0))
     bodies = {
         "paper-sheet": replace(BODIES["paper-sheet"], width=0.06, height=0.06),
-        "skin-slab": Body(width=0.042, height=0.042),
+        "skin-slab": Body(width=0.042, height=0.042, depth=0.01, sides="clamped"),
     }
     still = [("am140", Tacton(am_frequency=140, trajectory=Trajectory()))]
     found = paper_vs_skin(lambda phase, done: None, h=0.0075, chosen=still, bodies=bodies)

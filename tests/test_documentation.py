@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 
 import pytest
+from test_how_tos import WRITTEN  # whose blocks are run there, one after the other
 
 from skinwave import SkinwaveWarning, cli, dumps, loads
 
@@ -13,12 +14,12 @@ ROOT = Path(__file__).parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 
 
-def shown(language):
+def shown(language, pages=PAGES):
     """Code blocks of a language, each with its page."""
     pattern = re.compile(rf"```{language}\n(.*?)```", re.DOTALL)
     return [
         pytest.param(text, id=f"{page.stem} {k}")
-        for page in PAGES
+        for page in pages
         for k, text in enumerate(pattern.findall(page.read_text("utf-8")))
     ]
 
@@ -50,7 +51,7 @@ def test_commands_are_understood(text):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", shown("python"))
+@pytest.mark.parametrize("text", shown("python", [p for p in PAGES if p.stem not in WRITTEN]))
 def test_python_runs(text, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     with warnings.catch_warnings():

@@ -49,8 +49,11 @@ def alternating(load):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [5e-3, 10e-3, 20e-3, 40e-3])
-@pytest.mark.parametrize(("speed", "am"), [(100.0, 0.0), (30.0, 140.0), (100.0, 140.0)])
+@pytest.mark.parametrize(
+    ("size", "speed", "am"),
+    [(5e-3, 100.0, 140.0), (10e-3, 100.0, 0.0), (20e-3, 30.0, 140.0), (20e-3, 100.0, 140.0),
+     (40e-3, 100.0, 140.0)],
+)  # fmt: skip
 def test_flat_body_settles_into_the_steady_state_on_fast_circles(size, speed, am):
     load, times = circling(size, speed, am), TIMES[:3000]
     found, expected = (
@@ -84,10 +87,12 @@ def test_a_fast_recorded_circle_moves_a_body_as_the_circle_does():
 
 def test_pulses_of_a_fast_circle_do_not_fold():
     load = circling(0.02, 100.0)
-    pulsed = Tacton(trajectory=load.tacton.trajectory, rhythm=Rhythm(pulses=((0.5, 0.0),)))
-    found = flat_body(PALM, replace(load, tacton=pulsed), PROBES, TIMES).displacement
-    expected = steady_state(PALM, load, PROBES, TIMES).displacement
-    assert misfit(found, expected, alternating(load)).max() < 0.01
+    pulsed = Tacton(trajectory=load.tacton.trajectory, rhythm=Rhythm(pulses=((0.3, 0.0),)))
+    found, expected = (
+        model(PALM, its, PROBES, TIMES[:2850]).displacement
+        for model, its in ((flat_body, replace(load, tacton=pulsed)), (steady_state, load))
+    )
+    assert misfit(found, expected, alternating(load), slice(2500, 2850)).max() < 0.01
 
 
 @pytest.mark.parametrize("load", [circling(0.02, 100.0, 140.0), circling(0.0, 0.0, 6200.0)])

@@ -168,7 +168,7 @@ def test_a_material_is_recovered_from_every_start(scene, lines):
 def test_intervals_of_a_material_hold_the_truth(scene, lines):
     keys, inside = vary(*LIMITS)[:4], []
     truth = TRUE | {"gain": 0.8, "delay_ms": 0.7}
-    for seed in range(5):
+    for seed in range(3):
         found = fit(scene, spectra(scene, lines, 0.03, seed=seed), keys, starts=1, seed=seed)
         inside += [each.low <= truth[each.key] <= each.high for each in found.estimates]
     assert np.mean(inside) >= 0.8
@@ -293,13 +293,13 @@ def test_whiteness_refuses_coloured_residuals_only():
 @pytest.mark.slow
 def test_elements_are_factorised_once_for_many_predictions():
     small = loads(
-        TEXT.replace("thickness_mm = 15", 'size_x_mm = 40\nsize_y_mm = 40\nthickness_mm = 10\n'
-                     'sides = "clamped"').replace("[18, 0]", "[14, 0]")
+        TEXT.replace("thickness_mm = 15", 'size_x_mm = 30\nsize_y_mm = 30\nthickness_mm = 10\n'
+                     'sides = "clamped"').replace(", [18, 0]", "")
     )  # fmt: skip
     found = compute(varied(small, TRUE), "fem", h=5e-3)
     measured = waveforms(small, found.values, found.times)
     fitted = fit(small, measured, vary(MODULUS, VISCOSITY, "gain"), kind="lines", model="fem",
-                 starts=2)  # fmt: skip
+                 starts=1)  # fmt: skip
     assert fitted.target.reduced.effort.factorisations * 20 <= fitted.solution.runs
     assert fitted.values[MODULUS] == pytest.approx(30e3, rel=0.05)
 

@@ -244,9 +244,9 @@ def test_amplitudes_of_resolved_lines_are_those_of_a_longer_response(load):
     short = line_table(load, point_kernel(load, PLACES, TIMES))
     times = np.arange(40_000) / 4000
     longer = replace(load, tacton=replace(load.tacton, duration=10.0))
-    names, _ = resolved_lines(longer, point_kernel(longer, PLACES, times), highest=1900.0)
-    exact = dict(zip(names, lines(point_kernel(longer, PLACES, times), list(names.values())),
-                     strict=True))  # fmt: skip
+    response = point_kernel(longer, PLACES, times)
+    names, _ = resolved_lines(longer, response, highest=1900.0)
+    exact = dict(zip(names, lines(response, list(names.values())), strict=True))
     strongest = max((a.max() for a in short.amplitudes.values()), default=0.0)
     for name, amplitude in short.amplitudes.items():
         if name in exact and amplitude.max() > 0.03 * strongest:

@@ -302,11 +302,11 @@ def test_records_that_show_no_line_are_refused(models):
         at_measured(AM, short)
 
 
-@pytest.fixture(scope="module")
-def compared(tmp_path_factory):
+@pytest.fixture
+def compared(tmp_path_factory, in_one_process):
     """A folder of `compare --measured` on a small slab, and its summary."""
     folder = tmp_path_factory.mktemp("measured")
-    body = Body(kind="slab", width=0.05, height=0.05, depth=0.008)
+    body = Body(kind="slab", width=0.04, height=0.04, depth=0.008, sides="clamped")
     scene = replace(scene_of(am_frequency=140.0, body=body), quantity="displacement",
                     probes=((0.0, 0.0), (0.008, 0.0)), name="small")  # fmt: skip
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")

@@ -173,7 +173,7 @@ def taken(model):
 
 
 @pytest.mark.parametrize("model", [m for m in names() if "nonlinear" not in m])
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(tactons, numbers(0.01, 100))
 def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
     model_options = {"h": 0.01, "dt": 1e-3 if tacton.duration > 2e-3 else None}
@@ -250,7 +250,7 @@ def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
 
 
 @pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem", "fem-transient"])
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(tactons)
 def test_what_the_load_does_later_changes_nothing_before(model, tacton):
     """The load lasts as long as its Tacton, so that the longer one goes on pushing."""
@@ -391,7 +391,7 @@ def test_a_scene_comes_back_from_its_file(scene, tacton):
         assert once.body.width == pytest.approx(scene.body.width, rel=1e-14)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(scenes())
 def test_what_is_planned_runs(scene):
     with pytest.MonkeyPatch.context() as patch:

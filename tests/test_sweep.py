@@ -26,6 +26,7 @@ from skinwave.sweeps import sweep as sweeping
 from skinwave.sweeps.variation import cases, combinations, parse
 
 THREADS = ["--scheduler", "threads", "--quiet"]
+SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
 FOREARM = Path(__file__).parent.parent / "examples/speed-on-forearm.toml"
 not_on_windows = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 
@@ -144,7 +145,7 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
     monkeypatch.setattr(sweeping, "prepare", counted)
     sweeping._prepared.cache_clear()
     rows = swept("--vary", "tacton.speed_m_per_s=2:8:6", "body.thickness_mm=12,13",
-                 "body.size_x_mm=40", "body.size_y_mm=40", "--model", "fem", "--h", 10,
+                 *SMALL, "--model", "fem", "--h", 7,
                  "--workers", 1)  # fmt: skip
     assert {row["status"] for row in rows} == {"done"}
     assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
@@ -152,12 +153,7 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
 
 
 def test_each_row_says_how_wrong_its_mesh_is(scene):
-    smaller = [
-        "body.size_x_mm=40",
-        "body.size_y_mm=40",
-        "body.thickness_mm=8",
-        "body.sides=clamped",
-    ]
+    smaller = [*SMALL, "body.thickness_mm=8"]
     rows = swept(
         "--vary", "tacton.am_frequency_hz=80,300", *smaller, "--model", "fem", "--tolerance", 0.3
     )
@@ -212,11 +208,11 @@ def test_the_forearm_gives_way_most_near_the_rayleigh_speed(tmp_path, monkeypatc
     """Largest deflection on a circle of 100 mm around, in um/Pa, by Hankel transforms."""
     monkeypatch.chdir(tmp_path)
     table = dict(zip(
-        [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 18],
-        [0.362, 0.402, 0.409, 0.366, 0.309, 0.260, 0.222, 0.194, 0.175, 0.162, 0.146, 0.130, 0.120],
+        [1, 2, 3, 4, 6, 8, 10, 18],
+        [0.362, 0.402, 0.409, 0.366, 0.260, 0.194, 0.162, 0.120],
         strict=True,
     ))  # fmt: skip
-    speeds = [*table, 2.25, 2.5, 2.75, 3.25]
+    speeds = [*table, 2.5, 2.75]
     vary = f"tacton.speed_m_per_s={','.join(map(str, speeds))}"
     assert main(["sweep", str(FOREARM), "--vary", vary, "--out", "out", *THREADS]) == 0
     rows = dataset.read(Path("out"))
@@ -232,13 +228,14 @@ def test_the_forearm_gives_way_most_near_the_rayleigh_speed(tmp_path, monkeypatc
 
 
 def test_plots_are_drawn_with_units(scene):
-    swept("--vary", "tacton.speed_m_per_s=4,6,8", "tacton.size_mm=8,10,70")
+    swept("--vary", "tacton.speed_m_per_s=4,6", "tacton.size_mm=8,10,70")
     for kind in ("png", "svg", "pdf"):
         check_plots(kind)
 
 
 def test_rows_keep_the_order_of_the_design(scene):
-    vary = ["--vary", "tacton.speed_m_per_s=8,4,70,6", "tacton.size_mm=9,8"]
+    kernel = ["--model", "point-kernel"]
+    vary = ["--vary", "tacton.speed_m_per_s=8,4,70,6", "tacton.size_mm=9,8", *kernel]
     rows = swept(*vary)
     design = [(v, d) for v in (8, 4, 70, 6) for d in (9, 8)]
     at = lambda row: (row["tacton.speed_m_per_s"], row["tacton.size_mm"])  # noqa: E731
@@ -247,7 +244,7 @@ def test_rows_keep_the_order_of_the_design(scene):
     for part in list(Path("short-sweep/rows").glob("*.parquet"))[::2]:
         part.unlink()
     assert [row["key"] for row in swept(*vary)] == [row["key"] for row in rows]  # gone on with
-    more = swept("--vary", "tacton.speed_m_per_s=5,4", "tacton.size_mm=9", "--csv")
+    more = swept("--vary", "tacton.speed_m_per_s=5,4", "tacton.size_mm=9", "--csv", *kernel)
     assert [at(row) for row in more] == [*design, (5, 9)]
     assert [row["index"] for row in more] == list(range(9))
     with open("short-sweep/rows.csv", newline="") as file:
@@ -348,17 +345,17 @@ def test_curves_of_many_values_have_a_colour_bar():
 
 def check_plots(kind):
     drawn = ["plot", "short-sweep", "--format", kind, "--quiet"]
-    assert main([*drawn, "--column", "f_AM_um[1]", "--column", "kernel_misfit"]) == 0
+    assert main([*drawn, "--column", "f_AM_um[1]"]) == 0
     assert main([*drawn, "--column", "spread_6db_mm", "--heat"]) == 0
     assert main([*drawn, "--preset", "speed"]) == 0
     files = list(Path("short-sweep/figures").glob(f"*.{kind}"))
-    assert len(files) == 4
+    assert len(files) == 3
     assert all(file.stat().st_size > 5000 for file in files)
     if kind == "pdf":
         assert not any(b"/Type3" in file.read_bytes() for file in files)
     if kind == "svg":
         text = "".join(file.read_text() for file in files)
-        assert text.count("<text") > 40
+        assert text.count("<text") > 30
         assert "drawing speed, m/s" in text
         assert "size of the path, mm" in text
 
@@ -428,8 +425,8 @@ def cluster(tmp_path_factory):
             process.wait()
 
 
-VARY = ["--vary", "tacton.speed_m_per_s=4,6,8", "tacton.am_frequency_hz=0,100"]
-FEM = ["body.size_x_mm=40", "body.size_y_mm=40", "--model", "fem", "--h", "10", "--quiet"]
+VARY = ["--vary", "tacton.speed_m_per_s=4,6", "tacton.am_frequency_hz=0,100"]
+FEM = [*SMALL, "--model", "fem", "--h", "10", "--quiet"]
 
 
 @pytest.mark.slow
@@ -440,7 +437,7 @@ def test_processes_and_a_cluster_give_the_same_table(scene, cluster, monkeypatch
     assert main([*sweep, "--out", "here"]) == 0
     assert main([*sweep, "--out", "there", "--scheduler", cluster[0]]) == 0
     same(dataset.read(Path("here")), dataset.read(Path("there")))
-    short = replace(read(scene), body=Body(width=0.04, height=0.04))
+    short = replace(read(scene), body=Body(width=0.04, height=0.04, sides="clamped"))
     with engine.mapped_on(cluster[0]) as mapped:
         spread = compute(short, "fem-harmonic", h=0.015, mapped=mapped).displacement
     here = compute(short, "fem-harmonic", h=0.015).displacement
