@@ -20,7 +20,6 @@ from test_web_page import (
 )
 
 from skinwave.web.controls import KEYS
-from skinwave.web.turns import AT_ONCE
 
 SCRIPTS = (
     "<img src=x onerror='window.ran=1'>",
@@ -58,25 +57,19 @@ def next_open(pages):
     raise AssertionError("no page opens when another is closed")
 
 
-def test_more_pages_than_open_at_once_all_open(browser, address):
-    context = browser.new_context()
-    pages = [context.new_page() for _ in range(AT_ONCE + 1)]
-    for page in pages:
-        page.goto(address + "&body=none", wait_until="commit")
-    for page in pages:
-        page.wait_for_function(READY, timeout=2 * PATIENCE)
-    context.close()
-
-
-def test_pages_beyond_the_most_say_so_and_open_when_another_is_closed(browser):
+def test_pages_open_one_after_the_other_and_beyond_the_most_when_another_is_closed(
+    browser,
+):
     process = subprocess.Popen([sys.executable, "-c", FEW], stderr=subprocess.PIPE, text=True)
     address = re.search(r"http://\S+", process.stderr.readline())[0]
     context = browser.new_context()
     pages = [context.new_page() for _ in range(4)]
-    for page, awaited in zip(pages, (READY, READY, WAITING, WAITING), strict=True):
-        page.set_default_timeout(PATIENCE)
-        page.goto(address + "&body=none", wait_until="commit")
-        page.wait_for_function(awaited)
+    for two, awaited in ((pages[:2], READY), (pages[2:], WAITING)):
+        for page in two:
+            page.set_default_timeout(2 * PATIENCE)
+            page.goto(address + "&body=none", wait_until="commit")
+        for page in two:
+            page.wait_for_function(awaited)
     assert pages[2].locator("#sw-waiting").is_visible()
     pages[0].close()
     opened_by_itself, waits = next_open(pages[2:])
