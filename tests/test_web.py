@@ -816,6 +816,26 @@ def session(request):
     made.worker.close()
 
 
+def test_levels_of_waves_stay_with_another_look_and_are_asked_for_with_another_control(
+    session, monkeypatch
+):
+    asked = []
+    monkeypatch.setattr(session, "ask", lambda: asked.append(session.levels.view))
+    with session.state:
+        session.state.third = "level by speed"
+    with session.state:
+        told(session, "levels", session.number, [1.0] * len(session.levels.at))
+    with session.state:
+        session.state.highest = 1000
+    assert session.levels.waves is not None
+    with session.state:
+        session.state.third = "level by size"
+    assert asked == ["level by speed", "level by size"]
+    with session.state:
+        session.state.third = "spectrum"
+    assert (session.levels, session.variants) == (None, ())
+
+
 def test_the_state_of_a_page_is_numbers_texts_and_what_they_make_up(session):
     def plain(value):
         if isinstance(value, dict):

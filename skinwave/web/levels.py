@@ -71,7 +71,7 @@ def above_threshold(scene: Scene, answers: Sequence[Answer]) -> str:
     """
     kernel, waves = answers[0], answers[-1]
     own = waves is not kernel
-    if own and not (scene.body.is_skin and scene.reading.is_plain):
+    if scene.body.of_kind.discretise and not (scene.body.is_skin and scene.reading.is_plain):
         return ""
     unit = "m" if own else "Pa"
     levels = {x: float(sensation_level(x.amplitude, x.frequency, unit=unit))

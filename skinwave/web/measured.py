@@ -6,6 +6,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from meshes.tetmesh import Floats
+from simple_model import Response
+from simple_model import spectrum as model_spectrum
 from simple_model.quantities import Quantity, quantity
 from skinwave.measurements import Measurement
 
@@ -57,12 +59,18 @@ def waveform(measured: Measurement, place: int) -> tuple[Floats, Floats]:
 
 
 def spectrum(measured: Measurement, place: int) -> tuple[Floats, Floats]:
-    """Frequencies (f,) in Hz and amplitudes (f,) of the mean of all repetitions."""
+    """Frequencies (f,) in Hz and amplitudes (f,) of the mean of all repetitions, by the window that
+    the models' spectra have.
+    """
     if len(measured.frequencies):
         return measured.frequencies, np.abs(measured.values[:, :, place].mean(axis=0))
     t, values = waveform(measured, place)
-    size = np.abs(np.fft.rfft(values - values.mean())) * 2 / len(t)
-    return np.asarray(np.fft.rfftfreq(len(t), float(t[1] - t[0]))), size
+    shown = Response(
+        model="measured", times=t, probes=np.zeros((1, 2)), values=values[:, None],
+        quantity=measured.quantity,
+    )  # fmt: skip
+    frequencies, amplitudes = model_spectrum(shown)
+    return frequencies, amplitudes[:, 0]
 
 
 def refusal(measured: Measurement, shown: Quantity) -> str:

@@ -232,10 +232,10 @@ def published(session: Session) -> None:
 def look(session: Session) -> None:
     """Another view of the same response is to be seen."""
     session.zoomed = None
-    before = session.variants
-    vary(session)
-    if session.variants and not before and session.scene.body.of_kind.discretise:
-        session.ask()
+    if session.state.third != (session.levels.view if session.levels else ""):
+        vary(session)
+        if session.variants and session.scene.body.of_kind.discretise:
+            session.ask()
     draw(session)
 
 
@@ -260,11 +260,8 @@ def measurement(session: Session) -> None:
             session.measured = None
             draw(session)
         return
-    one = given[0] if isinstance(given, list) else given
-    content = one.get("content", b"")
-    content = content if isinstance(content, bytes) else b"".join(content)
     try:
-        session.measured = measured.read(str(one.get("name", "")), content)
+        session.measured = measured.read(*_sent(given))
     except ValueError as error:
         session.state.problem = f"the measurement cannot be read: {error}"
         return
@@ -278,9 +275,7 @@ def opened(session: Session) -> None:
     if not given:
         return
     session.state.opened = None
-    one = given[0] if isinstance(given, list) else given
-    content = one.get("content", b"")
-    content = content if isinstance(content, bytes) else b"".join(content)
+    _, content = _sent(given)
     if len(content) > LARGEST_FILE:
         session.state.problem = (
             f"the scene cannot be opened: a file of {len(content) / 1e6:.3g} MB exceeds "
@@ -288,6 +283,13 @@ def opened(session: Session) -> None:
         )
         return
     open_scene(session, content.decode("utf-8", "replace"))
+
+
+def _sent(given: Any) -> tuple[str, bytes]:
+    """Name and content of a file that a browser has sent."""
+    one = given[0] if isinstance(given, list) else given
+    content = one.get("content", b"")
+    return str(one.get("name", "")), content if isinstance(content, bytes) else b"".join(content)
 
 
 def open_scene(session: Session, text: str) -> None:

@@ -179,7 +179,8 @@ def _measured(curves: Curves) -> str:
     refused = measured.refusal(found, waves.response.record if waves else DISPLACEMENT)
     place = measured.nearest(found, curves.kernel.response.probes[0, :2])
     times = "from its first sample" if len(found.times) else "as a spectrum alone"
-    return refused or f"{measured.named(found, place)}: of {len(found.places)} places, {times}."
+    said = refused or f"{measured.named(found, place)}: of {len(found.places)} places, {times}."
+    return " ".join([said, *found.remarks])
 
 
 def _against(waves: Answer, kernel: Answer) -> dict[str, Any]:
