@@ -46,7 +46,14 @@ from fem.load_and_probe import (
     surface_frame,
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
-from fem.modal import Complex, Poles, exponential_sum, line_response, poles
+from fem.modal import (
+    Complex,
+    Poles,
+    exponential_sum,
+    impulse_response,
+    line_response,
+    poles,
+)
 from fem.nodal_strain import SolidPart, nodal_strain, solid_parts
 from fem.plane_stiffness import Tension
 from fem.reduced import NotReduced, ReducedModel, load_subspace, reduce, transfer
@@ -100,6 +107,7 @@ __all__ = [
     "goal_error",
     "harmonic",
     "imbalance",
+    "impulse_response",
     "is_inside",
     "line_response",
     "load_operator",
