@@ -32,7 +32,7 @@ from fem.boundary import Support
 from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
-from fem.goal import goal_error
+from fem.goal import GoalError, goal_error
 from fem.harmonic import harmonic
 from fem.interior import displacement_operator, is_inside, locate
 from fem.linear_solver import Factor, available, factorise
@@ -80,6 +80,7 @@ __all__ = [
     "Elastic",
     "EnergyBalance",
     "Factor",
+    "GoalError",
     "Material",
     "MaxwellBranch",
     "Membrane",
