@@ -17,7 +17,16 @@ import numpy as np
 
 import fem
 import skinwave
-from meshes import Grading, TetMesh, equidistributed, extrude, graded_axis, mapped_palm
+from meshes import (
+    Grading,
+    TetMesh,
+    corner_volumes,
+    equidistributed,
+    extrude,
+    graded_axis,
+    mapped_palm,
+)
+from meshes.shapes.equidistributed import ORDER
 from meshes.shapes.structured import with_planes
 from meshes.tetmesh import Floats, Ints
 from simple_model.load_spectrum import pressure_lines
@@ -33,10 +42,13 @@ from skinwave.scene import Layer, Scene
 SCENES = Path(__file__).parent.parent / "examples"
 HIGHEST = 300.0  # Hz
 UNIFORM = ((12, 2), (16, 3), (20, 4), (24, 5))  # cells along a side, and through the depth
-FINE, COARSE = 2.5e-3, 4.6e-3  # m, cells of the reference under the focus and far from it
+NEAR = {  # by kind of body, cells of the reference in metre under the focus, and beyond
+    "palm": (2.4e-3, Grading(radius=24e-3, growth=1.2, coarsest=4.2e-3)),
+    "slab": (2.5e-3, Grading(radius=22.5e-3, growth=1.25, coarsest=4.6e-3)),
+}
 DOWN = (0, 1.8, 3.7, 6, 8.6, 11.8, 15)  # mm, its grid line downwards
 DOWN_LAYERS = (0, 0.65, 1.3, 2.6, 4, 5.3, 8.2, 11.4, 15)
-DOFS = (11e3, 16e3, 22e3, 30e3)
+DOFS = (7e3, 11e3, 16e3, 22e3, 30e3)
 AIM = 0.02
 LAYERS = (Layer(thickness=1.3e-3, material="dermis"), Layer(thickness=4e-3, material="fat"))
 Lines = Sequence[Floats]
@@ -82,8 +94,7 @@ def uniform(body: Body, cells: int, layers: int) -> Lines:
 
 def reference(body: Body) -> Lines:
     """Cells that grow away from the focus."""
-    near = Grading(radius=9 * FINE, growth=1.25, coarsest=COARSE)
-    halves = [graded_axis(side / 2, FINE, near) for side in (body.width, body.height)]
+    halves = [graded_axis(side / 2, *NEAR[body.kind]) for side in (body.width, body.height)]
     along = [np.concatenate([-half[:0:-1], half]) for half in halves]
     return *along, -1e-3 * np.array(DOWN_LAYERS if body.layers else DOWN)[::-1]
 
@@ -143,6 +154,8 @@ def compare(name: str) -> None:
             print("    along x, y, z", np.round(start[1].sum(axis=0) / start[1].sum(), 2))
     lines, along_axes = start
     mesh = build_body(body, discretise=partial(discretised, lines)).mesh
+    least = ideal(corner_volumes(mesh.points, mesh.tets), along_axes.sum(axis=1))
+    print(f"  ideal elements of any size: {least:.2f} of the uniform dofs", flush=True)
     cells = cells_of(lines, body, mesh)
     for dofs in DOFS:
         *along, down = equidistributed(lines, cells, along_axes, dofs)
@@ -151,13 +164,22 @@ def compare(name: str) -> None:
     print(f"  dofs at 2 %: {each[0]:,.0f} and {each[1]:,.0f}, {each[1] / each[0]:.2f}", flush=True)
 
 
+def ideal(volume: Floats, error: Floats) -> float:
+    """Dofs at equal error, over those of uniform elements, of elements as large as the errors (e,)
+    of elements of a volume (e,) ask for: of a density e(x) h^r, h ~ e^(-1 / (r + 3)).
+    """
+    density = error / volume
+    graded = (density ** (3 / (ORDER + 3)) * volume).sum() ** ((ORDER + 3) / 3)
+    even = error.sum() * volume.sum() ** (ORDER / 3)
+    return float((graded / even) ** (3 / ORDER))
+
+
 def enough(errors: list[tuple[int, float]]) -> float:
-    """Dofs at the error that is aimed at, along straight lines of the logarithms; nan beyond."""
-    dofs, error = np.log(np.array(sorted(set(errors)))).T
-    order = np.argsort(error)
-    return float(
-        np.exp(np.interp(np.log(AIM), error[order], dofs[order], left=np.nan, right=np.nan))
-    )
+    """Dofs at the error that is aimed at, along straight lines of the logarithms."""
+    error, dofs = np.log(np.array(sorted({(error, dofs) for dofs, error in errors}))).T
+    k = np.clip(np.searchsorted(error, np.log(AIM)), 1, len(error) - 1)
+    slope = (dofs[k] - dofs[k - 1]) / (error[k] - error[k - 1])
+    return float(np.exp(dofs[k] + slope * (np.log(AIM) - error[k])))
 
 
 if __name__ == "__main__":
