@@ -24,8 +24,9 @@ FETCHED = {
     ("source", "src"),
 }
 OPENED = ("index", "moving-waves", "turning-waves", "tutorial/1-first-scene", "how-to",
-          "explanation/load", "reference/commands", "reference/scene-keys", "reference/api-skinwave",
-          "reference/verification", "gallery/index", "gallery/11_fingertip_with_bone")  # fmt: skip
+          "explanation/load", "reference/commands", "reference/scene-keys",
+          "reference/api-skinwave", "reference/verification", "gallery/index",
+          "gallery/11_fingertip_with_bone")  # fmt: skip
 LARGEST = 10e6  # bytes of a page that is a program of its own
 SERIOUS = ("serious", "critical")
 
