@@ -136,7 +136,7 @@ def reopen(page: Page, rng: random.Random) -> None:
         page.locator("#save-scene-toml").click()
         path = Path(folder, "scene.toml")
         saved.value.save_as(path)
-        page.locator("input[type=file]").set_input_files(path)
+        page.locator("#open").set_input_files(path)
 
 
 MOVES: dict[Callable[[Page, random.Random], None], int] = {

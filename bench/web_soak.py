@@ -86,10 +86,12 @@ def warm(pages: list[Page], bodies: Sequence[str]) -> None:
             query = f"body={name}&size={10 + 2 * k}&height={200 + 5 * k}"
             for page in pages:
                 page.evaluate("q => window.trame.trigger('restart', [q])", query)
-            for page in pages:
+            for page in pages:  # the body that it opens with is not in its query
                 page.wait_for_function(
-                    "q => window.trame.state.get('query').includes(q)"
-                    " && !window.trame.state.get('waves_stale')", arg=name, timeout=BUILT,
+                    "([body, size]) => window.trame.state.get('body') === body"
+                    " && window.trame.state.get('size') === size"
+                    " && !window.trame.state.get('waves_stale')",
+                    arg=[name, 10 + 2 * k], timeout=BUILT,
                 )  # fmt: skip
 
 

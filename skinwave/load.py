@@ -33,7 +33,7 @@ class Load:
     direction : of a shear traction (x, y) of any length, or "path", along the path of the focus; of
         a force (x, y, z), z upwards; () for that of its kind
     force : float, N, of a contact at full drive
-    width : float, metre, standard deviation of a contact's Gaussian traction
+    width : float, metre, standard deviation of a contact's Gaussian traction; 0 for 2 mm
     gravity : float, m/s2, downwards; it deflects the body before the load begins
     support_motion : SupportMotion, of all that the body is clamped to or rests on; or None
 

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import inf, isfinite, nextafter, pi
 from typing import Any
@@ -274,6 +274,13 @@ def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     return x / 1e3, y / 1e3
 
 
+def _contact_in_mm(key: str, value: Any) -> float:
+    if not (width := _number(key, value)):
+        raise ValueError(f"{key} = 0 is no contact, a point has no response of its own; give its "
+                         "width, or leave it out for 2 mm")  # fmt: skip
+    return width / 1e3
+
+
 def _scaled(name: str, per_unit: float = 1.0) -> SceneKey:
     """A number whose unit in the file is `per_unit` times smaller than inside."""
     return SceneKey(
@@ -437,7 +444,7 @@ SECTIONS = {
         "kind": _word("kind"),
         "direction": SceneKey("direction", _direction, _write_direction),
         "force_n": _scaled("force"),
-        "width_mm": _scaled("width", 1e3),
+        "width_mm": replace(_scaled("width", 1e3), read=_contact_in_mm),
         "gravity_m_per_s2": _scaled("gravity"),
         "support_motion": SceneKey(
             "support_motion", _support_motion, partial(written, SUPPORT_MOTION)

@@ -27,6 +27,7 @@ from skinwave.planning.extent import symmetry
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
 from skinwave.spreads import spreads_of
+from skinwave.studies.study import own_scenes
 from skinwave.web.scenes import values_of
 
 SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
@@ -254,6 +255,7 @@ def test_a_force_has_no_device():
         ('kind = "shear"\ndirection = "path"', "rests or jumps from point to point"),
         ('kind = "point_force"', "must be a finite number above 0; give force_n"),
         ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0.01', "is outside 0.2..20 mm"),
+        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0', "width_mm = 0 is no contact"),
         ('kind = "point_force"\nforce_n = 1\ndirection = [0, 0, 0]', "must be 3 finite numbers"),
         ('kind = "point_force"\nforce_n = 1\n[focus]\nheight_mm = 300', r"\[focus\] is that of a"),
         ("gravity_m_per_s2 = 99", "must be a number within 30 of 0"),
@@ -282,6 +284,8 @@ def test_models_say_which_loads_they_do_not_take(model, scene, said):
 def test_pages_of_a_focus_refuse_other_loads():
     with pytest.raises(ValueError, match="is about the pressure of a focus, not a shear traction"):
         values_of(loads('[load]\nkind = "shear"'))
+    with pytest.raises(ValueError, match="leave out .load., or use skinwave run or sweep"):
+        own_scenes(loads('[load]\nkind = "shear"'), "sheared")
 
 
 def test_kinds_of_load_are_registered_once():

@@ -19,6 +19,7 @@ from skinwave import window
 from skinwave.cli import main
 from skinwave.fields import Field
 from skinwave.models import BUILT_IN, named
+from skinwave.pictures import scene_plot
 from skinwave.pictures.styles import style
 from skinwave.planning.extent import PlanRow
 from skinwave.reports.album import Album
@@ -285,6 +286,17 @@ def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
     assert "less &lt;than&gt; asked" in plan._repr_html_()
     assert "too &lt;coarse&gt;" in wave()._repr_html_()
     assert "100 Hz" in scene._repr_html_()
+
+
+def test_the_page_of_a_scene_has_its_load_and_its_regions():
+    regions = '[body]\nkind = "mesh"\nfile = "hand.vtu"\nregions = { ring = "bone" }\n'
+    load = '[load]\nkind = "point_force"\nforce_n = 0.1\ngravity_m_per_s2 = 9.8\n'
+    page = scene_plot._facts(skinwave.loads(regions + load))
+    assert ["region ring", "bone"] in page
+    said = dict(page)["load"]
+    assert "0.1 N along (0, 0, -1)" in said
+    assert "gravity of 9.8 m/s2" in said
+    assert "pressure" not in dict(page), "a contact has no focus"
 
 
 def test_a_sweep_in_python_has_the_runs_of_each_scene(scene, tmp_path):

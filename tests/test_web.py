@@ -375,6 +375,18 @@ def test_the_third_plot_shows_what_is_chosen_of_what_the_body_has():
     assert third("none").startswith("Spectrum")
 
 
+def test_paper_has_no_threshold_not_even_while_its_waves_are_computed():
+    def names(body):
+        scene = scenes.scene_of(STARTS | {"body": body})
+        state = Mock(third="spectrum", highest=600, decibel=False)
+        plot = shown.third_plot(state, scene, plots.Curves(kernel=model.kernel(scene)))
+        return [curve["name"] for curve in plot["data"]]
+
+    assert not any("threshold" in name for name in names("a4-sheet"))
+    assert any("threshold" in name for name in names("none"))
+    assert any("threshold" in name for name in names("palm"))
+
+
 def test_what_is_shown_is_what_simulate_answers():
     scene = scenes.scene_of(STARTS)
     shown, alone = model.kernel(scene), compute(scene, "point-kernel")

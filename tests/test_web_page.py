@@ -809,6 +809,35 @@ def test_what_can_be_turned_has_a_name_for_a_screen_reader(page, query):
     assert nameless == []
 
 
+def test_axe_finds_no_serious_violation(page):
+    """In the panel with what opens in it, in a list that is open, and in the dark."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+
+    def violations():
+        page.wait_for_timeout(400)  # colours and lists come little by little
+        found = axe.run(page, options={"resultTypes": ["violations"], "preload": False})
+        return [
+            (each["id"], each["nodes"][0]["target"])
+            for each in found.response["violations"]
+            if each["impact"] in ("serious", "critical")
+        ]
+
+    query = "body=none&pulses=10/20&foci=2&paths=point/0/9/9,+line/9/0/0"
+    page.evaluate("q => window.trame.trigger('restart', [q])", query)
+    page.locator("#own").wait_for()
+    page.locator("#help-am").click()
+    page.locator("#pin").click()
+    page.locator("#highest").press("ArrowDown")
+    page.locator(".v-overlay [role=option]:visible").first.wait_for()
+    assert violations() == []
+    page.keyboard.press("Escape")
+    page.locator("#help-am").click()
+    page.locator("#pin").click()
+    page.locator("#theme").click()
+    assert violations() == []
+    page.locator("#theme").click()
+
+
 def test_two_pages_do_not_disturb_each_other_and_ask_nothing_of_the_network(
     browser, address, page, visit
 ):

@@ -1,4 +1,4 @@
-"""Page on which waves move in a browser without Python: recorded fields.
+"""Pages on which waves move in a browser without Python, maps and a scene: recorded fields.
 
 Of each Tacton the page has the complex amplitudes of the strongest lines of the load, at every
 place of a grid, as the point kernel has them and as the skin slab moves: Re sum a exp(2 pi i f t)
@@ -20,8 +20,8 @@ SPEEDS = (2.0, 4.0, 6.0, 8.0, 12.0)  # m/s
 AM = (0.0, 140.0)  # Hz
 SIZE, REACH, STEP = 0.020, 0.030, 1.2e-3  # m, diameter of the path; the grid and its step
 MOST, FAINT = 10, 0.02  # lines of a Tacton, and what they are at least of the strongest
-PAGE = "moving-waves.html"
-TEMPLATE = Path(__file__).parents[1] / "_templates" / PAGE
+PAGES = "moving-waves.html", "turning-waves.html"
+TEMPLATES = Path(__file__).parents[1] / "_templates"
 
 
 def _packed(a: Any) -> dict[str, Any]:
@@ -55,10 +55,7 @@ def recordings() -> Iterator[dict[str, Any]]:
             load = MovingPressure(tacton=Tacton(am_frequency=am, trajectory=path))
             f, q = pressure_lines(load, places, FAINT)
             _, u = steady_lines(skin, load, places, threshold=FAINT)
-            strength = (
-                np.abs(q).max(axis=1) / np.abs(q).max() + np.abs(u).max(axis=1) / np.abs(u).max()
-            )
-            kept = np.sort(np.argsort(-strength * (f > 1e-9))[: min(MOST, int((f > 1e-9).sum()))])
+            kept = _strongest(f, q, u)
             yield {
                 "am": am, "speed": speed, "side": len(line), "reach": REACH, "size": SIZE,
                 "frequencies": [float(f"{x:.9g}") for x in f[kept]],
@@ -74,12 +71,28 @@ def thresholds() -> dict[str, list[float]]:
     return {"f": [float(f"{x:.5g}") for x in f], "u": [float(f"{x:.5g}") for x in threshold(f)]}
 
 
+def pages(tactons: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
+    """Name and text of each page of these recordings."""
+    from turning import viewer
+
+    first = tactons[0]
+    data = json.dumps({"tactons": tactons, "threshold": thresholds()})
+    parts = {
+        "__SHARED__": (TEMPLATES / "recorded.js").read_text("utf-8").replace("__RECORDED__", data),
+        "__VIEWER__": viewer(first["side"], first["reach"], first["size"]),
+    }
+    for name in PAGES:
+        text = (TEMPLATES / name).read_text("utf-8")
+        for key, part in parts.items():
+            text = text.replace(key, part)
+        yield name, text
+
+
 def write(app: "Sphinx", exception: Exception | None) -> None:
-    """Write the page beside the others."""
+    """Write the pages beside the others."""
     if exception is None and app.builder.format == "html":
-        data = json.dumps({"tactons": [*recordings()], "threshold": thresholds()})
-        text = TEMPLATE.read_text("utf-8").replace("__RECORDED__", data)
-        (Path(app.outdir) / PAGE).write_text(text, "utf-8")
+        for name, text in pages([*recordings()]):
+            (Path(app.outdir) / name).write_text(text, "utf-8")
 
 
 def setup(app: "Sphinx") -> dict[str, bool]:

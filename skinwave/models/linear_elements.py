@@ -24,7 +24,7 @@ def vacuum_only(model: str, body: Body) -> None:
     if body.air:
         raise ValueError(
             f"{model} solves sparse equations, and the added mass of air is a dense operator; "
-            "leave air out, or use --model fem, fem-nonlinear or flat-body"
+            "leave air out, or use --model fem, fem-nonlinear, plate-modes or flat-body"
         )
 
 

@@ -103,14 +103,23 @@ def _facts(scene: "Scene") -> list[list[str]]:
         ["focus", "at rest" if path.is_static else moved],
         ["amplitude modulation", tones or "none"],
         ["duration", f"{tacton.duration:g} s"],
-        ["pressure", f"{pressure.peak_pressure:g} Pa, {pressure.drive}, {pressure.profile_name}"],
-        ["body", body.of_kind.words(body)],
     ]
+    if not scene.load.force:  # of a contact, which has no focus
+        rows.append(
+            [
+                "pressure",
+                f"{pressure.peak_pressure:g} Pa, {pressure.drive}, {pressure.profile_name}",
+            ]
+        )
+    if not scene.load.is_plain:
+        rows.append(["load", scene.load.words])
+    rows.append(["body", body.of_kind.words(body)])
     if body.of_kind.discretise:
         rows.append(["supports", f"base {body.base}, sides {body.sides}"])
         layers = [f"{1e3 * layer.thickness:g} mm of {_named(layer.material)}"
                   for layer in body.layers]  # fmt: skip
         rows.append(["material", "; below it ".join([*layers, _named(body.material)])])
+        rows += [[f"region {name}", _named(material)] for name, material in body.regions]
     return [*rows, ["probes", f"{len(scene.probes)}, {scene.reading.words}"]]
 
 

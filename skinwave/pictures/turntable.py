@@ -8,6 +8,7 @@ import sys
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from meshes import subprocess_call
 from skinwave.pictures.maps import SIGNED
@@ -21,29 +22,46 @@ EXTRA = "the extra [web], trame-pyvista, is not installed"
 
 def turntable(view: View, frame: int) -> str | None:
     """The page of a view at a frame; None if what exports it is not installed, or fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Path(folder, "view.npz")
+        save(kept, view)
+        return exported(Path(__file__), kept, frame)
+
+
+def exported(script: Path, *given: object) -> str | None:
+    """The page that a script exports to the last of its arguments, after those given; None if
+    what exports it is not installed, or fails.
+    """
     if find_spec("trame_pyvista") is None:
         return None
     with tempfile.TemporaryDirectory() as folder:
-        kept, page = Path(folder, "view.npz"), Path(folder, "page.html")
-        save(kept, view)
+        page = Path(folder, "page.html")
         # An existing folder keeps the exporter from asking a network for what it does not need.
         quiet = {"VTK_WASM_DIR_OVERRIDE": folder}
         try:
             subprocess_call.run(
-                Path(__file__), kept, frame, page, folder=folder, timeout=PATIENCE,
-                environment=quiet,
-            )  # fmt: skip
+                script, *given, page, folder=folder, timeout=PATIENCE, environment=quiet
+            )
         except (ValueError, TimeoutError):
             return None
         return page.read_text(encoding="utf-8").replace(ICON, "data:,")
 
 
-def _export(view: View, frame: int, path: str) -> None:
+def export(plotter: Any, path: str) -> None:
+    """Write the page of a plotter, which it closes; in a process of its own."""
     import pyvista as pv
     from trame_pyvista.jupyter import launch_server
 
     async def ready() -> None:
         await launch_server(pv.global_theme.trame.jupyter_server_name).ready
+
+    asyncio.run(ready())
+    plotter.trame.export_html(path)
+    plotter.close()
+
+
+def _drawn(view: View, frame: int) -> Any:
+    import pyvista as pv
 
     plotter = pv.Plotter(off_screen=True, lighting="none", window_size=(800, 500))
     plotter.set_background("white")
@@ -58,10 +76,8 @@ def _export(view: View, frame: int, path: str) -> None:
     plotter.camera.parallel_projection = False  # which the page does not take over
     plotter.reset_camera()
     plotter.camera.zoom(1.3)
-    asyncio.run(ready())
-    plotter.trame.export_html(path)
-    plotter.close()
+    return plotter
 
 
 if __name__ == "__main__":
-    _export(load(Path(sys.argv[1])), int(sys.argv[2]), sys.argv[3])
+    export(_drawn(load(Path(sys.argv[1])), int(sys.argv[2])), sys.argv[3])

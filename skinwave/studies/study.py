@@ -16,7 +16,7 @@ from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.processes import helper
 from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Scene, body_name, with_body
+from skinwave.scene import BODIES, Body, Scene, body_name, check_load, with_body
 from skinwave.simulation import check_options, compute
 from skinwave.studies import measured_page, measured_tables, paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
@@ -39,7 +39,14 @@ def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str
 
 
 def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
-    """The same for one scene: on its own body or, if it has none, on paper and skin."""
+    """The same for one scene: on its own body or, if it has none, on paper and skin.
+
+    Raises
+    ------
+    ValueError
+        If its load is another than the pressure of a focus, or it has gravity.
+    """
+    check_load(scene, "a comparison with the point kernel")
     if scene.body.of_kind.discretise:
         bodies = {body_name(scene.body): scene}
     else:

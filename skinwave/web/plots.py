@@ -134,7 +134,7 @@ def spectrum_plot(
         f, a = thinned(answer.frequencies[shown], answer.spectrum[shown])
         data.append({"x": numbers(f), "y": numbers(_in_unit(answer) * a), **style})
     data += _measured(curves, measured.spectrum, 1.0, (0.0, highest))
-    if with_threshold or waves is None:
+    if with_threshold:
         data.append(_threshold_curve(highest, of_waves=waves is not None))
     named = waves if waves is not None and not curves.stale else curves.kernel
     return {

@@ -94,8 +94,8 @@ def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
             state.problem = str(error)
     if state.third in LEVELS and curves.levels is not None:
         return level_plot(curves.levels, None if curves.stale else curves.waves)
-    plain = scene.reading.is_plain
-    found = plots.spectrum_plot(curves, state.highest, with_threshold=plain)
+    skin = (scene.body.is_skin and scene.reading.is_plain) or not scene.body.of_kind.discretise
+    found = plots.spectrum_plot(curves, state.highest, with_threshold=skin)
     return plots.in_decibel(found) if state.decibel else found
 
 
