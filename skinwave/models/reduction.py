@@ -98,9 +98,10 @@ def reduce_body(
         operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators),
         solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
+    pushed = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
     reduced = ReducedBody(
         poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=model.C, radiation=model.R,
-        branches=model.branches, load=P.T @ model.basis, points=points,
+        branches=model.branches, load=P[pushed].T @ model.basis[pushed], points=points,
         effort=Effort(
             dofs=len(operators.free), reduced_dofs=len(model.K), solver=model.solver,
             factorisations=1, estimate=model.estimate,
