@@ -98,6 +98,7 @@ def reduce_body(
         operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators),
         solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
+    P = P.tocsr()
     pushed = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
     reduced = ReducedBody(
         poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=model.C, radiation=model.R,
