@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from fem.materials import Material
 from fem.maxwell import Branch
@@ -27,10 +28,10 @@ class Combination:
 
     def of(self, K: Any, M: Any) -> Any:
         """The matrix itself, of the kind of K and M; K if it is nothing else."""
-        terms = [self.mass * M] if self.mass else []
+        terms = [_multiple(self.mass, M)] if self.mass else []
         terms += [] if self.rest is None else [self.rest]
         if self.stiffness or not terms:  # the largest last: each sum copies what it adds to
-            terms.append(K if self.stiffness == 1 else self.stiffness * K)
+            terms.append(_multiple(self.stiffness, K))
         return sum(terms[1:], start=terms[0])
 
     def times(self, v: Floats, Kv: Floats, Mv: Floats) -> Floats:
@@ -100,6 +101,16 @@ class Laws:
         x = sum((part.stiffness * v for part, v in each), np.zeros_like(z)) / A.stiffness
         m = sum((part.mass * v for part, v in each), z) - A.mass * x
         return x, m, [v - factor * x for factor, v in zip(factors, acted_on, strict=True)]
+
+
+def _multiple(factor: float, A: Any) -> Any:
+    """Multiple of a matrix; a sparse one shares its pattern, a third of its memory."""
+    if factor == 1:
+        return A
+    if isinstance(A, sparse.csr_array):
+        A.sort_indices()  # once for both: sorting the multiple would sort them, and not A's data
+        return sparse.csr_array((factor * A.data, A.indices, A.indptr), shape=A.shape)
+    return factor * A
 
 
 def factors_at(branches: Sequence[Branch], s: float) -> tuple[float, ...]:

@@ -169,12 +169,12 @@ def reduce(
     backend = factor.backend
     del factor  # whose memory the basis takes
     K, C, _, branches = space.model(size)
-    basis = space.basis[:, :size]
+    R = space.radiation(operators.R, size)
     return ReducedModel(
-        basis=operators.expand(basis),
+        basis=space.expanded(size),
         K=K.copy(),
         C=C.copy(),
-        R=space.radiation(operators.R, size),
+        R=R,
         outputs=space.seen(size)[:, : start_vectors.shape[1]].T.copy(),
         moments=moments,
         estimate=errors[-1],
@@ -231,7 +231,9 @@ class KrylovBasis:
         self._M, self._K = product(operators.M), product(operators.K)
         rests = (part.rest for part in laws.parts)
         self._rests = [None if rest is None else product(rest) for rest in rests]
-        self._columns = np.empty((len(operators.free), most), order="F")
+        self._free, n_dofs = operators.free, operators.n_dofs
+        self._all_dofs = np.empty((n_dofs, most), order="F")  # for `expanded`
+        self._columns = self._all_dofs[: len(operators.free)]
         # Projected K and rests (size, size), and what is seen of a response (size, k).
         self._small_K = np.empty((0, 0))
         self._small_rests = [None if times is None else self._small_K for times in self._rests]
@@ -242,6 +244,16 @@ class KrylovBasis:
     def basis(self) -> Floats:
         """Vectors (n, size)."""
         return self._columns[:, : self.size]
+
+    def expanded(self, size: int) -> Floats:
+        """The first vectors on all dofs (n_dofs, size), 0 where the body is fixed; in the memory of
+        the basis, which there is none of afterwards.
+        """
+        for column in self._all_dofs[:, :size].T:
+            values = column[: len(self._free)].copy()
+            column[:] = 0
+            column[self._free] = values
+        return self._all_dofs[:, :size]
 
     def model(self, size: int) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
         """Projected K, C, M and Maxwell branches, in the first vectors, as far as projected."""

@@ -173,6 +173,13 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
     assert {"numpy"} <= loaded
 
 
+def test_a_comparison_loads_no_statistics():
+    """Both of its processes would, for a second each."""
+    code = "import sys, skinwave.studies.study\n"
+    code += "assert not {'scipy.stats', 'scipy.interpolate', 'scipy.optimize'} & {*sys.modules}"
+    subprocess.check_call([sys.executable, "-c", code])
+
+
 @pytest.mark.parametrize("module", ["simulation", "sweeps.sweep", "web.layout"])
 def test_what_few_commands_need_is_loaded_by_these_alone(module):
     """Each takes a tenth of a second of every process that is started."""

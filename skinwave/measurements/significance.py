@@ -1,7 +1,7 @@
 """Significance of differences from measured lines, and their confidence regions."""
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtri  # whose module is loaded anyway; `scipy.stats` takes a second
 
 from meshes.tetmesh import Floats
 from skinwave.measurements.lines import MeasuredLines
@@ -26,13 +26,13 @@ def ellipses(lines: MeasuredLines, level: float = 0.95) -> tuple[Floats, Floats,
     """
     r = len(lines.each)
     if r < 4:
-        radius = np.sqrt(lines.variance * fisher.ppf(level, 2, lines.freedom))
+        radius = np.sqrt(lines.variance * fdtri(2, lines.freedom, level))
         return radius, radius, np.zeros_like(radius)
     away = lines.each - lines.mean
     parts = np.stack([away.real, away.imag])
     covariance = np.einsum("irfp,jrfp->fpij", parts, parts) / (r - 1) / r
     values, vectors = np.linalg.eigh(covariance)
-    reach = 2 * (r - 1) / (r - 2) * fisher.ppf(level, 2, r - 2)
+    reach = 2 * (r - 1) / (r - 2) * fdtri(2, r - 2, level)
     minor, major = np.moveaxis(np.sqrt(np.maximum(reach * values, 0)), -1, 0)
     return major, minor, np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1])
 

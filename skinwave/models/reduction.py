@@ -108,9 +108,11 @@ def reduce_body(
         operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators),
         solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
+    P = P.tocsr()
+    pushed = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
     reduced = ReducedBody(
         poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=model.C, radiation=model.R,
-        branches=model.branches, load=P.T @ model.basis, points=points,
+        branches=model.branches, load=P[pushed].T @ model.basis[pushed], points=points,
         inertia=np.zeros(len(model.K)) if inertia is None else inertia @ model.basis,
         effort=Effort(
             dofs=len(operators.free), reduced_dofs=len(model.K), solver=model.solver,

@@ -103,7 +103,8 @@ def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
 
 def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     """A few Tactons side by side: waveform, spectrum at one probe, and spread over all."""
-    figure = Figure(figsize=(max(7.0, 4.0 * len(columns) + 0.5), 8.2), layout="constrained")
+    width, height = max(7.0, 4.0 * len(columns) + 0.5), 8.2
+    figure = Figure(figsize=(width, height))
     axes = figure.subplots(3, len(columns), sharey="row", squeeze=False)
     for k, (title, runs) in enumerate(columns.items()):
         where = 1e3 * np.hypot(*runs[0].response.probes[probe])
@@ -118,6 +119,12 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     axes[1, 0].set_ylabel(f"spectrum at {where:g} mm,\ndB re largest line of the model")
     axes[2, 0].set_ylabel("RMS motion,\ndB re strongest probe")
     _legend(figure, next(iter(columns.values())), scales=False)
+    # Fixed margins here, too, in inches.
+    above = 0.35 + 0.25 * (len(figure.legends[0].get_texts()) > IN_A_ROW)
+    figure.subplots_adjust(
+        0.85 / width, 0.55 / height, 1 - 0.1 / width, 1 - (above + 0.3) / height,
+        wspace=0.06, hspace=0.24,
+    )  # fmt: skip
     return figure
 
 

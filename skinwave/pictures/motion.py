@@ -142,7 +142,8 @@ def driven(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
         radiated=motion.radiated,
     )  # fmt: skip
-    return DrivenBody(build=build, basis=model.basis, motion=motion, effort=effort)
+    basis = np.ascontiguousarray(model.basis)  # of which some rows are read at a time
+    return DrivenBody(build=build, basis=basis, motion=motion, effort=effort)
 
 
 def check_values(frames: int, nodes: int) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from meshes.tetmesh import Floats
 from simple_model import Response
@@ -84,6 +83,8 @@ def _mean_in_step(comparison: MeasuredComparison) -> Floats:
     measurement, shifts = comparison.measurement, comparison.lines.shifts
     if not shifts.any():
         return measurement.mean
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     times = evenly(measurement)
     shifted = [
         CubicSpline(times, values)(np.clip(times + shift, times[0], times[-1]))

@@ -319,7 +319,7 @@ def reduced_to_path(
     shape, nodes = skin_of(made, body)
     return Reduced(
         body=reduced, read=read, within=within, made=made, shape=shape, nodes=nodes,
-        basis=model.basis.astype(np.float32),
+        basis=model.basis.astype(np.float32, order="C"),
     )  # fmt: skip
 
 
