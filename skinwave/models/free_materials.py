@@ -135,13 +135,15 @@ def training_shares(count: int, inside: int) -> Floats:
     """Corners (at most `MOST_CORNERS`), the middle, and so many further points inside of a unit
     cube of `count` dimensions: shares (t, count), the same each time.
     """
-    from scipy.stats import qmc
-
     corners = np.array(list(product((0.0, 1.0), repeat=count)))
     if len(corners) > MOST_CORNERS:
         corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
-    sobol = qmc.Sobol(count, rng=0).random(inside) if inside else np.zeros((0, count))
-    return np.vstack([corners, np.full((1, count), 0.5), sobol])
+    few = np.vstack([corners, np.full((1, count), 0.5)])
+    if not inside:
+        return few
+    from scipy.stats import qmc  # which takes long to import
+
+    return np.vstack([few, qmc.Sobol(count, rng=0).random(inside)])
 
 
 def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
