@@ -147,10 +147,10 @@ def refresh(session: Session) -> None:
     })  # fmt: skip
     state.body_layers = rows(scenes.body_of(session.good, session.own), session.good["layers"])
     vary(session)
-    draw(session)
     if waiting:
-        session.ask()
-    else:
+        session.ask()  # the other process computes while this one draws
+    draw(session)
+    if not waiting:
         session.ask_bands()
 
 
