@@ -1,4 +1,5 @@
-"""Latency of the page: `python -m bench.web [moves]`, in Debian's chromium without a window.
+"""Latency of the page: `python -m bench.web [moves] [palm]`, in Debian's chromium without a window;
+with `palm` that of its stiffness slider alone, by finite elements.
 
 From a key press on a slider to plots on the screen with the new response; the process's own share
 of that, in CPU time, which other work on the machine disturbs little; and from opening a page to
@@ -10,18 +11,22 @@ import re
 import subprocess
 import sys
 import time
+from typing import Any
 
 import numpy as np
 from trame.app import get_server
 
+from skinwave.scene import BODIES
 from skinwave.web import waves
 from skinwave.web.controls import STARTS
+from skinwave.web.layer_values import with_own_materials
 from skinwave.web.scenes import scene_of
 from skinwave.web.serve import session_of
 
 CHROMIUM = "/usr/bin/chromium"
 ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 PAGES = 5
+LONGEST = 1800.0  # s that the palm's first waves may take on a busy machine
 DRAWN = "() => window.trame?.utils?.plots?.shown?.spectrum_plot?.figure"
 PRESSED = """async ([key, count, name]) => {
   const slider = document.querySelector(`.sw-row:has(#${key}-field) [role=slider]`);
@@ -78,7 +83,41 @@ def own_share(moves: int) -> None:
         print(f"{'':<4}the first: {spent[0]:.2f} s")
 
 
-def in_a_browser(moves: int) -> None:
+def palms_share(moves: int) -> None:
+    """CPU time of a move of the palm's modulus in the process that computes waves."""
+    answered, own = waves.BodyResponses(), BODIES["palm"]
+    spent = []
+    for modulus in 26.0 + np.arange(moves + 1):
+        layers = f"15/{modulus:g}"
+        scene = scene_of(STARTS | {"body": "palm", "layers": layers})
+        before = time.process_time()
+        base = with_own_materials(own, layers)
+        found = answered(scene, lambda phase, done: None, False, base)
+        spent.append(time.process_time() - before)
+    row("modulus: waves of the palm, CPU", spent[1:])
+    effort = found.response.effort
+    print(
+        f"{'':<4}the first: {spent[0]:.1f} s, {effort.factorisations} factorisations, "
+        f"{effort.dofs:,} dofs, {effort.reduced_dofs} left, estimate {effort.estimate:.1e}"
+    )
+
+
+def palm_in_a_browser(page: Any, address: str, moves: int) -> None:
+    """Waiting times of a user of the palm's stiffness slider."""
+    before = time.perf_counter()
+    page.goto(address + "&body=palm")
+    page.wait_for_function(
+        "() => window.trame?.state?.get('wave_map')?.picture", timeout=LONGEST * 1e3
+    )
+    print(f"{'':<4}the palm's first waves: {time.perf_counter() - before:.1f} s", flush=True)
+    page.evaluate("document.getElementById('layers').open = true")
+    (first,) = page.evaluate(PRESSED, ["modulus-0", 1, "waves (fem), µm"])
+    print(f"{'':<4}the first move of its modulus: {first / 1e3:.1f} s", flush=True)
+    times = page.evaluate(PRESSED, ["modulus-0", moves, "waves (fem), µm"])
+    row("modulus to waves of the palm", [t / 1e3 for t in times])
+
+
+def in_a_browser(moves: int, palm: bool) -> None:
     """Waiting times of a user."""
     from playwright.sync_api import sync_playwright
 
@@ -89,6 +128,10 @@ def in_a_browser(moves: int) -> None:
     try:
         with sync_playwright() as p:
             browser = p.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+            if palm:
+                page = browser.new_page(viewport={"width": 1280, "height": 720})
+                palm_in_a_browser(page, address, moves)
+                return
             ready = []
             for _ in range(PAGES):
                 time.sleep(9)  # the next session is made ready
@@ -123,9 +166,10 @@ def in_a_browser(moves: int) -> None:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    of_palm = sys.argv[2:] == ["palm"]
     sys.argv = sys.argv[:1]  # trame reads it
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} before")
     print(f"{'':<52}{'median':>10} {'95 %':>10} {'of':>5}")
-    own_share(count)
-    in_a_browser(count)
+    (palms_share if of_palm else own_share)(count)
+    in_a_browser(count, of_palm)
     print(f"load {os.getloadavg()[0]:.1f} after")

@@ -18,8 +18,9 @@ einsum in this package:
     n    node, or degree of freedom
     p    probe, or point
     m    mode, or vector of a basis
-    t    time
+    t    time, or body of a training set
     f    frequency
+    g    geometry
 """
 
 import warnings

@@ -11,10 +11,11 @@ the absorbing layer D. Poisson's ratios are fixed, so that the dynamic stiffness
 
 is an affine sum with scalar weights, and its projection onto one basis serves every material
 (Prud'homme et al., J Fluids Eng 124:70 (2002)). In the steady state mu_r(s) may be the complex
-modulus of any law.
+modulus of any law. On a mesh whose nodes move smoothly with a thickness the projected matrices A_q
+are smooth in it, and interpolated between those of a few geometries (`interpolated`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any
@@ -34,6 +35,7 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
 
 ABSENT = 1e-30  # of a modulus and a density beside 1: below all round-off
+KINDS = ("stiffness", "mass", "dashpots", "layer", "springs")  # of matrices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,26 +176,52 @@ def modulus(material: Material, s: Any) -> Any:
     return lasting + material.relaxing_modulus(s.imag)
 
 
-def project(affine: AffineOperators, basis: Floats) -> AffineOperators:
-    """The matrices (m, m) of Galerkin's method in a basis (n_free, m)."""
+def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
+    """Matrices (q, m, m) of Galerkin's method in a basis.
 
-    def small(matrix: Any) -> Floats:
-        found = basis.T @ product(matrix)(basis)
-        return np.asarray((found + found.T) / 2)
+    Parameters
+    ----------
+    affine : AffineOperators, of q matrices
+    basis : (n_free, m) float
+    before : (q, k, k) float, those of its first k vectors
 
-    return mapped(affine, small)
+    Returns
+    -------
+    (q, m, m) float
+    """
+    k, m = before.shape[1], basis.shape[1]
+    found = np.empty((len(affine.parts), m, m))
+    found[:, :k, :k] = before
+    for matrix, small in zip(affine.parts, found, strict=True):
+        columns = basis.T @ product(matrix)(basis[:, k:])
+        small[:, k:], small[k:, :k] = columns, columns[:k].T
+        small[k:, k:] = (columns[k:] + columns[k:].T) / 2
+    return found
 
 
-def mapped(affine: AffineOperators, of: Callable[[Any], Any]) -> AffineOperators:
-    """The same with a function of each matrix in its place."""
-    return replace(
-        affine,
-        stiffness=tuple(map(of, affine.stiffness)),
-        mass=tuple(map(of, affine.mass)),
-        dashpots=tuple(map(of, affine.dashpots)),
-        layer=tuple(map(of, affine.layer)),
-        springs=tuple(map(of, affine.springs)),
-    )
+def with_parts(affine: AffineOperators, parts: Iterable[Any]) -> AffineOperators:
+    """The same with other matrices (q,), in the order of `weights`."""
+    left = iter(parts)
+    found: dict[str, Any] = {
+        kind: tuple(next(left) for _ in getattr(affine, kind)) for kind in KINDS
+    }
+    return replace(affine, **found)
+
+
+def interpolated(affine: AffineOperators, parts: Floats, shares: Floats) -> AffineOperators:
+    """Projected operators of a geometry between others.
+
+    Parameters
+    ----------
+    affine : AffineOperators, of any matrices of the same kinds
+    parts : (g, q, m, m) float, matrices of each geometry
+    shares : (g,) float, of each, with sum 1
+
+    Returns
+    -------
+    AffineOperators
+    """
+    return with_parts(affine, np.tensordot(shares, parts, 1))
 
 
 def _alone(materials: Sequence[Material], r: int) -> tuple[Material, ...]:

@@ -31,8 +31,8 @@ DEPENDENT = 1e-10  # of a state: what is left of it outside a basis is round-off
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineBasis:
-    """Galerkin equations of one line in m states: matrices `parts` (q, m, m), `force` (m,) and
-    `outputs` (p, m); `states` (r, m) are orthonormal.
+    """Galerkin equations of one line in m states, of g geometries: matrices `parts` (g q, m, m),
+    `force` (g, m) and `outputs` (g, p, m); `states` (r, m) are orthonormal.
     """
 
     parts: Complex
@@ -41,9 +41,22 @@ class LineBasis:
     states: Complex
 
 
-def steady_lines(bases: tuple[LineBasis, ...], weights: Complex) -> Complex:
-    """Steady state (f, p) at the outputs of each line's basis, with weights (f, q) of the parts."""
-    return np.stack([_outputs(b, w[None])[0] for b, w in zip(bases, weights, strict=True)])
+def steady_lines(bases: tuple[LineBasis, ...], weights: Complex, shares: Floats) -> Complex:
+    """Steady state at the outputs of each line's basis.
+
+    Parameters
+    ----------
+    bases : (f,) LineBasis
+    weights : (f, q) complex, of the matrices of one geometry
+    shares : (g,) float, of the geometries of the bases
+
+    Returns
+    -------
+    (f, p) complex
+    """
+    both = _of_parts(weights[None], shares[None])[0]
+    each = zip(bases, both, strict=True)
+    return np.stack([_outputs(b, w[None], shares[None])[0] for b, w in each])
 
 
 def line_bases(
@@ -51,6 +64,7 @@ def line_bases(
     forces: Complex,
     outputs: Floats,
     weights: Complex,
+    shares: Floats,
     tolerance: float,
     progress: Callable[[float], None],
 ) -> tuple[tuple[LineBasis, ...], float]:
@@ -58,10 +72,11 @@ def line_bases(
 
     Parameters
     ----------
-    parts : (q, r, r) float, matrices of a reduced-order model
-    forces : (f, r) complex, of each line
-    outputs : (p, r) float
+    parts : (g, q, r, r) float, matrices of a reduced-order model, of each geometry
+    forces : (g, f, r) complex, of each line
+    outputs : (g, p, r) float
     weights : (t, f, q) complex, of the parts for each material of the training set, at each line
+    shares : (t, g) float, of the geometries for each of them
     tolerance : float, relative error of each line that is not faint
     progress : called with the fraction done
 
@@ -75,27 +90,29 @@ def line_bases(
     ValueError
         If `MOST_STATES` are not enough.
     """
-    count, r = forces.shape
+    (g, count, r), p = forces.shape, outputs.shape[1]
+    parts, weights = parts.reshape(-1, r, r), _of_parts(weights, shares)
     empty = LineBasis(
-        parts=np.zeros((len(parts), 0, 0), complex), force=np.zeros(0, complex),
-        outputs=np.zeros((len(outputs), 0), complex), states=np.zeros((r, 0), complex),
+        parts=np.zeros((len(parts), 0, 0), complex), force=np.zeros((g, 0), complex),
+        outputs=np.zeros((g, p, 0), complex), states=np.zeros((r, 0), complex),
     )  # fmt: skip
     bases, errors = [empty] * count, []
-    before = np.zeros((len(weights), count, len(outputs)), complex)
+    before = np.zeros((len(weights), count, p), complex)
     changes, left = np.zeros(len(weights)), np.ones(len(weights), bool)
     for _ in range(min(MOST_STATES, len(weights))):
         t = int(np.argmax(np.where(left, changes, -1)))
         left[t] = False
-        states = np.stack([_solved(parts, w, f) for w, f in zip(weights[t], forces, strict=True)])
-        found = states @ outputs.T
+        driven = zip(weights[t], np.tensordot(shares[t], forces, 1), strict=True)
+        states = np.stack([_solved(parts, w, f) for w, f in driven])
+        found = states @ np.tensordot(shares[t], outputs, 1).T
         by_line = line_errors(before[t], found)
         errors.append(float(by_line.max()))
         if len(errors) > IN_A_ROW and max(errors[-IN_A_ROW:]) <= tolerance:
             return tuple(bases), max(errors[-IN_A_ROW:])
         progress(min(0.9, len(errors) / EXPECTED))
         for k in np.flatnonzero(by_line > SETTLED * tolerance):
-            bases[k] = _extended(bases[k], states[k], parts, forces[k], outputs)
-        now = np.stack([_outputs(b, weights[:, k]) for k, b in enumerate(bases)], axis=1)
+            bases[k] = _extended(bases[k], states[k], parts, forces[:, k], outputs)
+        now = np.stack([_outputs(b, weights[:, k], shares) for k, b in enumerate(bases)], axis=1)
         changes = np.array([line_errors(a, b).max() for a, b in zip(before, now, strict=True)])
         before = now
     raise ValueError(
@@ -119,12 +136,19 @@ def _solved(parts: Floats, weights: Complex, force: Complex) -> Complex:
     return np.asarray(np.linalg.solve(A, force), np.complex128)
 
 
-def _outputs(basis: LineBasis, weights: Complex) -> Complex:
-    """Outputs (t, p) of one line with weights (t, q)."""
-    m = len(basis.force)
+def _of_parts(weights: Complex, shares: Floats) -> Complex:
+    """Weights (t, f, g q) of the matrices of all geometries."""
+    both = shares[:, None, :, None] * weights[:, :, None, :]
+    return both.reshape(*weights.shape[:2], -1)
+
+
+def _outputs(basis: LineBasis, weights: Complex, shares: Floats) -> Complex:
+    """Outputs (t, p) of one line with weights (t, g q) and shares (t, g) of the geometries."""
+    m = basis.states.shape[1]
     A = (weights @ basis.parts.reshape(len(basis.parts), -1)).reshape(-1, m, m)
-    states = np.linalg.solve(A, np.broadcast_to(basis.force[:, None], (len(A), m, 1)))[..., 0]
-    return np.asarray(states @ basis.outputs.T)
+    states = np.linalg.solve(A, (shares @ basis.force)[..., None])[..., 0]
+    each = np.einsum("gpm,tm->tgp", basis.outputs, states)
+    return np.asarray(np.einsum("tg,tgp->tp", shares, each))
 
 
 def _extended(
@@ -145,4 +169,4 @@ def _extended(
     grown = np.empty((len(parts), m, m), complex)
     grown[:, : m - 1, : m - 1] = basis.parts
     grown[:, :, -1:], grown[:, -1] = column, row
-    return LineBasis(parts=grown, force=W.conj().T @ force, outputs=outputs @ W, states=W)
+    return LineBasis(parts=grown, force=force @ W.conj(), outputs=outputs @ W, states=W)

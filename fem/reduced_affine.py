@@ -1,4 +1,4 @@
-"""Reduced-order model of a body for every material of a range.
+"""Reduced-order model of a body for every material and geometry of a range.
 
 One basis of Krylov moments serves all materials if it holds those of the least loss, whose motion
 has most detail. It begins with the reduced-order model of that material (`reduced`), and is
@@ -6,6 +6,10 @@ assessed over a training set: by how much its last quarter changes the response 
 line and, at the largest such changes, by solutions of the full body. Where one of these is off by
 more than the tolerance, the moments of that material are added (weak greedy algorithm: Rozza, Huynh
 and Patera, Arch Comput Methods Eng 15:229 (2008)).
+
+The nodes of all geometries are those of one mesh, moved. The same basis serves them all; matrices,
+forces and outputs are projected at some of them and interpolated. Variants between these are solved
+on the full body each time.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,7 +18,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from fem.affine import AffineOperators, Solids, modulus, operators_of, project, weights
+from fem.affine import (
+    AffineOperators,
+    Solids,
+    modulus,
+    operators_of,
+    project,
+    weights,
+    with_parts,
+)
 from fem.line_basis import FAINT, Complex, line_errors
 from fem.linear_solver import available, factorise
 from fem.reduced import reduce
@@ -25,17 +37,48 @@ NESTED = 3 / 4  # of the moments: a smaller basis, from which the change is take
 CHECKED = 2  # materials of which the full body is solved, one line each
 MOST_BASES = 6
 WATCHED = 16  # strongest lines, at which changes are looked at
+BETWEEN = 1e-9  # of a share: less is round-off
 DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AffineModel:
-    """Reduced-order model of any material: projected matrices, the `basis` (n_free, m), `outputs`
-    (p, m) and `forces` (f, m) of lines; the largest relative `error` found at a line of the full
-    body, and the number of `factorisations` that it took.
+class Geometry:
+    """Full body of one geometry: its `affine` operators, `probes` (p, 3 n) sparse, nodal `forces`
+    (f, n_free) of lines in N, and `loads` as for `reduce`.
     """
 
     affine: AffineOperators
+    probes: sparse.csr_array
+    forces: Complex
+    loads: Floats | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Variant:
+    """A body of a range: its `solids`, the full body of its `geometry`, and the `shares` (g,) of
+    the geometries that it is interpolated between, of which it may be one.
+    """
+
+    solids: Solids
+    geometry: Callable[[], Geometry]
+    shares: Floats
+
+    @property
+    def is_between(self) -> bool:
+        """Whether its geometry is none of those that others are interpolated between."""
+        return float(self.shares.max()) < 1 - BETWEEN
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AffineModel:
+    """Reduced-order model of any variant: matrices `parts` (g, q, m, m) of each geometry, whose
+    kinds are those of `affine`; the `basis` (n_free, m), `outputs` (g, p, m) and `forces` (g, f, m)
+    of lines; the largest relative `error` found at a line of the full body, and the number of
+    `factorisations` that it took.
+    """
+
+    affine: AffineOperators
+    parts: Floats
     basis: Floats
     outputs: Floats
     forces: Complex
@@ -44,26 +87,23 @@ class AffineModel:
 
 
 def reduce_affine(
-    affine: AffineOperators,
-    training: Sequence[Solids],
-    probes: sparse.csr_array,
-    lines: tuple[Floats, Complex],
+    geometries: Sequence[Callable[[], Geometry]],
+    training: Sequence[Variant],
+    frequencies: Floats,
     *,
     band: float,
     tolerance: float,
-    loads: Floats,
     solver: str,
     progress: Callable[[float], None],
 ) -> AffineModel:
-    """Reduced-order model for all materials of a range.
+    """Reduced-order model for all variants of a range.
 
     Parameters
     ----------
-    affine : AffineOperators, of the full body
-    training : materials without modulus laws of their own, over the range
-    probes : (p, 3 n) sparse
-    lines : frequencies (f,) in Hz and nodal forces (f, n_free) in N that errors are assessed at
-    band, loads, solver : as for `reduce`
+    geometries : (g,) between which others are interpolated
+    training : variants without modulus laws of their own, over the range
+    frequencies : (f,) float, Hz, of the lines that errors are assessed at
+    band, solver : as for `reduce`
     tolerance : float, relative error of a line
     progress : called with the fraction done
 
@@ -74,52 +114,56 @@ def reduce_affine(
     Raises
     ------
     ValueError
-        If `MOST_BASES` materials are not enough, or as `reduce` does.
+        If `MOST_BASES` variants are not enough, or as `reduce` does.
     """
-    frequencies, nodal = lines
-    read = sparse.csr_array(probes[:, affine.free])
-    t = min(range(len(training)), key=lambda each: _loss(training[each]))
-    M = operators_of(affine, training[t]).M
-    basis, visited, checked = np.zeros((len(affine.free), 0)), set[int](), 0
+    t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
+    first = training[t].geometry()
+    M = operators_of(first.affine, training[t].solids).M
+    basis, visited, checked = np.zeros((len(first.affine.free), 0)), set[int](), 0
+    parts = np.zeros((len(geometries), len(first.affine.parts), 0, 0))
+    errors: dict[int, float] = {}
     for step in range(min(MOST_BASES, len(training))):
         visited.add(t)
+        full = training[t].geometry()
         model = reduce(
-            operators_of(affine, training[t]), probes, band, tolerance / 2, loads=loads,
-            solver=solver, progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
+            operators_of(full.affine, training[t].solids), full.probes, band, tolerance / 2,
+            loads=full.loads, solver=solver,
+            progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
         )  # fmt: skip
         smaller = basis.shape[1] or int(NESTED * len(model.K))
-        basis = _joined(basis, model.basis[affine.free], M)
-        found = AffineModel(
-            affine=project(affine, basis), basis=basis, outputs=read @ basis,
-            forces=nodal @ basis, error=0.0, factorisations=step + 1 + checked,
-        )  # fmt: skip
-        others = [each for each in range(len(training)) if each not in visited]
+        basis = _joined(basis, model.basis[full.affine.free], M)
+        found = _projected(geometries, basis, parts)
+        parts = found.parts
+        others = [t for t, each in enumerate(training) if t not in visited or each.is_between]
         errors = {}
         for t, k, near, least in _suspects(found, training, others, frequencies, smaller):
-            of_line = weights(affine, training[t], frequencies[[k]])[0]
-            exact = read @ _solution(affine, of_line, nodal[k], solver)
+            exact = _outputs(training[t], frequencies[k], k, solver)
             errors[t] = _norm(near - exact) / max(_norm(exact), least)
         checked += len(errors)
         t = max(errors, key=lambda each: errors[each], default=t)
+        done = replace(found, factorisations=step + 1 + checked)
         if not errors or errors[t] <= tolerance:
-            return replace(
-                found, error=errors.get(t, model.estimate), factorisations=step + 1 + checked
+            return replace(done, error=errors.get(t, model.estimate))
+        if t in visited:
+            raise ValueError(
+                f"matrices interpolated between thicknesses leave an error of {errors[t]:.2g}, "
+                f"above the tolerance {tolerance:g}; narrow the range of the thickness or raise it"
             )
     raise ValueError(
-        f"reduced bases of {step + 1} materials leave an error of {errors[t]:.2g} at another, "
+        f"reduced bases of {step + 1} variants leave an error of {errors[t]:.2g} at another, "
         f"above the tolerance {tolerance:g}; narrow the ranges or raise it"
     )
 
 
 def steady(
-    model: AffineModel, solids: Solids, frequencies: Floats, chosen: Iterable[int], size: int = 0
+    model: AffineModel, variant: Variant, frequencies: Floats, chosen: Iterable[int], size: int = 0
 ) -> Complex:
     """Steady state (k, p) of the outputs at chosen lines (k,).
 
     Parameters
     ----------
     model : AffineModel
-    solids : Solids
+    variant : Variant
     frequencies : (f,) float, Hz, of all lines
     chosen : (k,) int, of these
     size : of its first vectors alone, all if 0
@@ -129,25 +173,44 @@ def steady(
     (k, p) complex, metre
     """
     n = size or model.basis.shape[1]
-    parts = np.stack(model.affine.parts)[:, :n, :n]
     chosen = list(chosen)
-    each = weights(model.affine, solids, frequencies[chosen])
+    parts = np.tensordot(variant.shares, model.parts[..., :n, :n], 1)
+    forces = np.tensordot(variant.shares, model.forces[:, chosen, :n], 1)
+    each = weights(model.affine, variant.solids, frequencies[chosen])
     states = [
-        np.linalg.solve(np.tensordot(w, parts, 1), model.forces[k, :n])
-        for w, k in zip(each, chosen, strict=True)
+        np.linalg.solve(np.tensordot(w, parts, 1), force)
+        for w, force in zip(each, forces, strict=True)
     ]
-    return np.asarray(np.stack(states) @ model.outputs[:, :n].T, np.complex128)
+    outputs = np.tensordot(variant.shares, model.outputs[..., :n], 1)
+    return np.asarray(np.stack(states) @ outputs.T, np.complex128)
+
+
+def _projected(
+    geometries: Sequence[Callable[[], Geometry]], basis: Floats, before: Floats
+) -> AffineModel:
+    """Model of a basis (n_free, m), with the matrices (g, q, k, k) of its first vectors."""
+    parts, outputs, forces = [], [], []
+    for each, known in zip(geometries, before, strict=True):
+        full = each()
+        parts.append(project(full.affine, basis, known))
+        outputs.append(sparse.csr_array(full.probes[:, full.affine.free]) @ basis)
+        forces.append(full.forces @ basis)
+    return AffineModel(
+        affine=with_parts(full.affine, parts[-1]), parts=np.stack(parts), basis=basis,
+        outputs=np.stack(outputs), forces=np.stack(forces), error=0.0, factorisations=0,
+    )  # fmt: skip
 
 
 def _suspects(
     model: AffineModel,
-    training: Sequence[Solids],
+    training: Sequence[Variant],
     others: Sequence[int],
     frequencies: Floats,
     smaller: int,
 ) -> Iterator[tuple[int, int, Complex, float]]:
-    """Materials that the last vectors changed most, each with the line where they did, the response
-    (p,) there, and what its error is relative to at least.
+    """Variants that the last vectors changed most, and all between the geometries, each with the
+    line where they changed it most, the response (p,) there, and what its error is relative to at
+    least.
     """
     if not others:
         return
@@ -163,8 +226,17 @@ def _suspects(
         least = FAINT * float(np.linalg.norm(now, axis=1).max())
         found.append((float(change[k]), (t, int(watched[k]), now[k], least)))
     found.sort(key=lambda each: -each[0])
-    for _, suspect in found[:CHECKED]:
+    between = [each for each in found[CHECKED:] if training[each[1][0]].is_between]
+    for _, suspect in found[:CHECKED] + between:
         yield suspect
+
+
+def _outputs(variant: Variant, frequency: float, line: int, solver: str) -> Complex:
+    """Steady state (p,) of the full body's outputs at one line."""
+    full = variant.geometry()
+    (of_line,) = weights(full.affine, variant.solids, [frequency])
+    u = _solution(full.affine, of_line, full.forces[line], solver)
+    return np.asarray(sparse.csr_array(full.probes[:, full.affine.free]) @ u)
 
 
 def _solution(affine: AffineOperators, of_line: Complex, force: Complex, solver: str) -> Complex:

@@ -1,14 +1,15 @@
-"""Parametric reduced body: one offline stage for every material of a range.
+"""Parametric reduced body: one offline stage for every material and thickness of a range.
 
 `prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds:
 Galerkin's equations of each line of the scene's load in a few states. `answer` is the waveform from
 rest, by the poles of the reduced-order model; `at` is that model, for any other Tacton. Poisson's
-ratios, geometry and mesh are fixed. The absorbing layer of a slab with absorbing sides is as wide
-as the fastest shear waves need.
+ratios and the elements are fixed: with a thickness the nodes of one mesh move. The absorbing layer
+of a slab with absorbing sides is as wide as the fastest shear waves need.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache as cached
 from functools import partial
 from typing import Any
 
@@ -16,15 +17,22 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.affine import AffineOperators, Solids, assemble_affine, operators_of, weights
+from fem.affine import (
+    AffineOperators,
+    Solids,
+    assemble_affine,
+    interpolated,
+    operators_of,
+    weights,
+)
 from fem.line_basis import LineBasis, line_bases, steady_lines
-from fem.maxwell import with_internal
-from fem.reduced_affine import AffineModel, reduce_affine, steady
+from fem.reduced_affine import AffineModel, Geometry, Variant, reduce_affine, steady
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, pressure_lines
 from simple_model.prony import FIT_TOLERANCE
+from simple_model.quantities import STRAIN
 from skinwave.bodies.build import Build
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sizes import default_size
@@ -34,45 +42,57 @@ from skinwave.models.free_materials import (
     Reference,
     free_keys,
     meshed_materials,
-    meshing_values,
+    meshing_shares,
     reference_of,
     solids_of,
     training_shares,
     values_at,
     with_values,
 )
-from skinwave.models.full import meshed, spent
+from skinwave.models.full import spent
 from skinwave.models.laws import check_laws, relaxing
 from skinwave.models.loads import line_factor, probe_rows, surface_load
 from skinwave.models.parametric_cache import packed, unpacked
 from skinwave.models.prepared import Prepared, entry_name, typical_spots
 from skinwave.models.prepared import answer as answer_of
-from skinwave.models.reduction import BAND, ReducedBody
+from skinwave.models.reduction import BAND, reduced_variant
+from skinwave.models.thicknesses import (
+    Range,
+    build_at,
+    geometry_shares,
+    nearest_geometry,
+    range_of,
+)
 from skinwave.scene import Body, Scene, check_load
 
 TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
 FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
 MOST_LINES = 400
-FORMAT = "parametric 1"  # of what is cached
+FORMAT = "parametric 2"  # of what is cached
 ARRAYS = ("outputs", "load", "points", "frequencies")
+BETWEEN = 0.3  # of each range: a body of no known geometry
 INSIDE = 128  # materials inside the ranges, for the lines' bases
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParametricBody:
-    """Reduced body of a scene for every material of a range.
+    """Reduced body of a scene for every material and thickness of a range.
 
-    The `keys` that are free; the `reference` that was meshed; projected matrices `affine`, and in
-    their coordinates what the probes read, `outputs` (p c, r), and reduced forces `load` (k, r) of
-    unit pressure at the surface points (k, 3) in metre; `bases` (f,) of the lines at `frequencies`
-    (f,) in Hz; and the `effort` of the offline stage, with the number of its factorisations.
+    The `keys` that are free and the `bodies` of their values; the `reference` that was meshed; of
+    each of g geometries the projected matrices `parts` (g, q, r, r), whose kinds are those of
+    `affine`, and in their coordinates what the probes read, `outputs` (g, p c, r), and reduced
+    forces `load` (g, k, r) of unit pressure at the surface `points` (g, k, 3) in metre; `bases`
+    (f,) of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline stage, with the
+    number of its factorisations.
     """
 
     scene: Scene
     keys: tuple[FreeKey, ...]
+    bodies: Range
     reference: Reference
     affine: AffineOperators
+    parts: Floats
     outputs: Floats
     load: Floats
     points: Floats
@@ -90,12 +110,12 @@ def prepare(
     h: float | None = None,
     solver: str = "auto",
 ) -> ParametricBody:
-    """Offline stage: reduce a scene's body once for all materials within ranges.
+    """Offline stage: reduce a scene's body once for all materials and thicknesses within ranges.
 
     Parameters
     ----------
     scene : Scene
-    free : key of a scene file, such as "body.material.shear_modulus_pa" or
+    free : key of a scene file, such as "body.material.shear_modulus_pa", "body.thickness_mm" or
         "body.layers.0.material.viscosity_pa_s" -> its least and largest value, in the file's unit
     tolerance : float, relative error of each line of the load at the probes
     progress : called with the name of the phase and the fraction done
@@ -113,10 +133,14 @@ def prepare(
         tolerance is out of reach.
     """
     keys = free_keys(scene.body, free)
-    _check(scene, tolerance)
+    _check(scene, keys, tolerance)
     clock, report = Clock(), progress or silent
-    body = relaxing(with_values(scene.body, keys, meshing_values(keys)), FIT_TOLERANCE)
-    build = meshed(body, h, clock, report)
+    bodies = _range(scene.body, keys, h)
+    body = bodies.body(bodies.meshed)
+    with clock("mesh"):
+        report("mesh", 0.0)
+        mesh = cached(partial(build_at, bodies))
+        build = mesh(bodies.meshed)
     reference = reference_of(body, build, keys)
     probes, _ = probe_rows(body, build, scene.probe_points, scene.reading)
     of_body = entry_name(body, build, scene.probe_points, solver, tolerance, outputs=probes)
@@ -125,76 +149,118 @@ def prepare(
         entry = cache.load(name)
     if not entry:
         stage = _Stage(
-            scene=scene, keys=keys, reference=reference, build=build, probes=probes,
-            tolerance=tolerance, solver=solver,
+            scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
+            solver=solver,
         )  # fmt: skip
-        entry = _reduced(stage, clock, report, h or default_size(body))
+        entry = _reduced(stage, clock, report, build, h or default_size(body))
         cache.store(name, **entry)
-    affine, bases = unpacked(entry, entry["outputs"])
+    affine, parts, bases = unpacked(entry, entry["outputs"])
     effort = Effort(**{**entry["meta"], "seconds": clock.seconds, "peak_memory": peak_memory()})
     return ParametricBody(
-        scene=scene, keys=keys, reference=reference, affine=affine, bases=bases, effort=effort,
-        **{array: entry[array] for array in ARRAYS},
+        scene=scene, keys=keys, bodies=bodies, reference=reference, affine=affine, parts=parts,
+        bases=bases, effort=effort, **{array: entry[array] for array in ARRAYS},
     )  # fmt: skip
+
+
+def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
+    """Bodies of all values of the free keys."""
+
+    def at(shares: Sequence[float]) -> Body:
+        return relaxing(with_values(body, keys, values_at(keys, shares)), FIT_TOLERANCE)
+
+    return range_of(at, meshing_shares(keys), [key.is_thickness for key in keys], h)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Stage:
-    """Offline stage of a scene on its mesh; `probes` (p c, 3 n) is what they read."""
+    """Offline stage of a scene and the bodies of a range; `mesh` is that of shares of the range."""
 
     scene: Scene
-    keys: tuple[FreeKey, ...]
+    bodies: Range
+    mesh: Callable[[tuple[float, ...]], Build]
     reference: Reference
-    build: Build
-    probes: sparse.csr_array
     tolerance: float
     solver: str
 
-    def training(self, inside: int) -> list[Solids]:
-        """Materials over the ranges, with so many inside them."""
-        shares = training_shares(len(self.keys), inside).tolist()
-        values = (values_at(self.keys, each) for each in shares)
-        bodies = (with_values(self.scene.body, self.keys, each) for each in values)
-        return [solids_of(self.reference, body) for body in bodies]
-
-
-def _reduced(stage: _Stage, clock: Clock, report: Progress, h: float) -> dict[str, Any]:
-    """Arrays and `meta`, the effort, of what is cached."""
-    build, tolerance = stage.build, stage.tolerance
-    with clock("assemble"):
-        report("assemble", 0.0)
+    def geometry(self, at: tuple[float, ...]) -> Geometry:
+        """Full body at shares of the range."""
+        body, build = self.bodies.body(at), self.mesh(at)
         affine = assemble_affine(
             build.mesh, meshed_materials(build), fixed=build.fixed, absorbing=build.absorbing,
             drag=build.drag, support=build.support, coat=build.coat,
         )  # fmt: skip
         P, points = surface_load(build)
-        frequencies, forces = _moving(stage.scene, P, points)
-    few = stage.training(0)
+        probes, _ = probe_rows(body, build, self.scene.probe_points, self.scene.reading)
+        return Geometry(
+            affine=affine, probes=probes,
+            forces=_moving(self.scene, P, points)[1][:, affine.free],
+            loads=P @ typical_spots(body, points),
+        )  # fmt: skip
+
+    def solids(self, at: Sequence[float]) -> Solids:
+        """Materials at shares of the range."""
+        return solids_of(self.reference, self.bodies.body(at))
+
+
+def _reduced(
+    stage: _Stage, clock: Clock, report: Progress, build: Build, h: float
+) -> dict[str, Any]:
+    """Arrays and `meta`, the effort, of what is cached."""
+    bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
+    geometries = {at: cached(partial(stage.geometry, at)) for at in bodies.geometries}
+    with clock("assemble"):
+        report("assemble", 0.0)
+        frequencies, _ = _moving(scene, *surface_load(build))
+        for geometry in geometries.values():
+            geometry()
+    few = [_variant(stage, at, geometries) for at in _training(stage)]
     with clock("factorise and reduce"), one_thread():
         model = reduce_affine(
-            affine, [_relaxed(solids) for solids in few], stage.probes,
-            (frequencies, forces[:, affine.free]), band=BAND, tolerance=SHARE * tolerance,
-            loads=P @ typical_spots(stage.scene.body, points), solver=stage.solver,
-            progress=partial(report, "reduce"),
+            list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
+            solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
+    surface = [_surface(stage.mesh(at), model) for at in geometries]
     with clock("lines"), one_thread():
-        kept, bases, error = _bases(
-            model, frequencies, few, stage.training(INSIDE), tolerance, report
-        )
+        kept, bases, error = _bases(stage, model, frequencies, few, report)
     effort = Effort(
-        dofs=len(affine.free), reduced_dofs=model.basis.shape[1],
+        dofs=len(model.basis), reduced_dofs=model.basis.shape[1],
         solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
         estimate=model.error + error, factorisations=model.factorisations,
     )  # fmt: skip
+    load, points = (np.stack(each) for each in zip(*surface, strict=True))
     return {
         "meta": asdict(spent(effort, clock, build, h)), "outputs": model.outputs,
-        "load": P[affine.free].T @ model.basis, "points": points, "frequencies": kept,
-        **packed(model.affine, bases),
+        "load": load, "points": points, "frequencies": kept, **packed(model, bases),
     }  # fmt: skip
 
 
+def _training(stage: _Stage) -> list[tuple[float, ...]]:
+    """Shares (k,) of corners and middle, of geometries that are known, and of one between them."""
+    count = len(stage.bodies.meshed)
+    few = [nearest_geometry(stage.bodies, each) for each in training_shares(count, 0).tolist()]
+    between = [(BETWEEN,) * count] if len(stage.bodies.geometries) > 1 else []
+    return list(dict.fromkeys([*few, *between]))
+
+
+def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
+    """Body at shares of the range, of a geometry that is meshed already, or of one of its own."""
+    shares = geometry_shares(stage.bodies, at)
+    nearest = list(geometries.values())[int(np.argmax(shares))]
+    is_known = nearest_geometry(stage.bodies, at) == at
+    return Variant(
+        solids=_relaxed(stage.solids(at)), shares=shares,
+        geometry=nearest if is_known else partial(stage.geometry, at),
+    )  # fmt: skip
+
+
+def _surface(build: Build, model: AffineModel) -> tuple[Floats, Floats]:
+    """Reduced forces (k, r) of unit pressure, and the points (k, 3) where it is."""
+    P, points = surface_load(build)
+    return P[model.affine.free].T @ model.basis, points
+
+
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
-    """Steady state of a material at the strong lines of the scene's load.
+    """Steady state of a body of the range at the strong lines of the scene's load.
 
     Returns
     -------
@@ -203,7 +269,7 @@ def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats
     """
     solids = solids_of(prepared.reference, _body(prepared, values))
     of_parts = weights(prepared.affine, solids, prepared.frequencies)
-    found = steady_lines(prepared.bases, of_parts)
+    found = steady_lines(prepared.bases, of_parts, _shares(prepared, values))
     s = 2j * np.pi * prepared.frequencies
     return prepared.frequencies, found * line_factor(
         prepared.scene.reading.asked, s, (), found.shape[1]
@@ -211,32 +277,24 @@ def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats
 
 
 def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
-    """Response of a material from rest to the scene's Tacton, all lines and the free vibration."""
+    """Response of a body of the range from rest to the scene's Tacton, all lines and the free
+    vibration.
+    """
     return answer_of(at(prepared, values), prepared.scene)
 
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
-    """Reduced body of a material, for any Tacton."""
+    """Reduced body of values of the free keys, for any Tacton."""
     body = relaxing(_body(prepared, values), FIT_TOLERANCE)
-    small = operators_of(prepared.affine, solids_of(prepared.reference, body))
-    upright = np.linalg.inv(np.linalg.cholesky(small.M)).T  # coordinates of unit mass
-    K, C, R = (upright.T @ matrix @ upright for matrix in (small.K, small.C, small.R))
-    branches = tuple(
-        replace(branch, K=upright.T @ branch.K @ upright)
-        for branch in with_internal(small.branches)
+    shares = _shares(prepared, values)
+    outputs, load, points = (
+        np.tensordot(shares, each, 1) for each in (prepared.outputs, prepared.load, prepared.points)
     )
-    outputs = prepared.outputs @ upright
-    model = fem.ReducedModel(
-        basis=upright, K=K, C=C, R=R, outputs=outputs, moments=0,
-        estimate=prepared.effort.estimate, solver=prepared.effort.solver, branches=branches,
-    )  # fmt: skip
-    reduced = ReducedBody(
-        poles=fem.poles(model, outputs=np.eye(len(K))), damping=C, radiation=R, branches=branches,
-        load=prepared.load @ upright, points=prepared.points, effort=prepared.effort,
-    )  # fmt: skip
+    affine = interpolated(prepared.affine, prepared.parts, shares)
+    small = operators_of(affine, solids_of(prepared.reference, body))
     return Prepared(
-        probes=prepared.scene.probe_points, read=outputs, body=reduced,
-        reading=prepared.scene.reading,
+        probes=prepared.scene.probe_points, read=outputs, reading=prepared.scene.reading,
+        body=reduced_variant(small, load, points, prepared.effort),
     )  # fmt: skip
 
 
@@ -247,7 +305,7 @@ def has_affine_operators(body: Body) -> bool:
     return body.mounting == FRAME and body.solid.orthotropy is None
 
 
-def _check(scene: Scene, tolerance: float) -> None:
+def _check(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None:
     """Refuse what no affine sum gives."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
@@ -264,6 +322,11 @@ def _check(scene: Scene, tolerance: float) -> None:
             "out, or reduce the body of each material"
         )
     asked, solid = scene.reading.asked, scene.body.solid
+    if asked.field == STRAIN and any(key.is_thickness for key in keys):
+        raise ValueError(
+            f"{scene.reading.words} of elements that move with a thickness is not smooth in it; "
+            "take a displacement, velocity or acceleration"
+        )
     rows, doubled = (asked.rows(each) for each in (solid, solid.scaled(modulus=2.0)))
     if asked.relaxes or not np.array_equal(rows, doubled):
         raise ValueError(
@@ -290,29 +353,36 @@ def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
     return with_values(prepared.scene.body, prepared.keys, values)
 
 
+def _shares(prepared: ParametricBody, values: Mapping[str, float]) -> Floats:
+    """Shares (g,) of the geometries that the body of some values is interpolated between."""
+    at = [key.share(values[key.key]) for key in prepared.keys]
+    return geometry_shares(prepared.bodies, at)
+
+
 def _relaxed(solids: Solids) -> Solids:
     """The materials with Prony series for modulus laws of their own."""
     return replace(solids, materials=tuple(m.relaxing() for m in solids.materials))
 
 
 def _bases(
+    stage: _Stage,
     model: AffineModel,
     frequencies: Floats,
-    few: Sequence[Solids],
-    many: Sequence[Solids],
-    tolerance: float,
+    few: Sequence[Variant],
     report: Progress,
 ) -> tuple[Floats, tuple[LineBasis, ...], float]:
-    """Frequencies, bases and error of the lines that are strong for some of a few materials."""
+    """Frequencies, bases and error of the lines that are strong for some of a few variants."""
     every = range(len(frequencies))
     strengths = np.array(
         [np.linalg.norm(steady(model, each, frequencies, every), axis=1) for each in few]
     )
     moving = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
     kept = (frequencies == 0) | (strengths > FAINTEST * moving).any(axis=0)
+    many = training_shares(len(stage.bodies.meshed), INSIDE).tolist()
     found, error = line_bases(
-        np.stack(model.affine.parts), model.forces[kept], model.outputs,
-        np.stack([weights(model.affine, each, frequencies[kept]) for each in many]),
-        SHARE * tolerance, partial(report, "lines"),
+        model.parts, model.forces[:, kept], model.outputs,
+        np.stack([weights(model.affine, stage.solids(at), frequencies[kept]) for at in many]),
+        np.stack([geometry_shares(stage.bodies, at) for at in many]),
+        SHARE * stage.tolerance, partial(report, "lines"),
     )  # fmt: skip
     return frequencies[kept], found, error

@@ -31,6 +31,7 @@ from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.prepared import answer as own_answer
 from skinwave.models.prepared import components
 from skinwave.models.prepared import prepare as own_body
+from skinwave.models.thicknesses import build_at, geometry_shares
 from skinwave.scene import BODIES, Body, Layer, Scene
 
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"
@@ -65,9 +66,9 @@ def random_values(keys, count, seed=1):
     return [values_at(keys, each) for each in shares]
 
 
-def full_lines(scene, body, frequencies, h=H):
+def full_lines(scene, body, frequencies, h=H, made=None):
     """Steady state (f, p) of the full body by a factorisation a line, without any reduction."""
-    made = build(body, h)
+    made = made or build(body, h)
     P, points = surface_load(made)
     every, pressures = pressure_lines(scene.pressure, points)
     S = surface_motion(body, made, scene.probe_points)
@@ -241,15 +242,54 @@ def test_affine_sums_are_the_operators():
     assert abs(summed - stiff).max() < 1e-12 * abs(stiff).max()
 
 
+LAYERED = Body(
+    layers=(Layer(thickness=0.003, material="dermis"),), sides="clamped",
+    width=0.024, height=0.024, depth=0.01,
+)  # fmt: skip
+THICK = {"body.layers.0.thickness_mm": (2.0, 4.0), "body.thickness_mm": (8.0, 12.0)}
+
+
+def test_matrices_of_a_stretched_slab_are_sums_over_known_geometries():
+    keys = free_keys(LAYERED, THICK)
+    bodies = parametric._range(LAYERED, keys, 8e-3)
+    assert len(bodies.geometries) == 5  # 1, two thicknesses and their inverses
+    at = [key.share(value) for key, value in zip(keys, (2.7, 11.0), strict=True)]
+    shares = geometry_shares(bodies, at)
+    assert shares.sum() == pytest.approx(1)
+    wanted = operators(build_at(bodies, at))
+    known = [operators(build_at(bodies, each)) for each in bodies.geometries]
+    for one in "KM":
+        A = getattr(wanted, one)
+        found = sum(s * getattr(each, one) for s, each in zip(shares, known, strict=True))
+        assert abs(found - A).max() < 1e-9 * abs(A).max()
+
+
+def test_thicknesses_are_free():
+    scene = replace(scene_of(LAYERED), probes=((0.0, 0.0),))
+    key = "body.thickness_mm"
+    prepared = skinwave.prepare(scene, {key: THICK[key]}, 0.05, h=8e-3)
+    body = with_values(LAYERED, prepared.keys, {key: 9.0})
+    assert body.depth == pytest.approx(9e-3)
+    frequencies, found = parametric.lines(prepared, {key: 9.0})
+    k = int(np.argmax(np.abs(found[:, 0])))
+    made = build_at(prepared.bodies, [prepared.keys[0].share(9.0)])
+    (expected,) = full_lines(scene, body, frequencies[[k]], made=made)
+    assert found[k] == pytest.approx(expected, rel=0.01)
+    other = parametric.lines(prepared, {key: 11.5})[1][k]
+    assert abs(other - found[k]) > 0.05 * abs(found[k])
+
+
 def test_a_line_takes_no_more_states_than_its_manifold_has():
     # (1 + w) x = f: one direction, whatever the weight.
     parts = np.stack([np.eye(6), np.eye(6)])
     force, outputs = np.ones((1, 6), complex), np.eye(2, 6)
     at = np.stack([np.ones(20), 1j * np.linspace(0, 3, 20)], axis=1)[:, None]
-    (basis,), error = line_bases(parts, force, outputs, at, 1e-3, lambda x: None)
+    (basis,), error = line_bases(
+        parts[None], force[None], outputs[None], at, np.ones((20, 1)), 1e-3, lambda x: None
+    )
     assert basis.states.shape == (6, 1)
     assert error < 1e-12
-    found = steady_lines((basis,), np.array([[1.0, 0.7j]]))
+    found = steady_lines((basis,), np.array([[1.0, 0.7j]]), np.ones(1))
     assert found == pytest.approx(np.full((1, 2), 1 / (1 + 0.7j)))
 
 
@@ -258,16 +298,21 @@ def test_ranges_that_few_states_do_not_span_are_refused():
     at = np.random.default_rng(0).uniform(0, 1, (30, 1, 30)).astype(complex)
     parts = np.stack([np.diag(row) for row in np.eye(30)])
     with pytest.raises(ValueError, match=r"^30 materials of the ranges leave an error of .*"):
-        line_bases(parts, np.ones((1, 30), complex), np.ones((1, 30)), at, 1e-6, lambda x: None)
+        line_bases(
+            parts[None], np.ones((1, 1, 30), complex), np.ones((1, 1, 30)), at, np.ones((30, 1)),
+            1e-6, lambda x: None,
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("free", "words"),
     [
         ({}, "names no key"),
-        ({"body.thickness_mm": (5, 10)}, "serves materials alone"),
+        ({"body.size_x_mm": (30, 40)}, "serves materials and thicknesses alone"),
         ({"body.material.poisson": (0.4, 0.45)}, "reduce a body for each value"),
         ({"body.material.shear_modulus": (1e4, 2e4)}, "body.material.shear_modulus'"),
+        ({"body.layers.0.thickness_mm": (1.0, 2.0)}, "it has 0, counted from 0"),
+        ({"body.thickness_mm": (0.0, 2.0)}, "give a least value above 0"),
         ({MODULUS: (2e4, 1e4)}, "give a finite range, low to high"),
         ({MODULUS: (-1e4, 1e4)}, "must be a finite number above 0"),
         ({"body.layers.2.material.density_kg_m3": (900, 1000)}, "it has 0, counted from 0"),
@@ -278,6 +323,14 @@ def test_ranges_that_few_states_do_not_span_are_refused():
 def test_keys_that_cannot_be_free_are_refused(slab, free, words):
     with pytest.raises(ValueError, match=words):
         free_keys(slab.body, free)
+
+
+def test_thicknesses_that_no_mesh_follows_are_refused(slab):
+    with pytest.raises(ValueError, match="the matrices of a palm are no sums"):
+        free_keys(BODIES["palm"], {"body.thickness_mm": (15.0, 20.0)})
+    strain = replace(slab, quantity="largest_shear_strain", depth=1e-3)
+    with pytest.raises(ValueError, match="is not smooth in it"):
+        skinwave.prepare(strain, {"body.thickness_mm": (8.0, 12.0)})
 
 
 def test_values_out_of_range_are_refused(prepared):

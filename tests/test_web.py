@@ -721,14 +721,14 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
         def recv(self):
             if (number := next(questions, None)) is None:
                 raise EOFError
-            return number, None, False, ()
+            return number, None, False, (), None
 
         def send(self, content):
             sent.append(content)
 
     answers = iter([error, "found"])
 
-    def answer(self, scene, tell, moving):
+    def answer(self, scene, tell, moving, base):
         if isinstance(found := next(answers), Exception):
             raise found
         return found

@@ -10,9 +10,16 @@ from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import stack
 from skinwave.scene import BODIES, Body, Layer
 from skinwave.scene_file import dumps
-from skinwave.web import moves
-from skinwave.web.controls import STARTS, checked, from_query, to_query
-from skinwave.web.layer_values import layers_of, rows, with_layers
+from skinwave.web import moves, waves
+from skinwave.web.controls import OWN_BODY, STARTS, checked, from_query, to_query
+from skinwave.web.free_bodies import covers
+from skinwave.web.layer_values import (
+    layers_of,
+    loss_factor,
+    rows,
+    with_layers,
+    with_own_materials,
+)
 from skinwave.web.scenes import scene_of
 from skinwave.web.slabs import is_tabulated, lowest, tabulate, wavenumbers
 
@@ -103,6 +110,51 @@ def test_layers_are_moved_one_by_one(session):
         moves.own_layer(session, 2, "modulus", "40")  # of the body before
         moves.turn(session, {"body": "paper-sheet"})
     assert session.state.body_layers == []
+
+
+def test_a_palm_has_stiffness_loss_and_thickness():
+    palm = BODIES["palm"]
+    (row,) = rows(palm, "")
+    assert (row["name"], row["thickness"], row["modulus"], row["loss"]) == (
+        "palm", "15", "25", "0.2513",
+    )  # fmt: skip
+    assert with_layers(palm, "15/25/0.2513") == palm
+    stiff = with_layers(palm, "16/40/0.4")
+    assert stiff.depth == pytest.approx(16e-3)
+    assert stiff.material.shear_modulus == pytest.approx(40e3)
+    assert loss_factor(stiff.material) == pytest.approx(0.4)
+    assert with_own_materials(palm, "16/40/0.4") == replace(palm, depth=16e-3)
+    assert with_own_materials(palm, "") is None
+    assert covers(palm, with_layers(palm, "15/40/0.4"))
+    for beyond in ("15/70", "15/25/0.6", "16/30"):
+        assert not covers(palm, with_layers(palm, beyond))
+    zener = replace(palm, material="palm-zener")
+    assert loss_factor(with_layers(zener, "15/25/0.1").material) == pytest.approx(0.1)
+    with pytest.raises(ValueError, match="is none that the law of this material can have"):
+        with_layers(replace(palm, material="bone"), "15/4000/0.1")
+
+
+def test_moved_materials_of_elements_are_those_of_their_own_reduction():
+    soft = replace(BODIES["silicone-disc"], material="palm", width=0.016, height=0.016, depth=0.005)
+    values = STARTS | {"body": OWN_BODY, "duration": 0.05, "size": 4.0, "x": 3.0}
+    answered, said = waves.BodyResponses(), []
+
+    def moved(layers):
+        base = with_own_materials(soft, layers)
+        assert base == soft
+        scene = scene_of(values | {"layers": layers}, soft)
+        return scene, answered(scene, lambda *each: said.append(each), False, base)
+
+    moved("5/30")
+    assert said
+    said.clear()
+    scene, found = moved("5/17/0.2")
+    assert not said, "one reduction serves all"
+    own = waves.BodyResponses()(scene, lambda *_: None)
+    motion = own.response.displacement
+    apart = np.linalg.norm(found.response.displacement - motion)
+    assert apart < 0.02 * np.linalg.norm(motion - motion.mean())
+    assert np.nansum((found.map.rms - own.map.rms) ** 2) < 4e-4 * np.nansum(own.map.rms**2)
 
 
 def test_the_table_of_layers_is_their_wavenumber_integral():

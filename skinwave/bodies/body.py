@@ -263,6 +263,9 @@ class BodyKind:
     check : raises a ValueError for a body that cannot be
     words : kind and size of a body in a few words
     discretise : mesh of a body, with elements of a size in metre; None without anything to mesh
+    morph : called as `discretise`, and with a `reference`: the mesh that this has with elements of
+        the size, its nodes moved in proportion to the thicknesses of the body's layers; None where
+        they do not follow these
     check_size : raises a ValueError for an element size in metre that has too many elements
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
@@ -291,6 +294,7 @@ class BodyKind:
     check: Callable[[Body], object] = lambda body: None
     words: Callable[[Body], str] = lambda body: _size(body)
     discretise: Callable[[Body, float], Discretised] | None = None
+    morph: Callable[..., Discretised] | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3

@@ -23,7 +23,31 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 def discretise(body: Body, h: float) -> Discretised:
     """Structured mesh whose elements follow the layers, with any absorbing layer around it."""
-    mesh = extrude(*slab_lines(body, h))
+    return _on_lines(body, *slab_lines(body, h))
+
+
+def morph(body: Body, h: float, *, reference: Body) -> Discretised:
+    """Mesh of a reference whose layers are stretched to those of the body.
+
+    Parameters
+    ----------
+    body : Body
+    h : metre, element size of the reference
+    reference : Body, of the same materials
+
+    Returns
+    -------
+    Discretised
+    """
+    x, y, z = slab_lines(reference, h)
+    before, now = (
+        np.array([*(start for start, _ in each.strata), each.depth]) for each in (reference, body)
+    )
+    return _on_lines(body, x, y, -np.interp(-z, before, now))
+
+
+def _on_lines(body: Body, x: Floats, y: Floats, z: Floats) -> Discretised:
+    mesh = extrude(x, y, z)
     depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh, materials = in_layers(mesh, body.strata, depths)
     drag = partial(layer_drag, body) if has_layer(body) else None
@@ -84,6 +108,7 @@ SLAB = register(
             "forearm-layers": {"material": "muscle", "layers": FOREARM_LAYERS, "depth": 0.020},
         },
         discretise=discretise,
+        morph=morph,
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),

@@ -1,9 +1,9 @@
-"""Free keys of a body's materials: their ranges, and the materials that values of them make."""
+"""Free keys of a body: their ranges, and the materials and thicknesses that values of them make."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from math import isfinite
+from math import isfinite, log
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.parts import solid_of
 from skinwave.scene_keys import MATERIAL, PRONY, SECTIONS, with_key, write_material
 
+THICKNESS = ("thickness_mm",)  # path of a key
+MOST_THICKNESSES = 2
 FIXED = ("poisson", "law", "table")  # keys of a material that are no number, or change the matrices
 MOST_CORNERS = 16
 AGREES = 1e-9  # of a modulus: materials that differ by less are one
@@ -25,8 +27,8 @@ OUTSIDE = 1e-9  # of a range: round-off by which a value may be beyond it
 
 @dataclass(frozen=True, kw_only=True)
 class FreeKey:
-    """A number of a scene's materials that is free from `low` to `high`: its `key` in a scene file,
-    the `layer` that it is of, None below all layers, and the `path` in the material's table.
+    """A number of a body that is free from `low` to `high`: its `key` in a scene file, the `layer`
+    that it is of, None below all layers, and the `path` in the material's table, or `THICKNESS`.
     """
 
     key: str
@@ -40,6 +42,17 @@ class FreeKey:
         if self.low > 0:
             return float(self.low * (self.high / self.low) ** share)
         return float(self.low + share * (self.high - self.low))
+
+    def share(self, value: float) -> float:
+        """Share of the range at a value, the inverse of `at`."""
+        if self.low > 0:
+            return log(value / self.low) / log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    @property
+    def is_thickness(self) -> bool:
+        """Whether it changes the mesh."""
+        return self.path == THICKNESS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,8 +84,11 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
             "by region; reduce a body for each value"
         )
     found = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
-    for bound in (0.0, 1.0):  # which materials refuse, they refuse here
-        with_values(body, found, values_at(found, [bound] * len(found)))
+    _check_thicknesses(body, [key for key in found if key.is_thickness])
+    for layers in (0.0, 1.0):  # what materials and bodies refuse, they refuse here
+        for below in (0.0, 1.0):
+            shares = [below if key.layer is None else layers for key in found]
+            with_values(body, found, values_at(found, shares))
     return found
 
 
@@ -99,14 +115,15 @@ def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]
             f"'{strange[0]}' is not free; free it as well, or leave it out: free are "
             f"{', '.join(key.key for key in keys)}"
         )
-    for of in dict.fromkeys(key.layer for key in keys):
+    thick = {key.layer: _value(key, values) / 1e3 for key in keys if key.is_thickness}
+    for of in dict.fromkeys(key.layer for key in keys if not key.is_thickness):
         solid = solid_of(body.material if of is None else body.layers[of].material)
         table = write_material(solid)
-        for key in (key for key in keys if key.layer == of):
+        for key in (key for key in keys if key.layer == of and not key.is_thickness):
             table = _changed(table, key.path, _value(key, values))
         solid = SECTIONS["body"]["material"].read("material", table)
         body = _with_material(body, of, solid)
-    return body
+    return _with_thicknesses(body, thick) if thick else body
 
 
 def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, float]:
@@ -118,26 +135,28 @@ def training_shares(count: int, inside: int) -> Floats:
     """Corners (at most `MOST_CORNERS`), the middle, and so many further points inside of a unit
     cube of `count` dimensions: shares (t, count), the same each time.
     """
-    from scipy.stats import qmc
-
     corners = np.array(list(product((0.0, 1.0), repeat=count)))
     if len(corners) > MOST_CORNERS:
         corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
-    sobol = qmc.Sobol(count, rng=0).random(inside) if inside else np.zeros((0, count))
-    return np.vstack([corners, np.full((1, count), 0.5), sobol])
+    few = np.vstack([corners, np.full((1, count), 0.5)])
+    if not inside:
+        return few
+    from scipy.stats import qmc  # which takes long to import
+
+    return np.vstack([few, qmc.Sobol(count, rng=0).random(inside)])
 
 
-def meshing_values(keys: Sequence[FreeKey]) -> dict[str, float]:
-    """Values of the body that is meshed: the fastest shear waves below all layers, for which an
-    absorbing layer is widest; layers of one range differ, so that their elements do.
+def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
+    """Shares (k,) of the ranges of the body that is meshed: the largest thicknesses, and the
+    fastest shear waves below all layers, for which an absorbing layer is widest; layers of one
+    range differ, so that their elements do.
     """
     fastest = {"shear_modulus_pa": 1.0, "density_kg_m3": 0.0}
     inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
-    shares = [
-        fastest.get(key.path[0], x) if key.layer is None else x
+    return tuple(
+        1.0 if key.is_thickness else fastest.get(key.path[0], x) if key.layer is None else x
         for key, x in zip(keys, inside, strict=True)
-    ]
-    return values_at(keys, shares)
+    )
 
 
 def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference:
@@ -216,17 +235,23 @@ def solids_of(reference: Reference, body: Body) -> Solids:
 def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
     parts = key.split(".")
     of, path = None, parts[2:]
-    if parts[:2] == ["body", "layers"] and len(parts) > 4 and parts[3] == "material":
+    is_thickness = parts[0] == "body" and (*parts[-1:],) == THICKNESS
+    if parts[:2] == ["body", "layers"] and (
+        (len(parts) > 4 and parts[3] == "material") or (len(parts) == 4 and is_thickness)
+    ):
         if not (parts[2].isdecimal() and int(parts[2]) < len(body.layers)):
             raise ValueError(
                 f"'{key}' is of a layer that the body has not; it has {len(body.layers)}, counted "
                 "from 0"
             )
-        of, path = int(parts[2]), parts[4:]
+        of, path = int(parts[2]), parts[4:] or parts[3:]
+    elif len(parts) == 2 and is_thickness:
+        path = parts[1:]
     elif parts[:2] != ["body", "material"] or not path:
         raise ValueError(
-            f"'{key}' cannot be free: one reduced body serves materials alone; free keys of "
-            "body.material or body.layers.0.material, and reduce a body for each value of others"
+            f"'{key}' cannot be free: one reduced body serves materials and thicknesses alone; "
+            "free keys of body.material or body.layers.0.material, body.thickness_mm or "
+            "body.layers.0.thickness_mm, and reduce a body for each value of others"
         )
     known = [name for name in MATERIAL if name not in FIXED]
     if path[0] in FIXED:
@@ -234,7 +259,8 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
             f"'{key}' cannot be free: only moduli, losses, times and densities change none of a "
             "body's matrices; reduce a body for each value of it"
         )
-    choose(f"free key '{key}'", path[0], known)
+    if (*path,) != THICKNESS:
+        choose(f"free key '{key}'", path[0], known)
     if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
         raise ValueError(f"'{key}' is no number of a Prony term; name one as prony.0.modulus_pa")
     low, high = (float(bound) for bound in bounds)
@@ -243,6 +269,34 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
             f"{key} is free from {low:g} to {high:g}; give a finite range, low to high"
         )
     return FreeKey(key=key, layer=of, path=tuple(path), low=low, high=high)
+
+
+def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
+    """Refuse thicknesses that do not move one mesh."""
+    if not keys:
+        return
+    kind = body.of_kind
+    if kind.morph is None:
+        raise ValueError(
+            f"'{keys[0].key}' cannot be free: the matrices of a {body.kind} are no sums over its "
+            "thicknesses; free those of a slab, or reduce a body for each value"
+        )
+    if len(keys) > MOST_THICKNESSES:
+        raise ValueError(
+            f"{len(keys)} thicknesses are free, the limit is {MOST_THICKNESSES}; each multiplies "
+            "the meshes that a body is interpolated between"
+        )
+    if low := [key.key for key in keys if not key.low > 0]:
+        raise ValueError(f"{low[0]} is free from 0 or below; give a least value above 0")
+
+
+def _with_thicknesses(body: Body, thick: Mapping[int | None, float]) -> Body:
+    """Body with other thicknesses in metre of some layers, and of all of it."""
+    layers = tuple(
+        replace(layer, thickness=thick.get(k, layer.thickness))
+        for k, layer in enumerate(body.layers)
+    )
+    return replace(body, layers=layers, depth=thick.get(None, body.depth))
 
 
 def _value(key: FreeKey, values: Mapping[str, float]) -> float:

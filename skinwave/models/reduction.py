@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import fem
+from fem.maxwell import with_internal
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure
 from simple_model.load_spectrum import merge_lines, reduced_lines
@@ -120,6 +121,37 @@ def reduce_body(
         ),
     )  # fmt: skip
     return reduced, model
+
+
+def reduced_variant(
+    operators: fem.Operators, load: Floats, points: Floats, effort: Effort
+) -> ReducedBody:
+    """Reduced body of projected operators, in coordinates of any mass matrix.
+
+    Parameters
+    ----------
+    operators : fem.Operators, of matrices (r, r)
+    load : (k, r) float, reduced forces of unit pressure at each point
+    points : (k, 3) float, metre
+    effort : of the offline stage
+
+    Returns
+    -------
+    ReducedBody
+    """
+    upright = np.linalg.inv(np.linalg.cholesky(operators.M)).T  # coordinates of unit mass
+    K, C, R = (upright.T @ A @ upright for A in (operators.K, operators.C, operators.R))
+    branches = with_internal(operators.branches)
+    model = fem.ReducedModel(
+        basis=upright, K=K, C=C, R=R, outputs=upright, moments=0, estimate=effort.estimate,
+        solver=effort.solver,
+        branches=tuple(replace(each, K=upright.T @ each.K @ upright) for each in branches),
+    )  # fmt: skip
+    poles = fem.poles(model)
+    return ReducedBody(
+        poles=replace(poles, inputs=poles.inputs @ upright.T), damping=operators.C,
+        radiation=operators.R, branches=tuple(branches), load=load, points=points, effort=effort,
+    )  # fmt: skip
 
 
 def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Floats, fem.Complex]:

@@ -23,7 +23,7 @@ from skinwave.web.session import Session, draw, put, refresh, solid, take, vary
 
 SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
 LIKE = 20.0  # mm: paths of several foci begin no larger, to have place beside each other
-LAYER_PARTS = ("thickness", "modulus")
+LAYER_PARTS = ("thickness", "modulus", "loss")
 LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 
 
@@ -126,14 +126,16 @@ def own_path(session: Session, which: int, part: int, given: str) -> None:
 
 
 def own_layer(session: Session, which: int, part: str, given: str) -> None:
-    """Set the "thickness" in mm or the shear "modulus" in kPa of one of the body's layers."""
+    """Set the "thickness" in mm, shear "modulus" in kPa or "loss" factor of one of the body's
+    layers.
+    """
     rows, (which,) = session.state.body_layers, map(int, numbers(which))
     if not 0 <= which < len(rows):
         return  # of a body that is not shown any more
     part = choose("part of a layer", str(part), LAYER_PARTS)
     values = [{name: row[name] for name in LAYER_PARTS} for row in rows]
     values[which][part] = str(given).strip().replace(",", ".").replace("/", "")
-    turn(session, {"layers": text_of([(row["thickness"], row["modulus"]) for row in values])})
+    turn(session, {"layers": text_of([[row[name] for name in LAYER_PARTS] for row in values])})
 
 
 def select(session: Session, x: float, y: float) -> None:

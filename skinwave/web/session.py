@@ -17,7 +17,7 @@ from skinwave.web.band_worker import BANDS, FAILED, BandWorker
 from skinwave.web.bands import Bands
 from skinwave.web.controls import KEYS, STARTS, Values
 from skinwave.web.history import History
-from skinwave.web.layer_values import rows
+from skinwave.web.layer_values import rows, with_own_materials
 from skinwave.web.levels import Levels
 from skinwave.web.model import Answer
 from skinwave.web.worker import LEVELS, Worker
@@ -85,7 +85,9 @@ class Session:
     def ask(self) -> None:
         """Have the other process compute the body's response, if there is a page to tell."""
         if self._loop:
-            self.worker.ask(self.number, self.scene, bool(self.state.solid), self.variants)
+            base = with_own_materials(scenes.body_of(self.good, self.own), self.good["layers"])
+            moving = bool(self.state.solid)
+            self.worker.ask(self.number, self.scene, moving, self.variants, base)
 
     def ask_bands(self) -> None:
         """Have the bands of what is shown computed, in a process that comes after all others."""
@@ -145,10 +147,10 @@ def refresh(session: Session) -> None:
     })  # fmt: skip
     state.body_layers = rows(scenes.body_of(session.good, session.own), session.good["layers"])
     vary(session)
-    draw(session)
     if waiting:
-        session.ask()
-    else:
+        session.ask()  # the other process computes while this one draws
+    draw(session)
+    if not waiting:
         session.ask_bands()
 
 

@@ -7,11 +7,13 @@ path (`slabs`); a probe's motion from rest is then a sum over harmonics of the p
     u_f(x) = sum_k g(|x - X_k|, f) w_k(f),   w_k(f) = 1/K sum_n c_fn exp(-2 pi i n a_k)
 
 over K knots X_k of the path. Other bodies: finite elements, reduced to the pressure along the path
-and read everywhere; another path needs another reduction, other controls none.
+and read everywhere; another path needs another reduction, other controls none. Once a slider of its
+materials is moved, it is reduced for all of a range (`free_bodies`).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,6 +51,7 @@ from skinwave.models.reduction import (
 from skinwave.planning.assessment import sentences
 from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
+from skinwave.web.free_bodies import FreeBody, can_be_free, covers, free_body, reduced_at
 from skinwave.web.levels import level_of
 from skinwave.web.model import (
     FAINTEST_LEVEL,
@@ -98,12 +101,14 @@ class BodyResponses:
 
     def __init__(self) -> None:
         self._kept: dict[str, dict[Any, Any]] = {
-            "known": {}, "table": {}, "body": {}, "reduced": {}
+            "known": {}, "table": {}, "body": {}, "reduced": {}, "free": {}
         }  # fmt: skip
 
-    def __call__(self, scene: Scene, progress: Progress, moving: bool = False) -> Answer:
-        """The response in a scene of one probe, with the motion of the whole body if `moving`;
-        raises what `simulate` does.
+    def __call__(
+        self, scene: Scene, progress: Progress, moving: bool = False, base: Body | None = None
+    ) -> Answer:
+        """The response in a scene of one probe, with the motion of the whole body if `moving`; the
+        `base` is its body of other materials, before these were moved. Raises what `simulate` does.
         """
         if is_tabulated(scene.body):
             gaussian_only(scene.pressure)
@@ -112,7 +117,10 @@ class BodyResponses:
             known = self._keep("known", wide, lambda: wavenumbers(*wide, progress))
             table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
             return warned_of(scene, flat_answer(table, scene, moving))
-        body = self._keep("reduced", _reduction(scene), lambda: self._reduce(scene, progress))
+        reduce = partial(self._reduce, scene, progress)
+        if base and base != scene.body and can_be_free(base) and covers(base, scene.body):
+            reduce = partial(self._of_materials, scene, base, progress)
+        body = self._keep("reduced", _reduction(scene), reduce)
         return warned_of(scene, reduced_answer(body, scene, moving))
 
     def level(self, scene: Scene) -> float:
@@ -141,6 +149,27 @@ class BodyResponses:
             found = reduced_to_path(made, ops, scene.body, scene.pressure, progress)
         effort = replace(found.body.effort, seconds=clock.seconds)
         return replace(found, body=replace(found.body, effort=effort))
+
+    def _of_materials(self, scene: Scene, base: Body, progress: Progress) -> Reduced:
+        """The body of a scene by one that is reduced for all materials of a range."""
+        key = _reduction(replace(scene, body=base))
+        found = self._keep("free", key, lambda: self._free(scene, base, progress))
+        return of_materials(found, scene.body)
+
+    def _free(self, scene: Scene, base: Body, progress: Progress) -> tuple[FreeBody, Reduced]:
+        """Body for all materials of a range, and what it has with each of them."""
+        clock = Clock()
+        made, _ = self._keep("body", base, lambda: _assembled(base, progress))
+        with clock("reduce"):
+            P, points, spots = pushed(made, scene.pressure)
+            forces = P @ spots.T
+            found = free_body(
+                base, made, (P, points), fem.load_subspace(forces, TOLERANCE / 5), forces, progress,
+            )  # fmt: skip
+        progress("read the surface", 1.0)
+        found = replace(found, effort=replace(found.effort, seconds=clock.seconds))
+        own = seen_of(made, base, reduced_at(found, base), found.basis)
+        return replace(found, basis=found.basis[:0]), own
 
     def _keep(self, kind: str, key: Any, make: Callable[[], Any]) -> Any:
         kept = self._kept[kind]
@@ -302,32 +331,57 @@ def reduced_to_path(
 ) -> Reduced:
     """A meshed and assembled body, reduced to a pressure's path."""
     progress("factorise", 0.0)
-    P, points = surface_load(made)
-    knots = path_samples(pressure)
-    spots = pressure.spot(points, knots[:: 1 if len(knots) < MANY else 2])
-    near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
-    # As columns: taken out of coordinates they take longer than the factorisation.
-    P, points, spots = P.tocsc()[:, near], points[near], spots[:, near]
+    P, points, spots = pushed(made, pressure)
     subspace = sparse.csr_array(fem.load_subspace(P @ spots.T, TOLERANCE / 5).T)
     reduced, model = reduce_body(
         body, made, ops, subspace, TOLERANCE, surface=(P, points), report=progress
     )
     progress("read the surface", 1.0)
+    return seen_of(made, body, reduced, model.basis)
+
+
+def pushed(made: Any, pressure: MovingPressure) -> tuple[Any, Floats, Floats]:
+    """Load operator (3 n, k), points (k, 3) in metre and unit pressures (j, k) along a path, where
+    it pushes a meshed body.
+    """
+    P, points = surface_load(made)
+    knots = path_samples(pressure)
+    spots = pressure.spot(points, knots[:: 1 if len(knots) < MANY else 2])
+    near = spots.max(axis=0) > NOWHERE * spots.max()  # of a large body most is never pushed
+    # As columns: taken out of coordinates they take longer than the factorisation.
+    return P.tocsc()[:, near], points[near], spots[:, near]
+
+
+def seen_of(made: Any, body: Body, reduced: ReducedBody, basis: Floats) -> Reduced:
+    """A reduced body with what a page shows of it, in the basis (3 n, r) of its coordinates."""
     inwards = (1 - 1e-6) * places()  # a body may end where the area does
     within = fem.on_surface(made.mesh, inwards)
-    read = fem.probe_operator(made.mesh, inwards[within]) @ model.basis
+    read = fem.probe_operator(made.mesh, inwards[within]) @ basis
     shape, nodes = skin_of(made, body)
     return Reduced(
         body=reduced, read=read, within=within, made=made, shape=shape, nodes=nodes,
-        basis=model.basis.astype(np.float32, order="C"),
+        basis=basis.astype(np.float32, order="C"),
     )  # fmt: skip
+
+
+def of_materials(found: tuple[FreeBody, Reduced], body: Body) -> Reduced:
+    """A body of other materials within the range of one."""
+    whole, own = found
+    made = replace(own.made, material=dict(enumerate(relaxing(body, FIT_TOLERANCE).solids)))
+    return replace(own, body=reduced_at(whole, body), made=made)
+
+
+def _at_nodes(rows: sparse.csr_array, basis: NDArray[np.float32]) -> Floats:
+    """Product of sparse rows (k, 3 n) with a basis (3 n, r), of which they take next to nothing."""
+    used = np.unique(rows.indices)
+    return np.asarray(rows[:, used] @ basis[used])
 
 
 def _at_probe(body: Reduced, scene: Scene, motion: ReducedResponse) -> Response:
     """The quantity that a scene's probe reads, from rest."""
     times, asked = sample_times(scene), scene.reading.asked
     rows, solids = probe_rows(scene.body, body.made, scene.probe_points, scene.reading)
-    components = in_motion(read_at(motion, rows @ body.basis), asked, solids)
+    components = in_motion(read_at(motion, _at_nodes(rows, body.basis)), asked, solids)
     return Response(
         model="fem", times=times, probes=scene.probe_points, quantity=asked.name,
         values=asked.waveforms(from_rest(components, times), 1), effort=body.body.effort,
@@ -338,7 +392,7 @@ def reduced_lines_at(body: Reduced, scene: Scene) -> tuple[Floats, fem.Complex]:
     """Frequencies (f,) in Hz and steady lines (f,) in metre of a scene's probe."""
     motion = respond(body.body, _steady(scene.pressure))
     rows, _ = probe_rows(scene.body, body.made, scene.probe_points, scene.reading)
-    return motion.frequencies, (motion.lines @ np.asarray(rows @ body.basis).T)[:, 0]
+    return motion.frequencies, (motion.lines @ _at_nodes(rows, body.basis).T)[:, 0]
 
 
 def reduced_answer(body: Reduced, scene: Scene, moving: bool = False) -> Answer:

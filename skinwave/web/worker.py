@@ -18,7 +18,7 @@ LEVELS = "levels"  # what is told after a response
 
 
 def answer_forever(pipe: Connection) -> None:
-    """Compute requests (number, scene, moving, variants) until the other end is closed.
+    """Compute requests (number, scene, moving, variants, base) until the other end is closed.
 
     Sends ("progress", number, Step), then the response with its number or ("failed", number,
     sentence); and after a response ("levels", number, values) of the variants of its scene, if
@@ -32,9 +32,9 @@ def answer_forever(pipe: Connection) -> None:
     waves = BodyResponses()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
-            number, scene, moving, variants = pipe.recv()
+            number, scene, moving, variants, base = pipe.recv()
             try:
-                found = waves(scene, _teller(pipe, number), moving)
+                found = waves(scene, _teller(pipe, number), moving, base)
             except MemoryError as error:
                 pipe.send(
                     ("failed", number, one_sentence(error) or "not enough memory for this body")
@@ -122,20 +122,32 @@ class Worker:
         self._pipe: Any = None
         self._lock = threading.Lock()
         self._at: int | None = None
-        self._waiting: tuple[int, Any, bool, Sequence[Any]] | None = None
+        self._waiting: tuple[int, Any, bool, Sequence[Any], Any] | None = None
 
     def ask(
-        self, number: int, scene: Any, moving: bool = False, variants: Sequence[Any] = ()
+        self,
+        number: int,
+        scene: Any,
+        moving: bool = False,
+        variants: Sequence[Any] = (),
+        base: Any = None,
     ) -> None:
-        """Request a scene's response, with the motion of the whole body if `moving`, and the
-        sensation levels of its variants; an older request that still waits is forgotten.
+        """Request a scene's response; an older request that still waits is forgotten.
+
+        Parameters
+        ----------
+        number : of the request
+        scene : Scene
+        moving : whether with the motion of the whole body
+        variants : scenes whose sensation levels are computed after it
+        base : its body before sliders of its materials were moved, if any were
         """
         with self._lock:
             if self._at is not None:
-                self._waiting = (number, scene, moving, variants)
+                self._waiting = (number, scene, moving, variants, base)
                 return
             self._start()
-            self._send(number, scene, moving, variants)
+            self._send(number, scene, moving, variants, base)
 
     def cancel(self) -> None:
         """Forget all requests, and end the process if it is at one."""
