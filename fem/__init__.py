@@ -32,7 +32,7 @@ from fem.boundary import Support
 from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
-from fem.goal import goal_error
+from fem.goal import GoalError, goal_error
 from fem.harmonic import harmonic
 from fem.interior import displacement_operator, is_inside, locate
 from fem.linear_solver import Factor, available, factorise
@@ -46,7 +46,14 @@ from fem.load_and_probe import (
     surface_frame,
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
-from fem.modal import Complex, Poles, exponential_sum, line_response, poles
+from fem.modal import (
+    Complex,
+    Poles,
+    exponential_sum,
+    impulse_response,
+    line_response,
+    poles,
+)
 from fem.nodal_strain import SolidPart, nodal_strain, solid_parts
 from fem.plane_stiffness import Tension
 from fem.reduced import NotReduced, ReducedModel, load_subspace, reduce, transfer
@@ -73,6 +80,7 @@ __all__ = [
     "Elastic",
     "EnergyBalance",
     "Factor",
+    "GoalError",
     "Material",
     "MaxwellBranch",
     "Membrane",
@@ -100,6 +108,7 @@ __all__ = [
     "goal_error",
     "harmonic",
     "imbalance",
+    "impulse_response",
     "is_inside",
     "line_response",
     "load_operator",

@@ -11,9 +11,14 @@ nearly incompressible solid has, with the pressure p = lam_r theta of the projec
 where e, d and p are the errors of strain, dilatation and pressure. It is an estimate, no bound:
 inertia is left out, because errors of displacement are an order higher, and so is the phase that
 waves lose on their way.
+
+What cells that are shorter along one axis would gain is told by the curvatures of the same
+polynomials: along an axis, in which an element is h long, the strain leaves h^2 d^2 e. Each
+element's share is divided among the axes as the products of those of both solutions.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,8 +38,22 @@ TWICE_SHEAR = np.array([1.0, 1, 1, 2, 2, 2])  # of the components xx, yy, zz, xy
 # Weight in a fit, over that of all samples, of slopes and of curvatures, which few elements leave
 # undetermined.
 RIDGE = np.array([0.0, *3 * [1e-12], *6 * [1e-2]])
+SQUARES = [4, 7, 9]  # of the monomials, those of one coordinate
+TINY = 1e-300  # of a field without curvature
 
 Values = NDArray[Any]  # float64 or complex128
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GoalError:
+    """Error of goals by element, in the unit of the goals.
+
+    `shares` (e, g), float or complex: their sum over the elements estimates s^T u less that of the
+    mesh; `along` (e, 3): the magnitudes of all goals' shares, divided among the axes x, y and z.
+    """
+
+    shares: Values
+    along: Floats
 
 
 def goal_error(
@@ -42,7 +61,7 @@ def goal_error(
     material: Material | Mapping[int, Material],
     fields: tuple[Values, Values],
     frequency: float = 0.0,
-) -> Values:
+) -> GoalError:
     """Estimate of the error that each element leaves in goals.
 
     Parameters
@@ -54,19 +73,20 @@ def goal_error(
 
     Returns
     -------
-    (e, g), metre: its sum over the elements estimates s^T u less that of the mesh
+    GoalError, in metre
     """
     u = np.column_stack(fields)
     materials, region = by_region(mesh, material)
-    found = np.zeros((len(mesh.tets), u.shape[1] - 1), u.dtype)
+    shares = np.zeros((len(mesh.tets), u.shape[1] - 1), u.dtype)
+    along = np.zeros((len(mesh.tets), 3))
     for r, solid in enumerate(materials):
         own = np.flatnonzero(region == r)
-        found[own] = _of_solid(elements_of(mesh, own), solid, u, frequency)
-    return found
+        shares[own], along[own] = _of_solid(elements_of(mesh, own), solid, u, frequency)
+    return GoalError(shares=shares, along=along)
 
 
-def _of_solid(mesh: TetMesh, solid: Material, u: Values, frequency: float) -> Values:
-    """Shares (e, g) of the elements of one material."""
+def _of_solid(mesh: TetMesh, solid: Material, u: Values, frequency: float) -> tuple[Values, Floats]:
+    """Shares (e, g) of the elements of one material, and their magnitudes (e, 3) along the axes."""
     lam, mu = np.array(solid.first_lame), np.array(solid.shear_modulus)
     direct = direct_part(lam, mu)
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
@@ -79,8 +99,9 @@ def _of_solid(mesh: TetMesh, solid: Material, u: Values, frequency: float) -> Va
         projected = _by_parts(lambda part: projected_dilatation(mesh, part), u)[:, :, None]
     # Recovered strain has the dilatation that the stiffness acts on.
     strain[:, :, :3] += (projected - trace) / 3
-    error = _recovered(mesh, np.concatenate([strain, projected], axis=2))
-    error -= np.concatenate([strain, projected], axis=2)
+    samples = np.concatenate([strain, projected], axis=2)
+    smooth, curvature = _recovered(mesh, samples)
+    error = smooth - samples
     error[:, :, :3] += (projected - trace) / 3
     e, d, p = error[:, :, :6], error[:, :, :3].sum(axis=2), error[:, :, 6]
     relative = (
@@ -91,16 +112,27 @@ def _of_solid(mesh: TetMesh, solid: Material, u: Values, frequency: float) -> Va
     mixed = direct * d[..., :1] * d[..., 1:] + rest * (
         p[..., :1] * d[..., 1:] + d[..., :1] * p[..., 1:] - p[..., :1] * p[..., 1:]
     )
-    return np.asarray(relative * np.einsum("eq,eqp->ep", volumes, shear + mixed))
+    shares = np.asarray(relative * np.einsum("eq,eqp->ep", volumes, shear + mixed))
+    return shares, np.einsum("eip,ep->ei", _by_axis(mesh, curvature), np.abs(shares))
+
+
+def _by_axis(mesh: TetMesh, curvature: Floats) -> Floats:
+    """Parts (e, 3, g) of each element's share that its length along each axis leaves, by the
+    curvatures (e, 3, m) of the strain of all fields.
+    """
+    left = curvature * np.ptp(mesh.points[mesh.tets[:, :4]], axis=1)[:, :, None] ** 2
+    products = left[..., :1] * left[..., 1:] + TINY
+    return np.asarray(products / products.sum(axis=1, keepdims=True))
 
 
 def _by_parts(of: Any, u: Values) -> Values:
     return of(u.real) + 1j * of(u.imag) if np.iscomplexobj(u) else of(u)
 
 
-def _recovered(mesh: TetMesh, samples: Values) -> Values:
+def _recovered(mesh: TetMesh, samples: Values) -> tuple[Values, Floats]:
     """Samples (e, q, c, m) at quadrature points, smoothed there: the mean of the polynomials of
-    second degree that fit them about each of an element's corners.
+    second degree that fit them about each of an element's corners; and the norm (e, 3, m) of the
+    second derivatives of all components along each axis.
     """
     tets, nodes = mesh.tets[:, :4], shape_nodes(mesh)
     N = shape_functions(tetrahedron_rule(2)[0], nodes.shape[1])
@@ -117,7 +149,9 @@ def _recovered(mesh: TetMesh, samples: Values) -> Values:
     normal = normal.reshape(-1, 10, 10) + np.diag(RIDGE) * normal[:, :1, None]
     fits = np.linalg.solve(normal, right.reshape(len(normal), 10, -1))
     smooth = np.einsum("qa,eaqj,eajv->eqv", near, P, fits[corner], optimize=True)
-    return np.asarray(smooth.reshape(samples.shape))
+    curved = fits[:, SQUARES].reshape(len(fits), 3, *samples.shape[2:])
+    curvature = np.linalg.norm(curved, axis=2) / (size**2)[:, None, None]
+    return np.asarray(smooth.reshape(samples.shape)), curvature[corner].mean(axis=1)
 
 
 def _into_corners(tets: Ints) -> sparse.csr_array:

@@ -83,6 +83,13 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
     return lines, -(forwards + backwards).sum(axis=0)[:, None] * poles.outputs.T
 
 
+def impulse_response(poles: Poles, impulse: Floats) -> Complex:
+    """Free vibration (m, p), complex amplitudes of exp(pole t), after an impulse (r,) in
+    N s kg^-1/2 at t = 0.
+    """
+    return 2 * (poles.inputs @ impulse)[:, None] * poles.outputs.T
+
+
 def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
     """Exponential sum Re sum_j amplitudes exp(rates t).
 

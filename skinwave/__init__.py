@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.scene import BODIES, Body, Load, Scene, Sides
     from skinwave.scene_file import dumps, loads, read
     from skinwave.simulation import simulate
+    from skinwave.support_motion import SupportMotion
     from skinwave.sweeps.in_python import SweepTable, sweep
 
 _HOMES = {
@@ -37,6 +38,7 @@ _HOMES = {
     "dumps": "scene_file",
     "simulate": "simulation",
     "SkinwaveWarning": "effort",
+    "SupportMotion": "support_motion",
     "Plan": "planning.plan",
     "Field": "fields",
     "field": "fields",
@@ -52,8 +54,8 @@ _HOMES = {
 }
 __all__ = [
     "BODIES", "Agreement", "Body", "Field", "Load", "ParametricBody", "Plan", "Scene", "Sides",
-    "SkinwaveWarning", "SweepTable", "cite", "compare", "dumps", "field", "loads", "paper", "plan",
-    "prepare", "read", "simulate", "sweep",
+    "SkinwaveWarning", "SupportMotion", "SweepTable", "cite", "compare", "dumps", "field", "loads",
+    "paper", "plan", "prepare", "read", "simulate", "sweep",
 ]  # fmt: skip
 
 

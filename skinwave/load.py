@@ -1,7 +1,8 @@
 """How a scene's load acts: as a pressure, as a shear traction, or as the force of a contact.
 
 A Tacton says where and when, by q(x, t) at the surface; a kind of load says what q is, and in which
-direction it acts on a surface of normal n. Gravity is one more load, which is static.
+direction it acts on a surface of normal n. Beside it there may be gravity, which is static, and a
+support that moves.
 """
 
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from simple_model import MovingPressure
 from simple_model.choices import choose
 from simple_model.focus import NOMINAL_HEIGHT, ContactSpot
 from skinwave import extensions
+from skinwave.support_motion import SupportMotion
 
 ALONG_PATH = "path"
 STRONGEST = 30.0  # m/s2 of gravity: three times that of the earth
@@ -33,6 +35,7 @@ class Load:
     force : float, N, of a contact at full drive
     width : float, metre, standard deviation of a contact's Gaussian traction
     gravity : float, m/s2, downwards; it deflects the body before the load begins
+    support_motion : SupportMotion, of all that the body is clamped to or rests on; or None
 
     Raises
     ------
@@ -45,6 +48,7 @@ class Load:
     force: float = 0.0
     width: float = 0.0
     gravity: float = 0.0
+    support_motion: SupportMotion | None = None
 
     def __post_init__(self) -> None:
         kind = self.of_kind
@@ -83,9 +87,10 @@ class Load:
 
     @property
     def words(self) -> str:
-        """Its kind, its direction and gravity, in a few words."""
+        """Its kind, its direction, gravity and the motion of the support, in a few words."""
         gravity = f" and gravity of {self.gravity:g} m/s2" if self.gravity else ""
-        return f"{self.of_kind.words(self)}{gravity}"
+        moved = f" and {self.support_motion.words}" if self.support_motion else ""
+        return f"{self.of_kind.words(self)}{gravity}{moved}"
 
     def pressures(self, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
         """Its components (c,), each a moving scalar load."""

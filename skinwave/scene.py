@@ -167,6 +167,8 @@ class Scene:
                 "an unconstrained body falls under gravity; clamp its base or its sides, or leave "
                 "gravity out"
             )
+        if self.load.support_motion:
+            _check_moved(self.body, self.load.support_motion.words)
 
     def _check_extent(self) -> None:
         half = np.array([self.body.width, self.body.height]) / 2
@@ -216,6 +218,22 @@ class Scene:
 
     def _repr_html_(self) -> str:
         return scene_plot.page(self)
+
+
+def _check_moved(body: Body, motion: str) -> None:
+    """Refuse the motion of a support that a body has not, or that sides at rest contradict."""
+    if not body.of_kind.discretise or body.of_kind.is_plate:
+        raise ValueError(f"{motion} is for a solid, not a body of kind '{body.kind}'; take a slab")
+    if not body.is_held:
+        raise ValueError(
+            f"{motion} moves what the body is clamped to, and this one is unconstrained; clamp its "
+            "base, or leave support_motion out"
+        )
+    if "absorbing" in (body.base, *body.conditions):
+        raise ValueError(
+            f"{motion} would move the tissue beyond absorbing sides, too, which is taken to be at "
+            'rest; take sides = "free" or "clamped", which move along'
+        )
 
 
 def _check_sheet(body: Body, reading: Reading) -> None:

@@ -188,6 +188,7 @@ def _without_meaning(scene: Scene) -> set[str]:
     load = scene.load.of_kind
     own = SECTIONS["load"].items()
     has = {"kind", "gravity", *load.defaults}
+    has |= {"support_motion"} if scene.load.support_motion else set()
     left = {f"load.{key}" for key, field in own if field.name not in has}
     left |= set() if load.is_of_device else {"focus"}
     return left | (set() if scene.body.base_stiffness else {"body.base_stiffness_n_per_m3"})

@@ -17,6 +17,7 @@ from simple_model.trajectory import Points
 from skinwave.material_file import material_of, values_of, written_table
 from skinwave.plain_text import number_in
 from skinwave.scene import Layer, Mounting, Phalanx, Relief, Sides
+from skinwave.support_motion import SupportMotion
 
 # Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
 # the base of the epidermis, Meissner's corpuscles in the papillae beside them, Pacini's in the deep
@@ -241,6 +242,14 @@ def _mounting(key: str, value: Any) -> Mounting:
     return Mounting(**values)
 
 
+def _support_motion(key: str, value: Any) -> SupportMotion:
+    values = checked(f"[load.{key}]", as_table(f"load.{key}", value), SUPPORT_MOTION)
+    missing = [k for k in ("amplitude_um", "frequency_hz") if SUPPORT_MOTION[k].name not in values]
+    if missing:
+        raise ValueError(f"[load.{key}] lacks {' and '.join(missing)}; give it")
+    return SupportMotion(**values)
+
+
 def _sides(key: str, value: Any) -> str | Sides:
     if isinstance(value, str):
         return value
@@ -366,6 +375,11 @@ SIGNAL = {
     "samples": SceneKey("samples", _numbers, list),
     "role": _word("role"),
 }
+SUPPORT_MOTION = {
+    "amplitude_um": _scaled("amplitude", 1e6),
+    "frequency_hz": _scaled("frequency"),
+    "direction": SceneKey("direction", _direction, _write_direction),
+}
 REQUIRED = {"rhythm": 1, "signal": 2}  # how many of the keys, from the first
 PATH = ("shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold")
 SECTIONS = {
@@ -425,6 +439,9 @@ SECTIONS = {
         "force_n": _scaled("force"),
         "width_mm": _scaled("width", 1e3),
         "gravity_m_per_s2": _scaled("gravity"),
+        "support_motion": SceneKey(
+            "support_motion", _support_motion, partial(written, SUPPORT_MOTION)
+        ),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),

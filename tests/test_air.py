@@ -73,15 +73,15 @@ def test_a_sheet_without_a_frame_is_refused_by_elements():
 
 
 def test_the_operator_is_symmetric_positive_and_that_of_any_position():
-    made = build(SHEET, H)
+    tilted = replace(SHEET, placement=Placement(tilt_x=0.5, tilt_y=-0.3, lift=0.01))
+    turned = build(tilted, H)
+    made = replace(build(SHEET, H), held=turned.held)
     ops = operators(made)
     M = air(SHEET, made, ops).M
     rng = np.random.default_rng(3)
     x, y = rng.standard_normal((2, len(ops.free)))
     assert x @ (M @ y) == pytest.approx(y @ (M @ x), rel=1e-9)
     assert x @ (M @ x) > 0
-    tilted = replace(SHEET, placement=Placement(tilt_x=0.5, tilt_y=-0.3, lift=0.01))
-    turned = build(tilted, H)
     A = air(tilted, turned, operators(turned)).M
 
     def placed(u):

@@ -32,7 +32,7 @@ def test_estimate_is_within_a_factor_3_of_the_true_error(poisson):
     _, exact = solved(grid(10, 4), solid, 200.0)
     mesh = grid(4, 2)
     u, found = solved(mesh, solid, 200.0)
-    shares = fem.goal_error(mesh, solid, (u[:, 0], u[:, 1:]), 200.0)
+    shares = fem.goal_error(mesh, solid, (u[:, 0], u[:, 1:]), 200.0).shares
     assert shares.shape == (len(mesh.tets), 1)
     estimate, true = shares.sum(), exact - found
     assert abs(true) > 0.01 * abs(exact)  # a mesh that has an error
@@ -45,9 +45,20 @@ def test_fields_without_error_have_none():
     x, y, z = mesh.points.T
     u = np.stack([x**2 - y * z, x * z + y, x + z**2 - x * y], axis=1).ravel()
     solid = fem.Material(density=1000.0, shear_modulus=25e3, poisson=0.3)
-    shares = fem.goal_error(mesh, solid, (u, u[:, None]))
+    found = fem.goal_error(mesh, solid, (u, u[:, None]))
     energy = u @ fem.assemble(mesh, solid, fixed=np.zeros(mesh.points.shape, bool)).K @ u
-    assert np.abs(shares).sum() < 1e-12 * energy
+    assert np.abs(found.shares).sum() < 1e-12 * energy
+    assert found.along.sum() == pytest.approx(np.abs(found.shares).sum())
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_error_lies_along_the_axis_that_the_strain_is_curved_along(axis):
+    mesh = grid(6, 3)
+    u = np.zeros(mesh.points.shape)
+    u[:, (axis + 1) % 3] = np.sin(mesh.points[:, axis] / 4e-3)  # a shear wave
+    solid = fem.Material(density=1000.0, shear_modulus=25e3, poisson=0.3)
+    along = fem.goal_error(mesh, solid, (u.ravel(), u.ravel()[:, None])).along.sum(axis=0)
+    assert along[axis] > 0.95 * along.sum()
 
 
 def test_two_materials_are_recovered_apart():
@@ -60,19 +71,21 @@ def test_two_materials_are_recovered_apart():
     soft = fem.Material(density=1000.0, shear_modulus=10e3, poisson=0.3)
     fields = u.ravel(), u.ravel()[:, None]
     both = {0: soft, 1: fem.Material(density=1000.0, shear_modulus=30e3, poisson=0.3)}
-    jump = np.abs(fem.goal_error(mesh, soft, fields)).sum()
-    assert np.abs(fem.goal_error(mesh, both, fields)).sum() < 1e-12 * jump
+    jump = fem.goal_error(mesh, soft, fields).along.sum()
+    assert fem.goal_error(mesh, both, fields).along.sum() < 1e-12 * jump
 
 
 def test_lines_have_the_density_that_errors_ask_for():
     line = np.linspace(-1.0, 1.0, 201)
     middles = (line[1:] + line[:-1]) / 2
     cells = np.column_stack(3 * [np.arange(200)])
-    found = equidistributed(
-        3 * [line], cells, np.exp(-3 * np.abs(middles)), dofs=24 * 40**3, order=2.0
-    )
+    error = np.exp(-3 * np.abs(middles))[:, None] * np.ones(3)
+    found = equidistributed(3 * [line], cells, error, dofs=24 * 40**3, order=2.0)
     for each in found:  # the same error along each axis: as many cells, of h ~ g^(-1/3)
         assert len(each) == 41
         assert (each[0], each[-1]) == (-1, 1)
         ratio = np.diff(each) * np.exp(-np.abs(each[1:] + each[:-1]) / 2)
         assert ratio[1:-1].max() < 1.05 * ratio[1:-1].min()
+    error[:, 2] *= 16  # which four times as many cells along z make up for
+    x, _, z = equidistributed(3 * [line], cells, error, dofs=24 * 40**3, order=2.0)
+    assert (len(x) - 1, len(z) - 1) == (26, 101)

@@ -101,6 +101,7 @@ def scene_keys() -> str:
     from simple_model.rhythm import Rhythm, Signal
     from skinwave import Body, Load, Scene, scene_keys
     from skinwave.bodies import Layer, Mounting, Phalanx, Placement, Relief
+    from skinwave.support_motion import SupportMotion
 
     sections = scene_keys.SECTIONS
     records: dict[str, list[type]] = {
@@ -116,6 +117,7 @@ def scene_keys() -> str:
         "body.relief": (scene_keys.RELIEF, Relief),
         "body.bone": (scene_keys.BONE, Phalanx),
         "body.mounting": (scene_keys.MOUNTING, Mounting),
+        "load.support_motion": (scene_keys.SUPPORT_MOTION, SupportMotion),
     }
     parts = [_section(name, sections[name], classes) for name, classes in records.items()]
     parts += [_section(name, keys, [record]) for name, (keys, record) in inner.items()]

@@ -178,8 +178,11 @@ def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
     """Components (n, 3) of the nodes that supports hold, of a flat sheet or the part of it that
     symmetry leaves.
 
-    A simple support holds an edge's deflection, and its motion along the edge; that across the edge
-    in the middle plane alone, so that the section may turn.
+    Clamped sections neither move along the sheet nor turn. Their deflection is held in the middle
+    plane alone: bending changes the thickness, by Poisson's effect, and held faces would make the
+    sheet stiffer in proportion to its thickness, which is larger in elements. A simple support
+    holds an edge's deflection, and its motion along the edge; that across the edge in the middle
+    plane alone, so that the section may turn.
     """
     points = mesh.points
     low, high = points.min(axis=0), points.max(axis=0)
@@ -190,12 +193,17 @@ def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
     for edge in mounting.edges:
         axis, end = EDGES[edge]
         at = np.abs(points[:, axis] - end * high[axis]) < near
-        turning = at & ~middle if mounting.support == "simply" else np.zeros_like(at)
-        found[at & ~turning] = True
-        found[turning, 2] = found[turning, 1 - axis] = True
+        if mounting.support == "simply":
+            found[at, 2] = found[at, 1 - axis] = True
+            found[at & middle] = True
+        else:
+            found[at, :2] = True
+            found[at & middle, 2] = True
     for clip in mounting.clips:
         there = [abs(c) if low[axis] > -near else c for axis, c in enumerate(clip)]
-        found |= _clipped(mesh, there, mounting.clip_radius)[:, None]
+        at = _clipped(mesh, there, mounting.clip_radius)
+        found[at, :2] = True
+        found[at & middle, 2] = True
     return found
 
 

@@ -5,6 +5,7 @@ from functools import partial
 from math import pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.added_mass import AddedMass, added_mass
@@ -23,9 +24,9 @@ from simple_model.sheet_modes import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.mounting import FRAME, clip_lines, held
+from skinwave.bodies.mounting import clip_lines, held
 
-SHEET_CELLS = 60  # along the shorter side: f1 within 0.3 %, deflection within 0.6 %
+SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
 # area, and thicker elements are far more accurate: thin ones lock.
 SHEET_THICKNESS = 0.01
@@ -54,10 +55,18 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     return Discretised(
         mesh=sheet(body.width, body.height, thickness, h, planes=planes),
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
-        held=None if _is_clamped_frame(body) else partial(held, body.mounting),
+        held=partial(_held, body) if body.sides == "clamped" else None,
         tension=tension(body),
         stiffener=partial(_curl, body) if body.mounting.is_curled else None,
     )
+
+
+def _held(body: Body, mesh: TetMesh) -> NDArray[np.bool_]:
+    """Components (n, 3) that are held; all of a tilted sheet's, whose own directions are none of
+    the components.
+    """
+    found = held(body.mounting, mesh)
+    return found | (found.any(axis=1, keepdims=True) & body.placement.is_tilted)
 
 
 def _equivalent(body: Body) -> float:
@@ -99,11 +108,6 @@ def damping(body: Body) -> tuple[float, float]:
     return rayleigh_damping(
         body.solid.loss_factor, LOSS_BAND, None if stretched is None else stretched.share
     )
-
-
-def _is_clamped_frame(body: Body) -> bool:
-    """Whether its sides are as `sides` says, all alike."""
-    return body.mounting.is_frame and body.mounting.support == FRAME.support
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:

@@ -70,7 +70,7 @@ def takes_load(scene: Scene) -> bool:
     """
     reading, load = scene.reading, scene.load
     own = reading.asked.is_normal and reading.is_on_surface and scene.body.of_kind.is_layer
-    return load.is_plain or (own and not load.gravity)
+    return load.is_plain or (own and not load.gravity and not load.support_motion)
 
 
 def field_read(scene: Scene, depth: float) -> Field:

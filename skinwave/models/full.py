@@ -23,15 +23,18 @@ from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models import Request
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import (
+    inertia,
     line_factor,
     load_lines_at,
     loads_at,
     probe_rows,
     sag,
     surface_load,
+    translation,
     with_sag,
 )
 from skinwave.scene import Body, Scene
+from skinwave.support_motion import SupportMotion
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 CHECKED_EACH = 50  # steps of a transient
@@ -264,6 +267,11 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
         still = sag(build, ops, S, scene.load, solver)
+        if motion := scene.load.support_motion:
+            moved, power = moved_line(build, ops, S, solver, motion)
+            total += power
+            frequencies = np.append(frequencies, motion.frequency)
+            amplitudes = np.vstack([amplitudes, moved])
     energy = energy_balance(total)
     amplitudes = amplitudes * line_factor(asked, 2j * np.pi * frequencies, solids, S.shape[0])
     below = shown(scene.pressure, frequencies, times)
@@ -294,6 +302,29 @@ def _line(
     u = fem.harmonic(ops, force, frequency, solver=solver)
     line = force[None, free], u[:, free], np.array([frequency])
     return S @ u[0], fem.mean_power(ops.C, ops.R, *line, ops.branches)
+
+
+def moved_line(
+    build: Build, ops: fem.Operators, S: sparse.csr_array, solver: str, motion: SupportMotion
+) -> tuple[fem.Complex, fem.EnergyBalance]:
+    """Steady state on a support that moves.
+
+    Parameters
+    ----------
+    build : Build
+    ops : operators of its mesh
+    S : (p c, 3 n) sparse, what the probes read
+    solver : of `fem.linear_solver`
+    motion : SupportMotion
+
+    Returns
+    -------
+    components (p c,) complex at its frequency, and the mean power balance about the support
+    """
+    force = sparse.csr_array(-inertia(build, motion.unit)[:, None])
+    acceleration = np.array([motion.acceleration])
+    seen, power = _line(ops, force, S, solver, motion.frequency, acceleration)
+    return seen + S @ translation(build, motion.unit) * motion.line, power
 
 
 def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:

@@ -105,11 +105,21 @@ def sag(
     """
     if not load.gravity:
         return np.zeros(outputs.shape[0])
-    whole = operators_of(replace(build, fixed={}, held=None))  # fixed nodes have a share of a mass
-    down = np.zeros(whole.n_dofs)
-    down[2::3] = -load.gravity
-    weight = whole.expand(whole.M @ down[whole.free])
+    weight = load.gravity * inertia(build, (0.0, 0.0, -1.0))
     return np.asarray(outputs @ fem.static(operators, weight, solver=solver))
+
+
+def translation(build: Build, direction: Sequence[float]) -> Floats:
+    """Rigid translation (3 n,) along a unit vector."""
+    return np.tile(np.asarray(direction, np.float64), len(build.mesh.points))
+
+
+def inertia(build: Build, direction: Sequence[float]) -> Floats:
+    """Nodal forces M r (3 n,) in N per m/s2 of a body along a unit vector: its weight at 1 m/s2, or
+    against the acceleration of its support.
+    """
+    whole = operators_of(replace(build, fixed={}, held=None))  # fixed nodes have a share of a mass
+    return whole.expand(whole.M @ translation(build, direction)[whole.free])
 
 
 def with_sag(components: Floats, sag: Floats | float, asked: Quantity) -> Floats:

@@ -11,6 +11,7 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_width
+from simple_model.load_spectrum import merge_lines
 from simple_model.material import Material
 from simple_model.quantities import Quantity
 from simple_model.sampling import shown
@@ -20,7 +21,16 @@ from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, ve
 from skinwave.load import PRESSURE, Load
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import line_factor, probe_rows, sag, spread, surface_load, with_sag
+from skinwave.models.loads import (
+    inertia,
+    line_factor,
+    probe_rows,
+    sag,
+    spread,
+    surface_load,
+    translation,
+    with_sag,
+)
 from skinwave.models.reduction import (
     BAND,
     ReducedBody,
@@ -35,10 +45,10 @@ from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = 3  # of what is cached of a body
+FORMAT = 4  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
-ARRAYS = ("damping", "radiation", "load", "points")
-OTHERS = ("relaxing", "relaxation_times", "read", "sag")
+ARRAYS = ("damping", "radiation", "load", "points", "inertia")
+OTHERS = ("relaxing", "relaxation_times", "read", "sag", "carried")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
 
 
@@ -55,13 +65,15 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
     """Reduced body of probes (p, 2) in metre, which read a quantity: its components at rest are
-    `read` (p c, r) of the body's coordinates, and `sag` (p c,) under gravity; `solids`, if any, are
-    the materials of the probes. It has the `load` for which it is reduced.
+    `read` (p c, r) of the body's coordinates, `sag` (p c,) under gravity, and `carried` (p c,) of a
+    translation by 1 m of a support that moves; `solids`, if any, are the materials of the probes.
+    It has the `load` for which it is reduced.
     """
 
     probes: Floats
     read: Floats
     sag: Floats | float = 0.0
+    carried: Floats | float = 0.0
     body: ReducedBody
     reading: Reading = SURFACE
     solids: tuple[Material, ...] = ()
@@ -117,7 +129,8 @@ def prepare(
             found = _prepared_anew(
                 body, build, size, probes, outputs, clock, report, solver, tolerance, name, load
             )
-    return replace(found, reading=reading, solids=solids, load=load)
+    shaken = replace(found.body, support_motion=load.support_motion)
+    return replace(found, reading=reading, solids=solids, load=load, body=shaken)
 
 
 def entry_name(
@@ -149,12 +162,14 @@ def entry_name(
     named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
     rests = tuple(vars(build.support).values()) if build.support else ()
     used = fem.available()[0] if solver == "auto" else solver
+    # Of its motion a reduced body depends on the direction alone.
+    way = load.support_motion.unit if load.support_motion else ()
     read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
         FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
         build.fixed, build.absorbing, build.coat, build.drag, build.held, build.tension,
         *rests, probes, BAND, tolerance, used,
-        versions(), *read, load,
+        versions(), *read, replace(load, support_motion=None), way,
     )  # fmt: skip
 
 
@@ -172,6 +187,7 @@ def _from_cache(
         "damping": square, "radiation": square, "relaxing": (terms, *square),
         "relaxation_times": (terms,),
         "read": (outputs, unknowns), "points": (surface, 3), "sag": (outputs,),
+        "carried": (outputs,), "inertia": (unknowns,),
         "load": (len(entry["load"]) // max(surface, 1) * surface, unknowns),
     }  # fmt: skip
     if any(entry[field].shape != shape for field, shape in expected.items()):
@@ -188,7 +204,9 @@ def _from_cache(
         branches=tuple(fem.MaxwellBranch(K=K, time=time) for K, time in branches),
         **{name: entry[name] for name in ARRAYS},
     )
-    return Prepared(probes=probes, read=entry["read"], sag=entry["sag"], body=reduced)
+    return Prepared(
+        probes=probes, read=entry["read"], sag=entry["sag"], carried=entry["carried"], body=reduced
+    )
 
 
 def _prepared_anew(
@@ -209,22 +227,26 @@ def _prepared_anew(
         report("factorise", 0.0)
         P, points = surface_load(build, load)
         still = sag(build, operators, outputs, load, solver)
+        motion = load.support_motion
         reduced, model = reduce_body(
             body, build, operators, outputs, tolerance, surface=(P, points),
-            loads=spread(P, typical_spots(body, points)), solver=solver, report=report,
+            loads=spread(P, typical_spots(body, points)),
+            inertia=inertia(build, motion.unit) if motion else None, solver=solver, report=report,
         )  # fmt: skip
     effort = spent(reduced.effort, clock, build, h)
     arrays = {
         "read": model.outputs,
         "sag": still,
+        "carried": outputs @ translation(build, motion.unit if motion else (0.0, 0.0, 0.0)),
         "relaxing": np.array([b.K for b in model.branches]).reshape(-1, *model.K.shape),
         "relaxation_times": np.array([b.time for b in model.branches]),
         **{name: getattr(reduced, name) for name in ARRAYS},
     }
     cache.store(name, asdict(effort), **asdict(reduced.poles), **arrays)
     return Prepared(
-        probes=probes, read=model.outputs, sag=still, body=replace(reduced, effort=effort)
-    )
+        probes=probes, read=model.outputs, sag=still, carried=arrays["carried"],
+        body=replace(reduced, effort=effort),
+    )  # fmt: skip
 
 
 def _mirrored(probes: Floats, symmetry: str) -> Floats:
@@ -297,6 +319,11 @@ def components(prepared: Prepared, *pressures: MovingPressure) -> ReducedRespons
     relaxation of stress.
     """
     motion = read_at(respond(prepared.body, *pressures), prepared.read)
+    if moved := prepared.load.support_motion:
+        frequencies = np.append(motion.frequencies, moved.frequency)
+        lines = np.vstack([motion.lines, moved.line * np.asarray(prepared.carried)])
+        frequencies, lines = merge_lines(frequencies, lines)
+        motion = replace(motion, frequencies=frequencies, lines=lines)
     return in_motion(motion, prepared.reading.asked, prepared.solids)
 
 

@@ -25,6 +25,7 @@ from skinwave.bodies.sheet import air
 from skinwave.effort import Progress, silent
 from skinwave.models.full import energy_balance
 from skinwave.scene import Body
+from skinwave.support_motion import SupportMotion
 
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 
@@ -35,7 +36,9 @@ class ReducedBody:
 
     `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
     `radiation` (r, r) in it and its Maxwell `branches` of (r, r); `load` (k, r): reduced forces of
-    unit pressure at the surface points (k, 3) in metre; of a load of c components (c k, r).
+    unit pressure at the surface points (k, 3) in metre; of a load of c components (c k, r). On a
+    support that moves, its `support_motion` and the reduced inertial force `inertia` (r,) per
+    acceleration against it; the coordinates are then those seen from the support.
     """
 
     poles: fem.Poles
@@ -45,6 +48,8 @@ class ReducedBody:
     load: Floats
     points: Floats
     effort: Effort
+    inertia: Floats | float = 0.0
+    support_motion: SupportMotion | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +78,7 @@ def reduce_body(
     *,
     surface: tuple[sparse.csr_array, Floats],
     loads: Floats | None = None,
+    inertia: Floats | None = None,
     solver: str = "auto",
     report: Progress = silent,
 ) -> tuple[ReducedBody, fem.ReducedModel]:
@@ -87,6 +93,7 @@ def reduce_body(
     tolerance : relative error of the reduction
     surface : load operator (3 n, c k) and points (k, 3), of `bodies.surface_load` or a part of them
     loads : (3 n, j), as `fem.reduce` takes them
+    inertia : (3 n,), nodal forces per acceleration of a support that moves
     solver, report : as for `simulate`, `report` its progress
 
     Returns
@@ -94,6 +101,9 @@ def reduce_body(
     ReducedBody, and the fem.ReducedModel of it
     """
     P, points = surface
+    if inertia is not None and loads is not None:  # which counts as much as all others
+        size = np.linalg.norm(loads) / np.linalg.norm(inertia)
+        loads = np.column_stack([loads, size * inertia])
     model = fem.reduce(
         operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators),
         solver=solver, progress=partial(report, "reduce"),
@@ -101,6 +111,7 @@ def reduce_body(
     reduced = ReducedBody(
         poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=model.C, radiation=model.R,
         branches=model.branches, load=P.T @ model.basis, points=points,
+        inertia=np.zeros(len(model.K)) if inertia is None else inertia @ model.basis,
         effort=Effort(
             dofs=len(operators.free), reduced_dofs=len(model.K), solver=model.solver,
             factorisations=1, estimate=model.estimate,
@@ -116,6 +127,9 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
         reduced_lines(pressure, reduced.points, part)
         for pressure, part in zip(pressures, parts, strict=True)
     ]
+    if motion := reduced.support_motion:
+        against = -motion.acceleration * np.asarray(reduced.inertia)
+        each.append((np.array([motion.frequency]), against[None]))
     if len(each) == 1:
         return each[0]
     frequencies, forces = zip(*each, strict=True)
@@ -133,6 +147,8 @@ def respond(reduced: ReducedBody, *pressures: MovingPressure) -> ReducedResponse
     """
     frequencies, forces = reduced_forces(reduced, *pressures)
     lines, start = fem.line_response(reduced.poles, forces, frequencies)
+    if motion := reduced.support_motion:  # which the body at rest is struck by
+        start += fem.impulse_response(reduced.poles, -motion.speed * np.asarray(reduced.inertia))
     damping = reduced.damping, reduced.radiation
     power = fem.mean_power(*damping, forces, lines, frequencies, reduced.branches)
     imbalance, radiated = energy_balance(power)

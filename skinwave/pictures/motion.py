@@ -90,6 +90,10 @@ def waves(
         raise ValueError(
             "the motion of a whole body is that about its rest under gravity; leave gravity out"
         )
+    if scene.load.support_motion:
+        raise ValueError(
+            "the motion of a whole body is that on a support at rest; leave support_motion out"
+        )
     moved = driven(scene, tolerance, progress, h=h, solver=solver)
     mesh, basis = moved.build.mesh, moved.basis
     nodes = np.arange(len(mesh.points))

@@ -111,7 +111,8 @@ def plan(
     if asked and asked.error:
         return _unplanned(scene, tolerance, asked, h)
     spectrum = response_spectrum(scene, tolerance)
-    highest = cutoff_frequency(*spectrum, tolerance)
+    motion = scene.load.support_motion
+    highest = max(cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0)
     rows = [
         PlanRow(
             what="highest line",

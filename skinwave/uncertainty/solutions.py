@@ -118,7 +118,8 @@ def _is_proportional(scene: Scene, method: Method) -> bool:
     """Whether the vibration is in proportion to the pressure."""
     model = named(method.model)
     linear = (model.is_reduced or model.is_infinite or model.is_steady) and not model.is_nonlinear
-    return method.mapped or (scene.reading.is_plain and linear and not scene.load.gravity)
+    alone = not (scene.load.gravity or scene.load.support_motion)
+    return method.mapped or (scene.reading.is_plain and linear and alone)
 
 
 @lru_cache(maxsize=KEPT)
