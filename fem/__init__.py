@@ -10,6 +10,7 @@ einsum in this package:
     e    element or facet
     q    quadrature point
     a b  nodes of an element
+    h    sides of the edges at which facets meet
     d    derivative along an element edge, from corner 0 to another corner
     i j  components of displacement
     c    components of a symmetric tensor: xx, yy, zz, xy, xz, yz

@@ -20,7 +20,7 @@ from simple_model import (
     steady_motion,
     timed_path,
 )
-from simple_model.compliance import half_space, layered, slab, thin_sheet
+from simple_model.compliance import Compliance, half_space, layered, slab, thin_sheet
 from simple_model.flat_body import steady_lines
 from simple_model.flat_motion import point_motion
 from simple_model.flat_quantities import from_rest, quantity_field
@@ -208,6 +208,27 @@ def test_no_frequency_of_thin_stiff_skin_stands_out():
         g = point_response(layered(SKIN), RADII, 2 * np.pi * np.arange(1.0, 1001.0), WIDTH)
     turns = np.abs(np.diff(g, 4, axis=0)).max(axis=1)  # a spike of 1 % has 6 %
     assert turns.max() < 0.03 * np.abs(g).max()
+
+
+@pytest.mark.parametrize(("loss", "smooth"), [(2e-3, True), (2e-4, False)])
+def test_frequencies_of_a_transient_are_interpolated_where_they_are_smooth(loss, smooth):
+    """Of a body with less loss they are not: each is integrated."""
+    counted = []
+    skin = replace(SKIN, materials=tuple(replace(m, viscosity=loss * m.shear_modulus)
+                                         for m in SKIN.materials))  # fmt: skip
+    whole = layered(skin)
+
+    def answer(k, w):
+        counted.append(len(w) * (len(k) == 128))
+        return whole(k, w)
+
+    body = Compliance(answer, whole.clearance)
+    w = 2 * np.pi * np.arange(80.0, 208.0, 0.5) - 6j
+    found = point_response(body, RADII, w, WIDTH)
+    # Without its neighbours a frequency is integrated by itself.
+    one_by_one = point_response(whole, RADII, w[::5], WIDTH)
+    assert np.abs(found[::5] - one_by_one).max() < 1e-8 * np.abs(found).max()
+    assert (sum(counted) < len(w) / 3) == smooth
 
 
 def test_deep_layers_tend_to_the_half_space():

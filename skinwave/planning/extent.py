@@ -130,8 +130,8 @@ def _of_stiffness(body: Body, coat: Coat) -> str:
     if ratio < STIFF:
         return ""
     return (
-        f"; it is {ratio:.0f} times as stiff as what it covers, and of 100 times the error is 4 to "
-        f"11 % at {AT:g} Hz, the more the thicker (0.1 to 1 mm)"
+        f"; it is {ratio:.0f} times as stiff as what it covers, and of 100 times the error is at "
+        f"most 3 to 15 % up to {AT:g} Hz, the more the thicker (0.1 to 1 mm)"
     )
 
 
