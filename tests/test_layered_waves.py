@@ -58,6 +58,9 @@ def angular(hertz):
     return 2 * np.pi * np.atleast_1d(hertz)[:, None] + 0j
 
 
+IS_EXTENDED = np.finfo(np.longdouble).eps < 1e-18
+
+
 def circling(**load):
     path = Trajectory(shape="circle", size=0.02, speed=6)
     return MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path), **load)
@@ -86,15 +89,19 @@ def potentials(material, depth, k, w):
 
 
 def by_elements(stack, k, w, order=16):
-    """U and W at each interface but a rigid base, by spectral elements in depth; one k and w."""
+    """U and W at each interface but a rigid base, by spectral elements in depth; one k and w.
+
+    In extended precision, which the last digits of a slow motion without a base need.
+    """
     roots = Legendre.basis(order).deriv().roots()
     x = np.concatenate([[-1], roots, [1]])
     weights = 2 / (order * (order + 1) * Legendre.basis(order)(x) ** 2)
     values = np.array([Legendre.basis(n)(x) for n in range(order + 1)]).T
     slopes = np.array([Legendre.basis(n).deriv()(x) for n in range(order + 1)]).T
-    derivative = slopes @ np.linalg.inv(values)
+    derivative = (slopes @ np.linalg.inv(values)).astype(np.longdouble)
+    derivative -= np.diag(derivative.sum(axis=1))  # of a constant it is 0
     n = order * len(stack.materials) + 1
-    matrix = np.zeros((2 * n, 2 * n), complex)
+    matrix = np.zeros((2 * n, 2 * n), np.clongdouble)
     for i, (m, h) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):
         mu = m.complex_modulus(w)
         lam = mu * 2 * m.poisson / (1 - 2 * m.poisson)
@@ -114,9 +121,12 @@ def by_elements(stack, k, w, order=16):
         free = free[(free != n - 1) & (free != 2 * n - 1)]
     load = np.zeros(2 * n)
     load[n] = 1
-    u = np.zeros(2 * n, complex)
-    u[free] = np.linalg.solve(matrix[np.ix_(free, free)], load[free])
-    return u.reshape(2, n)[:, ::order]
+    u = np.zeros(2 * n, np.clongdouble)
+    held = matrix[np.ix_(free, free)]
+    inverse = np.linalg.inv(held.astype(complex))
+    for _ in range(6):
+        u[free] += inverse @ (load[free] - held @ u[free])
+    return u.reshape(2, n)[:, ::order].astype(complex)
 
 
 @pytest.mark.parametrize("depth", [0.3e-3, 5e-3, 15e-3, 60e-3])
@@ -159,7 +169,7 @@ def test_soft_on_stiff_moves_as_published():
     [
         (SKIN, 3e-5),
         (replace(SKIN, thicknesses=(0.1e-3, 1e-3, 4e-3, 9.5e-3)), 3e-5),
-        (replace(SKIN, base="free"), 1e-3),  # at 1 Hz, where elements lose digits
+        (replace(SKIN, base="free"), 3e-5 if IS_EXTENDED else 3e-3),  # at 1 Hz
         (replace(SKIN, base="elastic", base_stiffness=2e6), 3e-5),
         (
             Stack(
