@@ -135,9 +135,14 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
         try:
             yield executor
         finally:
+            manager: Any = executor._executor_manager_thread
             executor.shutdown(wait=False, cancel_futures=True)
             # A daemon is none of the executor's, but may have been started meanwhile.
             stop(child for child in set(active_children()) - others if not child.daemon)
+            # As it ends, Python wakes this thread up, and prints a traceback if its pipe is closed
+            # at that moment.
+            if manager is not None:
+                manager.join(PATIENCE)
 
 
 def as_worker() -> None:
