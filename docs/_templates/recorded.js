@@ -54,3 +54,14 @@ function share(t) {
   return outside / all;
 }
 const shown = x => x >= 9.95 ? x.toFixed(0) : x.toPrecision(2);
+
+function told(t) {
+  by("speed-shown").value = `${t.speed} m/s`;
+  by("slow-shown").value = `${Math.round(10 ** +by("slow").value)} times`;
+  by("found").textContent = `Waves carry ${Math.round(100 * share(t))} % of the mean-square motion shown here to where the point kernel has less than a tenth of its largest.`;
+}
+
+let time = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, last = 0;
+function say() { by("play").textContent = playing ? "Pause" : "Play"; }
+by("play").onclick = () => { playing = !playing; say(); };
+by("speed").max = speeds.length - 1; by("speed").value = speeds.length - 1;

@@ -78,6 +78,7 @@ def pages(tactons: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
     first = tactons[0]
     data = json.dumps({"tactons": tactons, "threshold": thresholds()})
     parts = {
+        "__STYLE__": (TEMPLATES / "recorded.css").read_text("utf-8"),
         "__SHARED__": (TEMPLATES / "recorded.js").read_text("utf-8").replace("__RECORDED__", data),
         "__VIEWER__": viewer(first["side"], first["reach"], first["size"]),
     }
