@@ -786,6 +786,7 @@ def test_the_process_computes_on_the_cores_that_are_idle(monkeypatch, load, thre
     monkeypatch.setattr(worker.multiprocessing, "get_context", lambda _: context)
     Worker(print)._start()
     assert seen.pop("MKL_NUM_THREADS") == "3", "what the user said stays"
+    assert seen.pop("OPENBLAS_NUM_THREADS") == "1", "its threads keep cores busy as they wait"
     assert set(seen.values()) == {str(threads)}
     assert "OMP_NUM_THREADS" not in worker.os.environ
 
