@@ -464,10 +464,8 @@ def _waves(frequencies: Floats, times: Floats) -> Floats:
     few, dt = int(np.ceil(np.sqrt(len(times)))), step(times)
     turn = 2j * np.pi * frequencies[1:, None]
     blocks = np.exp(turn * (times[0] + dt * np.arange(0, len(times), few)))
-    waves = (blocks[:, :, None] * np.exp(turn * dt * np.arange(few))[:, None]).reshape(
-        len(turn), -1
-    )
-    waves = waves[:, : len(times)]
+    waves = blocks[:, :, None] * np.exp(turn * dt * np.arange(few))[:, None]
+    waves = waves.reshape(len(turn), blocks.shape[1] * few)[:, : len(times)]
     return np.concatenate([np.ones((1, len(times))), waves.real, waves.imag])
 
 
