@@ -27,11 +27,11 @@ from simple_model.compliance import Compliance
 from simple_model.focus import gaussian_width
 from simple_model.load_spectrum import (
     foci_harmonics,
-    harmonics,
     load_lines,
     merge_lines,
     path_fourier,
     path_samples,
+    path_strengths,
     path_weights,
     synthesise,
 )
@@ -50,6 +50,7 @@ WRAPPED = 1e-5
 AT_ONCE = 2**19  # pairs of frequency and distance: some ten megabytes
 FEW_DISTANCES = 40  # are integrated one by one, without a spline
 ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
+FAINT = 1e-7  # of the strongest harmonic of the path, which a transient leaves out
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
 
 
@@ -255,24 +256,25 @@ def _circling(
     dt: float,
 ) -> Complex:
     """Transform (f, p, m) of the field at the probes under foci that run a closed path."""
-    f_d = pressure.tacton.trajectory.drawing_frequency
-    away = _offsets(pressure, probes)
-    g = _response_at(field, pressure, away, w, NEGLIGIBLE)(away)
-    h = path_fourier(g * path_weights(pressure))
-    u = np.zeros(h.shape[:-1], np.complex128)
-    orders = harmonics(h.shape[-1])
+    f_d, away = pressure.tacton.trajectory.drawing_frequency, _offsets(pressure, probes)
+    distance = np.linalg.norm(away, axis=-1)
+    table, through = _interpolation(distance, _width(pressure))
+    g = point_integrals(field, table, w, _width(pressure), negligible=NEGLIGIBLE)
+    shares = through(np.eye(len(table)))(distance) * path_weights(pressure)
+    h = path_fourier(np.einsum("mcpk,jpk->cjpmk", field.weights(away), shares))
+    orders, _ = path_strengths(pressure, FAINT)
     h[..., orders] *= foci_harmonics(pressure, orders)
-    largest = np.abs(h).max(axis=(0, 1, 3))
+    u = np.zeros((len(w), *h.shape[2:-1]), np.complex128)
     gain = cache(partial(_gain, pressure, window, dt))
-    for m in orders:
-        if (np.abs(h[..., m]) > 1e-7 * largest).any():
-            parts = finer(highest(pressure, abs(m) * f_d), dt)
+    for n in orders:
+        parts = finer(highest(pressure, abs(n) * f_d), dt)
 
-            def turned(late: float, m: int = m, parts: int = parts) -> Complex:
-                t, gained = gain(late, parts)
-                return gained * np.exp(2j * np.pi * m * f_d * t)
+        def turned(late: float, n: int = n, parts: int = parts) -> Complex:
+            t, gained = gain(late, parts)
+            return gained * np.exp(2j * np.pi * n * f_d * t)
 
-            u += h[..., m] * transform(turned, w, dt, parts)[:, None, None]
+        transformed = transform(turned, w, dt, parts)[:, None, None]
+        u += np.tensordot(g, h[..., n], axes=([0, 2], [0, 1])) * transformed
     return u
 
 
@@ -358,27 +360,29 @@ def _offsets(pressure: MovingPressure, probes: ArrayLike) -> Floats:
     return np.atleast_2d(np.asarray(probes, np.float64))[:, None] - path_samples(pressure)
 
 
-def _response_at(
-    field: Field,
-    pressure: MovingPressure,
-    offsets: Floats,
-    w: ArrayLike,
-    negligible: float = 0.0,
-) -> Callable[[Floats], Complex]:
-    """Components (f, p, m, k) at any of these offsets (p, k, 2) in metre from the focus: integrated
-    at each of few distances, interpolated by a spline between many.
+def _interpolation(
+    distance: Floats, width: float
+) -> tuple[Floats, Callable[[Complex | Floats], Callable[[Floats], Complex | Floats]]]:
+    """Distances (j,) in metre to integrate at, and the interpolant of values (..., j) there: of few
+    distances each one, between many a spline.
     """
-    width = _width(pressure)
-    distance = np.linalg.norm(offsets, axis=-1)
     unique = np.unique(distance)
-    few = len(unique) <= FEW_DISTANCES
-    table = unique if few else _table(distance.max(), width)
-    g = point_integrals(field, table, w, width, negligible=negligible)
-    spline = None if few else _spline(table, g, axis=2)
+    if len(unique) <= FEW_DISTANCES:
+        return unique, lambda values: lambda r: values[..., np.searchsorted(unique, r)]
+    table = _table(distance.max(), width)
+    return table, partial(_spline, table, axis=-1)
+
+
+def _response_at(
+    field: Field, pressure: MovingPressure, offsets: Floats, w: ArrayLike
+) -> Callable[[Floats], Complex]:
+    """Components (f, p, m, k) at any of these offsets (p, k, 2) in metre from the focus."""
+    width = _width(pressure)
+    table, through = _interpolation(np.linalg.norm(offsets, axis=-1), width)
+    integrals = through(point_integrals(field, table, w, width))
 
     def components(away: Floats) -> Complex:
-        r = np.linalg.norm(away, axis=-1)
-        integrals = spline(r) if spline else g[:, :, np.searchsorted(unique, r)]
-        return np.einsum("mcpk,cfpk->fpmk", field.weights(away), integrals)
+        integral = integrals(np.linalg.norm(away, axis=-1))
+        return np.einsum("mcpk,cfpk->fpmk", field.weights(away), integral)
 
     return components

@@ -12,14 +12,13 @@ second derivatives likewise have n = 2. In this form all are as smooth as the fo
 Frequencies of a transient are close to each other, below the real axis by its damping, and far from
 the poles, which lie above it by the body's own loss: what they make is smooth. Each batch of them
 is interpolated by a polynomial through Chebyshev points, whose error falls geometrically with their
-number (Berrut and Trefethen, SIAM Rev 46:501 (2004)), with half of them well below that of the
-integrals.
+number (Berrut and Trefethen, SIAM Rev 46:501 (2004)), to below that of the integrals.
 
 The path of integration over k runs above the real axis, away from the poles of forward waves, which
 lie below it for any loss; and below those of backward waves, which lie above it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import factorial
@@ -38,8 +37,10 @@ AT_ONCE = 2**12  # pairs of frequency and wavenumber, in arrays that stay in cac
 UNRESOLVED = "the wavenumber integral does not converge; add some loss"
 CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
-FEWEST_POINTS = 16  # intervals of the first Chebyshev points that a batch is interpolated between
-INTERPOLATION_ERROR = 1e-7  # relative, of half as many points as are used
+FIRST_BATCH = 64  # of a transient, whose later batches are as long as all before
+FEWEST_POINTS = 8  # intervals of the first Chebyshev points that a batch is interpolated between
+INTERPOLATION_ERROR = 1e-7  # relative, so that lines far weaker than the largest are right, too
+COMPARED = 16  # frequencies of a smooth batch at which two wavenumber grids are compared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,10 +150,9 @@ def point_integrals(
         return _grid(field.orders, r, width, lift, n)
 
     n, before = FEWEST_NODES, 0.0
-    for start in range(0, len(w), BATCH):
-        part = slice(start, start + BATCH)
+    for part in _batches(w):
         lift = _lift(field, r, w[part], width)
-        if lift != before or start % (CHECKED_EACH * BATCH) == 0:
+        if lift != before or part.start % (CHECKED_EACH * BATCH) == 0:
             least = n if lift == before else FEWEST_NODES
             n, found[:, part] = _resolved(field, w[part], partial(grid, lift), least)
         else:
@@ -162,6 +162,14 @@ def point_integrals(
         if (np.abs(found[:, part]).max(axis=(1, 2)) < negligible * largest).all():
             break
     return found
+
+
+def _batches(w: Complex) -> Iterator[slice]:
+    start = 0
+    while start < len(w):
+        stop = start + (max(FIRST_BATCH, start) if _is_damped(w) else BATCH)
+        yield slice(start, stop)
+        start = stop
 
 
 def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
@@ -179,21 +187,26 @@ def _resolved(
     """The fewest wavenumbers, from n, that twice as many do not improve on; the integrals with
     these.
     """
-    coarse = _batch(field, w, grid(n))
+    some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
+    coarse = _integrated(field, some, grid(n))
     while n < MOST_NODES:
-        fine = _batch(field, w, grid(2 * n))
+        fine = _integrated(field, some, grid(2 * n))
         largest = np.abs(fine).max(axis=(1, 2))
         if (np.abs(fine - coarse).max(axis=(1, 2)) <= INTEGRATION_ERROR * largest).all():
-            return n, fine
+            return n, fine if some is w else _batch(field, w, grid(2 * n))
         coarse, n = fine, 2 * n
     raise ArithmeticError(UNRESOLVED)
 
 
 def _batch(field: Field, w: Complex, grid: _Grid) -> Complex:
     """The integrals (c, f, r) at the frequencies of a batch: interpolated where they are smooth."""
-    damped = len(w) > 4 * FEWEST_POINTS and w.imag.max() < 0 and np.ptp(w.imag) == 0
-    found = _interpolated(field, w, grid) if damped else None
+    found = _interpolated(field, w, grid) if _is_damped(w) else None
     return _integrated(field, w, grid) if found is None else found
+
+
+def _is_damped(w: Complex) -> bool:
+    """Whether frequencies are many on a line below the real axis, as those of a transient are."""
+    return bool(len(w) > 4 * FEWEST_POINTS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
 
 
 def _interpolated(field: Field, w: Complex, grid: _Grid) -> Complex | None:
@@ -205,18 +218,19 @@ def _interpolated(field: Field, w: Complex, grid: _Grid) -> Complex | None:
     def at(x: Floats) -> Complex:
         return _integrated(field, middle + half * x + 1j * w.imag[0], grid)
 
-    n = FEWEST_POINTS
+    n, error = FEWEST_POINTS, np.nan
     values = at(_chebyshev(n))
-    while 4 * n < len(w):
+    while 4 * n <= len(w):
         between = _chebyshev(2 * n)[1::2]
         finer = np.repeat(values, 2, axis=1)[:, :-1]
         finer[:, 1::2] = at(between)
-        error = np.abs(_through(values, between) - finer[:, 1::2]).max(axis=(1, 2))
-        error = (error / np.abs(finer).max(axis=(1, 2))).max()
+        before, errors = error, np.abs(_through(values, between) - finer[:, 1::2]).max(axis=(1, 2))
+        error = (errors / np.abs(finer).max(axis=(1, 2))).max()
         values, n = finer, 2 * n
-        if error <= INTERPOLATION_ERROR:
+        foreseen = error * (error / before) ** 2  # as it falls geometrically
+        if np.fmin(error, foreseen) <= INTERPOLATION_ERROR:
             return _through(values, (w.real - middle) / half)
-        if error > INTERPOLATION_ERROR**0.5:  # twice as many squares it
+        if error ** (len(w) / n) > INTERPOLATION_ERROR**0.5:  # at as many as are allowed
             return None
     return None
 

@@ -220,25 +220,28 @@ def test_no_frequency_of_thin_stiff_skin_stands_out():
     assert turns.max() < 0.03 * np.abs(g).max()
 
 
-@pytest.mark.parametrize(("loss", "smooth"), [(2e-3, True), (2e-4, False)])
-def test_frequencies_of_a_transient_are_interpolated_where_they_are_smooth(loss, smooth):
-    """Of a body with less loss they are not: each is integrated."""
-    counted = []
+@pytest.mark.parametrize(
+    ("loss", "damping", "smooth"), [(2e-3, 6.0, True), (2e-4, 6.0, True), (1e-5, 0.3, False)]
+)
+def test_frequencies_of_a_transient_are_interpolated_where_they_are_smooth(loss, damping, smooth):
+    """Near the poles of a body with little loss they are not: most are integrated."""
+    integrated = []
     skin = replace(SKIN, materials=tuple(replace(m, viscosity=loss * m.shear_modulus)
                                          for m in SKIN.materials))  # fmt: skip
     whole = layered(skin)
 
     def answer(k, w):
-        counted.append(len(w) * (len(k) == 128))
+        integrated.append(w.ravel())
         return whole(k, w)
 
     body = Compliance(answer, whole.clearance)
-    w = 2 * np.pi * np.arange(80.0, 208.0, 0.5) - 6j
+    w = 2 * np.pi * np.arange(80.0, 208.0, 0.5) - 1j * damping
     found = point_response(body, RADII, w, WIDTH)
     # Without its neighbours a frequency is integrated by itself.
     one_by_one = point_response(whole, RADII, w[::5], WIDTH)
     assert np.abs(found[::5] - one_by_one).max() < 1e-8 * np.abs(found).max()
-    assert (sum(counted) < len(w) / 3) == smooth
+    share = np.isin(w, np.concatenate(integrated)).mean()
+    assert share < 0.25 if smooth else share > 0.5, share
 
 
 def test_deep_layers_tend_to_the_half_space():
