@@ -1,5 +1,6 @@
-"""Latency of the page: `python -m bench.web [moves] [palm]`, in Debian's chromium without a window;
-with `palm` that of its stiffness slider alone, by finite elements.
+"""Latency of the page: `python -m bench.web [moves] [palm | own]`, in Debian's chromium without a
+window; with `palm` that of its stiffness slider alone, by finite elements; with `own` CPU times
+alone, without a browser.
 
 From a key press on a slider to plots on the screen with the new response; the process's own share
 of that, in CPU time, which other work on the machine disturbs little; and from opening a page to
@@ -16,12 +17,15 @@ from typing import Any
 import numpy as np
 from trame.app import get_server
 
+from skinwave.effort import THREADS
 from skinwave.scene import BODIES
 from skinwave.web import waves
 from skinwave.web.controls import STARTS
 from skinwave.web.layer_values import with_own_materials
+from skinwave.web.memory import KEEPING
 from skinwave.web.scenes import scene_of
 from skinwave.web.serve import session_of
+from skinwave.web.worker import limits
 
 CHROMIUM = "/usr/bin/chromium"
 ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
@@ -141,7 +145,10 @@ def in_a_browser(moves: int, palm: bool) -> None:
                 page.goto(address)
                 page.wait_for_function(DRAWN)
                 ready.append(time.perf_counter() - before)
+                page.close()  # else its bands are computed beside what is measured
             row("page ready", ready)
+            page = browser.new_page(viewport={"width": 1280, "height": 720})
+            page.set_default_timeout(120_000)
             page.goto(address + "&body=none")
             page.wait_for_function(DRAWN)
             said = "kernel, same load, Pa"
@@ -166,10 +173,16 @@ def in_a_browser(moves: int, palm: bool) -> None:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
-    of_palm = sys.argv[2:] == ["palm"]
+    of_palm, alone = sys.argv[2:] == ["palm"], sys.argv[2:] == ["own"]
+    if os.environ.keys().isdisjoint(KEEPING):  # as the processes behind a page begin
+        command = [sys.executable, "-m", "bench.web", *sys.argv[1:]]
+        sys.exit(subprocess.run(command, env={**KEEPING, **limits(1), **os.environ}).returncode)
     sys.argv = sys.argv[:1]  # trame reads it
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} before")
     print(f"{'':<52}{'median':>10} {'95 %':>10} {'of':>5}")
     (palms_share if of_palm else own_share)(count)
-    in_a_browser(count, of_palm)
+    if not alone:
+        for name in (*KEEPING, *THREADS):
+            os.environ.pop(name, None)  # the server says its own
+        in_a_browser(count, of_palm)
     print(f"load {os.getloadavg()[0]:.1f} after")

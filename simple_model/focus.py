@@ -10,7 +10,7 @@ Its intensity |p|^2 near the focus is close to sinc^2(D/D0) with D0 growing with
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -177,6 +177,7 @@ def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:
     return (PRESSURE_AT_1M / distance * directivity * wave).sum(axis=1)
 
 
+@lru_cache(maxsize=64)  # asked for with every pressure of a load
 def relative_intensity(height: float) -> float:
     """Intensity at a height in metre relative to 200 mm, where it is greatest.
 

@@ -104,7 +104,7 @@ def line_names(
     return _line_names(pressure, threshold, most, tuple(candidates))
 
 
-@lru_cache(maxsize=128)  # several models take each load
+@lru_cache(maxsize=16)  # several models take each load; of one with a rhythm up to some MB
 def _line_names(
     pressure: MovingPressure, threshold: float, most: int, candidates: tuple[str, ...]
 ) -> LineNames:

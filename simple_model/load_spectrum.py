@@ -13,6 +13,7 @@ that time, by causality.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import lcm
 
 import numpy as np
@@ -157,11 +158,18 @@ def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[
     """Orders (n,) of the harmonics of one focus along the path that, with all foci, exceed a
     fraction of the strongest, and 0; and their largest amplitude (n,) at about eight points of it.
     """
-    of_spot = np.abs(path_fourier(_swept(pressure))).max(axis=0)
+    of_spot = _largest_harmonics(pressure)
     n = harmonics(len(of_spot))
     share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
     heard = (share > threshold * share.max()) | (n == 0)
     return n[heard], of_spot[n[heard]]
+
+
+@lru_cache(maxsize=8)  # lines, their names and maps are of the same load
+def _largest_harmonics(pressure: MovingPressure) -> Floats:
+    found = np.abs(path_fourier(_swept(pressure))).max(axis=0)
+    found.setflags(write=False)
+    return found
 
 
 def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:

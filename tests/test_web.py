@@ -57,6 +57,7 @@ from skinwave.web import (
 )
 from skinwave.web.controls import STARTS
 from skinwave.web.history import History
+from skinwave.web.memory import REST
 from skinwave.web.session import told
 from skinwave.web.shown import unresolved
 from skinwave.web.worker import Worker
@@ -718,6 +719,9 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
     questions, sent = iter([1, 2]), []
 
     class Pipe:
+        def poll(self, seconds):
+            return True
+
         def recv(self):
             if (number := next(questions, None)) is None:
                 raise EOFError
@@ -740,6 +744,48 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
     assert sent[0][:2] == ("failed", 1)
     assert said in sent[0][2]
     assert sent[1:] == [("answer", 2, "found")]
+
+
+def test_the_process_gives_memory_back_when_nothing_is_asked(monkeypatch):
+    given_back, rests = Mock(), iter([True, False, True])
+
+    class Pipe:
+        poll, send = staticmethod(lambda seconds: next(rests)), Mock()
+
+        def recv(self):
+            if given_back.called:
+                raise EOFError
+            return 1, None, False, (), None
+
+    monkeypatch.setattr(waves.BodyResponses, "__call__", lambda *_: given_back.assert_not_called())
+    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
+    monkeypatch.setattr(worker.os, "nice", lambda _: None)
+    monkeypatch.setattr(worker, "give_back", given_back)
+    worker.answer_forever(Pipe())
+    assert given_back.call_count == 1
+
+
+def test_curves_are_drawn_before_what_is_beside_them(session):
+    state, asked = session.state, []
+
+    def call_later(seconds, call):
+        asked.append((seconds, call, handle := Mock()))
+        return handle
+
+    session._loop = Mock(call_later=call_later)
+    rows, plot = state.rows, state.spectrum_plot
+    with state:
+        state.am = 90
+    assert state.spectrum_plot != plot
+    assert state.rows == rows
+    with state:
+        state.am = 80  # before the page has what is beside the curves
+    (seconds, _, cancelled), (_, beside, _) = (each for each in asked if each[0] < REST)
+    assert seconds > 0
+    assert cancelled.cancel.called
+    beside()
+    assert "80.0" in {row["frequency"] for row in state.rows}
+    assert sum(each[0] == REST for each in asked) == 2, "and memory is given back after both"
 
 
 def test_each_step_has_its_number_and_the_time_that_is_left():
@@ -786,6 +832,7 @@ def test_the_process_computes_on_the_cores_that_are_idle(monkeypatch, load, thre
     monkeypatch.setattr(worker.multiprocessing, "get_context", lambda _: context)
     Worker(print)._start()
     assert seen.pop("MKL_NUM_THREADS") == "3", "what the user said stays"
+    assert seen.pop("OPENBLAS_NUM_THREADS") == "1", "its threads keep cores busy as they wait"
     assert set(seen.values()) == {str(threads)}
     assert "OMP_NUM_THREADS" not in worker.os.environ
 

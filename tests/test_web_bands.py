@@ -171,7 +171,7 @@ def planted(response):
 
 
 def test_bands_are_asked_for_after_the_waves_and_go_with_the_next_change(session):
-    session._loop = Mock()
+    session._loop = Mock(call_later=lambda _, call: call() or Mock())
     found = answer(session.scene)
     assert not session.sampler.ask.called
     with session.state:

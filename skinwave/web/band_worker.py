@@ -11,6 +11,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from skinwave.processes import end_group
+from skinwave.web.memory import give_back
 from skinwave.web.worker import Told, end_with_parent, one_sentence, started
 
 LEAST_PRIORITY = 15
@@ -38,6 +39,7 @@ def sample_forever(pipe: Connection, samples: int) -> None:
                 asked = pipe.recv()
             if asked is not None:
                 _sample(sampler, pipe, *asked)
+                give_back()
 
 
 def _sample(sampler: Any, pipe: Connection, number: int, scene: Any, response: Any) -> None:

@@ -131,7 +131,8 @@ class Sampler:
         while len(self._tables) > self.samples + 1:  # those of one scene
             del self._tables[next(iter(self._tables))]
         times, probes = sample_times(sample), sample.probe_points
-        motion = flat_motion(table, sample.pressure, probes[0], times)
+        # Of a copy, whose splines, several times as large, are not kept.
+        motion = flat_motion(replace(table), sample.pressure, probes[0], times)
         return Response(model="flat-body", times=times, probes=probes, values=motion[:, None])
 
 

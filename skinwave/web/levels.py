@@ -74,8 +74,9 @@ def above_threshold(scene: Scene, answers: Sequence[Answer]) -> str:
     if scene.body.of_kind.discretise and not (scene.body.is_skin and scene.reading.is_plain):
         return ""
     unit = "m" if own else "Pa"
-    levels = {x: float(sensation_level(x.amplitude, x.frequency, unit=unit))
-              for x in waves.lines if x.frequency > 0}  # fmt: skip
+    lines = [x for x in waves.lines if x.frequency > 0]
+    sizes, frequencies = np.array([(x.amplitude, x.frequency) for x in lines]).reshape(-1, 2).T
+    levels = dict(zip(lines, sensation_level(sizes, frequencies, unit=unit).tolist(), strict=True))
     line = max(levels, key=lambda each: levels[each], default=None)
     if line is None or levels[line] < FAINTEST:
         return "Above threshold at the point: no, next to nothing moves there."

@@ -12,11 +12,9 @@ from typing import Any
 
 from skinwave.processes import SAFE_PATH, end_group
 from skinwave.web.access import one_line
+from skinwave.web.memory import KEEPING
 
 PATIENCE = 60.0  # s that a session may take to start
-# For glibc: arrays above 2 MiB go back to the system when they are freed. By itself it raises that
-# limit to what was freed once, and the heap of a process that runs for hours is fragmented.
-RETURNED = {"MALLOC_MMAP_THRESHOLD_": str(2**21)}
 COMMAND = (sys.executable, "-m", "skinwave.web.serve")
 FAILURES = (OSError, TimeoutError, ValueError)  # of a process that does not start
 
@@ -49,7 +47,7 @@ async def started(folder: str) -> PageProcess:
         asyncio.create_subprocess_exec(
             *COMMAND, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
-            env={**RETURNED, **os.environ, **SAFE_PATH, "WSLINK_READY_MSG": "",
+            env={**KEEPING, **os.environ, **SAFE_PATH, "WSLINK_READY_MSG": "",
                  **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), own)},
         )
     )  # fmt: skip

@@ -5,7 +5,9 @@ a browser. What a page can do beside turning controls is in `moves`, what it loo
 """
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,11 @@ from skinwave.web.controls import KEYS, STARTS, Values
 from skinwave.web.history import History
 from skinwave.web.layer_values import rows, with_own_materials
 from skinwave.web.levels import Levels
+from skinwave.web.memory import REST, give_back
 from skinwave.web.model import Answer
 from skinwave.web.worker import LEVELS, Worker
+
+SENT = 0.01  # s in which curves are on their way to the page
 
 
 class Session:
@@ -60,6 +65,8 @@ class Session:
         self.number = 0
         self.zoomed: tuple[float, float] | None = None
         self._loop: Any = None
+        self._beside: asyncio.TimerHandle | None = None
+        self._resting: asyncio.TimerHandle | None = None
         self.state.update({**self.good, **shown.first(own)})
         self.state.client_only("draft", "helped", "hue")
 
@@ -93,6 +100,28 @@ class Session:
         """Have the bands of what is shown computed, in a process that comes after all others."""
         if self._loop and self.samples and not self.state.stale:
             self.sampler.ask(self.number, self.scene, self.answers[-1].response)
+
+    def after_curves(self, drawn: Callable[[], None]) -> None:
+        """Draw what is beside the curves: once a page has been sent these, unless it is sent
+        others before; at once if there is no page.
+        """
+        if self._beside is not None:
+            self._beside.cancel()
+
+        def later() -> None:
+            with self.state:
+                drawn()
+
+        if self._loop is None:
+            drawn()
+        else:
+            self._beside = self._loop.call_later(SENT, later)
+
+    def rest(self) -> None:
+        """Give back the memory of moves unless another one comes."""
+        if self._resting is not None:
+            self._resting.cancel()
+        self._resting = self._loop.call_later(REST, give_back) if self._loop else None
 
     def _told_elsewhere(self, what: str, number: int, content: Any) -> None:
         """Messages of the other process, brought to where the page is served."""
@@ -199,17 +228,27 @@ def solid(session: Session) -> None:
 
 
 def draw(session: Session) -> None:
-    """Draw all that is seen, from the responses there are."""
+    """Draw all that is seen, from the responses there are: curves first, and what is beside them
+    once they are on their way.
+    """
+    session.rest()
     if session.kernel is not None:
-        shown.commanded(session.state, session.scene, session.zoomed)
-        shown.foci(session.state, session.scene)
-        shown.answers(session.state, session.scene, plots.Curves(
+        curves = plots.Curves(
             kernel=session.kernel, waves=session.waves, published=session.published,
             pinned=session.pinned, bands=session.bands, stale=bool(session.state.waves_stale),
             levels=session.levels, measured=session.measured,
-        ))  # fmt: skip
-        session.state.differs = (
-            shown.differs(controls.values_in(session.state.pinned_query), session.good)
-            if session.pinned
-            else []
-        )
+        )  # fmt: skip
+        shown.commanded(session.state, session.scene, session.zoomed)
+        shown.plotted(session.state, session.scene, curves)
+        session.after_curves(partial(_beside, session, curves))
+
+
+def _beside(session: Session, curves: plots.Curves) -> None:
+    """Maps, table and sentences beside the curves."""
+    shown.foci(session.state, session.scene)
+    shown.answers(session.state, session.scene, curves)
+    session.state.differs = (
+        shown.differs(controls.values_in(session.state.pinned_query), session.good)
+        if session.pinned
+        else []
+    )

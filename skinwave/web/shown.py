@@ -50,14 +50,20 @@ def first(own: Body | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def answers(state: Any, scene: Scene, curves: Curves) -> None:
-    """Plots, maps and table of responses."""
-    kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
-    bands = curves.bands
-    span = plots.span_of(state.span, tacton.duration)
+def plotted(state: Any, scene: Scene, curves: Curves) -> None:
+    """Plots of responses."""
+    span = plots.span_of(state.span, scene.tacton.duration)
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
         "spectrum_plot": third_plot(state, scene, curves),
+    })  # fmt: skip
+
+
+def answers(state: Any, scene: Scene, curves: Curves) -> None:
+    """Maps, table and sentences of responses."""
+    kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
+    bands = curves.bands
+    state.update({
         "lines_unit": scene.reading.asked.shown,
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),

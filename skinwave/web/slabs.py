@@ -9,6 +9,8 @@ the real axis, away from the poles of waves.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.special import jv
@@ -41,17 +43,34 @@ class Table:
     distances: Floats
     g: fem.Complex
 
+    @cached_property
+    def along_frequencies(self) -> Any:
+        """Cubic spline of a frequency (...) to (..., r)."""
+        from scipy.interpolate import CubicSpline  # which takes long to import
+
+        return CubicSpline(self.frequencies, self.g, axis=0)
+
+    @cached_property
+    def along_distances(self) -> Any:
+        """Cubic spline of a distance (...) to (f, ...)."""
+        from scipy.interpolate import CubicSpline
+
+        return CubicSpline(self.distances, self.g, axis=1)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Wavenumbers:
     """A body's compliance G (f, k) in m/Pa at `frequencies` (f,) in Hz on the path of integration
-    `k` (k,) in 1/m with the `weights` (k,) of its nodes, whose real parts are `along` (k,).
+    `k` (k,) in 1/m with the `weights` (k,) of its nodes, whose real parts are `along` (k,), and
+    `bessel` J0(k r) (k, r) at the `distances` (r,) in metre of the narrowest profile.
     """
 
     frequencies: Floats
+    distances: Floats
     along: Floats
     k: fem.Complex
     weights: fem.Complex
+    bessel: fem.Complex
     G: fem.Complex
 
 
@@ -87,12 +106,12 @@ def wavenumbers(body: Body, low: float, progress: Progress) -> Wavenumbers:
     """
     progress(PHASE, 0.0)
     answer, frequencies = compliance(body), _frequencies(body)
-    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(low)[::LOOKED]
-    coarse = _tabulated(_on_grid(answer, some, low, n), low, at)
+    n, some, at = FEWEST_NODES, frequencies[::LOOKED], _distances(low)
+    coarse = _tabulated(_on_grid(answer, some, at[::LOOKED], low, n), low)
     while n < MOST_NODES:
-        fine = _tabulated(_on_grid(answer, some, low, 2 * n), low, at)
+        fine = _tabulated(_on_grid(answer, some, at[::LOOKED], low, 2 * n), low)
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
-            return _on_grid(answer, frequencies, low, n)
+            return _on_grid(answer, frequencies, at, low, n)
         coarse, n = fine, 2 * n
     raise ArithmeticError(UNRESOLVED)
 
@@ -110,9 +129,8 @@ def _frequencies(body: Body) -> Floats:
 
 def tabulate(known: Wavenumbers, height: float) -> Table:
     """The table of a flat body for a height in metre."""
-    distances = _distances(height)
     return Table(
-        frequencies=known.frequencies, distances=distances, g=_tabulated(known, height, distances)
+        frequencies=known.frequencies, distances=known.distances, g=_tabulated(known, height)
     )
 
 
@@ -120,17 +138,19 @@ def _distances(height: float) -> Floats:
     return np.linspace(0, FURTHEST, int(np.ceil(6 * FURTHEST / spot_width(height))))
 
 
-def _tabulated(known: Wavenumbers, height: float, distances: Floats) -> fem.Complex:
+def _tabulated(known: Wavenumbers, height: float) -> fem.Complex:
     """g (f, r) at the distances (r,) in metre."""
     width = spot_width(height)
-    counts = known.along <= 6.5 / width  # beyond, the transform of the profile is negligible
-    k = known.k[counts]
+    # Ascending; beyond, the transform of the profile is negligible.
+    n = int(np.searchsorted(known.along, 6.5 / width, side="right"))
+    k = known.k[:n]
     spot = width**2 * np.exp(-((k * width) ** 2) / 2)
-    carried = known.G[:, counts] * (spot * k * known.weights[counts])
-    return np.asarray(carried @ jv(0, k[:, None] * distances))
+    return np.asarray(known.G[:, :n] @ ((spot * k * known.weights[:n])[:, None] * known.bessel[:n]))
 
 
-def _on_grid(answer: Compliance, frequencies: Floats, low: float, n: int) -> Wavenumbers:
+def _on_grid(
+    answer: Compliance, frequencies: Floats, distances: Floats, low: float, n: int
+) -> Wavenumbers:
     w = 2 * np.pi * frequencies.astype(np.complex128)
     lift = min(1.5 / FURTHEST, answer.clearance(w))  # J0 grows by e^1.5 at most
     if not lift > 0:
@@ -144,7 +164,8 @@ def _on_grid(answer: Compliance, frequencies: Floats, low: float, n: int) -> Wav
     k = along + 1j * lift * ramp
     parts = max(1, len(w) * n // AT_ONCE)
     return Wavenumbers(
-        frequencies=frequencies, along=along, k=k,
+        frequencies=frequencies, distances=distances, along=along, k=k,
+        bessel=jv(0, k[:, None] * distances),
         G=np.concatenate([answer(k, some) for some in np.array_split(w[:, None], parts)]),
         weights=(half[:, None] * weights).ravel() * (1 + 1j * (1 - ramp**2)),
     )  # fmt: skip

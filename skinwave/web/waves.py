@@ -68,7 +68,7 @@ from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
 from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, tabulate, wavenumbers
 
 TAIL = 0.4  # s that motion may last after the Tacton
-FINER = 4  # places of a map's table in each interval of the table
+FINER = 8  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
 TOLERANCE = 0.02  # of a reduction
@@ -221,13 +221,13 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
     f, w = path_amplitudes(_steady(pressure))
     away = np.linalg.norm(places()[:, None] - path_samples(pressure), axis=2)
     fine = np.linspace(0, FURTHEST, FINER * len(table.distances))
-    index = np.rint(away / fine[1]).astype(np.int32)
-    of_lines = CubicSpline(table.frequencies, table.g, axis=0)(f)
-    of_lines = CubicSpline(table.distances, of_lines, axis=1)(fine).astype(np.complex64)
+    index = np.rint(away / fine[1]).astype(np.intp)
+    of_lines = CubicSpline(table.distances, table.along_frequencies(f), axis=1)(fine)
+    of_lines, carried = of_lines.astype(np.complex64), np.empty(index.shape, np.complex64)
     # Silence has no lines, and moves nothing: the shape is not left to what there is.
     motion = np.zeros((len(f), SIDE**2), np.complex128)
     for line, g, weights in zip(motion, of_lines, w, strict=True):
-        line[:] = g[index] @ weights
+        line[:] = np.take(g, index, out=carried, mode="clip") @ weights  # without a check of each
     seen = None
     if moving:
         shape = slab_shape(scene.body, places())
@@ -243,7 +243,7 @@ def flat_lines(table: Table, scene: Scene) -> tuple[Floats, fem.Complex]:
 
     f, w = path_amplitudes(_steady(scene.pressure))
     away = np.linalg.norm(scene.probe_points[0, :2] - path_samples(scene.pressure), axis=1)
-    g = CubicSpline(table.distances, table.g, axis=1)(away)
+    g = table.along_distances(away)
     return f, (CubicSpline(table.frequencies, g, axis=0)(f) * w).sum(axis=1)
 
 
@@ -268,7 +268,7 @@ def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Fl
     gain = pressure.gain(t, over=dt) * (np.arange(padded) < n)
     gain[0] /= 2  # as in `flat_body`
     away = np.linalg.norm(probe - path_samples(pressure), axis=1)
-    h = path_fourier(CubicSpline(table.distances, table.g, axis=1)(away))
+    h = path_fourier(table.along_distances(away))
     orders = harmonics(h.shape[1])
     h[:, orders] *= foci_harmonics(pressure, orders)
     orders = orders[np.abs(h[:, orders]).max(axis=0) > FAINTEST * np.abs(h).max()]

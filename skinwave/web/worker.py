@@ -11,6 +11,7 @@ from typing import Any
 from skinwave.effort import THREADS
 from skinwave.processes import end_group, environment, when_parent_ends
 from skinwave.steps import Step, follower
+from skinwave.web.memory import REST, give_back
 
 Told = Callable[[str, int, Any], None]  # what, number of the request, content
 LEAST_STEP = 0.02  # of progress that is told
@@ -32,6 +33,8 @@ def answer_forever(pipe: Connection) -> None:
     waves = BodyResponses()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
+            if not pipe.poll(REST):
+                give_back()
             number, scene, moving, variants, base = pipe.recv()
             try:
                 found = waves(scene, _teller(pipe, number), moving, base)
@@ -66,8 +69,12 @@ def idle_cores() -> int:
 
 
 def limits(threads: int) -> dict[str, str]:
-    """Environment variables of so many threads; those that the user has set stay."""
-    return {name: str(threads) for name in THREADS if name not in os.environ}
+    """Environment variables of so many threads; those that the user has set stay. numpy has one:
+    products of a move are small, and OpenBLAS keeps cores busy while its threads wait for work. On
+    two cores that others use, too, waves of a slab take 110 ms with one thread, 540 ms with two.
+    """
+    counts = dict.fromkeys(THREADS, str(threads)) | {"OPENBLAS_NUM_THREADS": "1"}
+    return {name: count for name, count in counts.items() if name not in os.environ}
 
 
 def one_sentence(error: Exception) -> str:
