@@ -65,13 +65,21 @@ def reach(scene: Scene, found: AreaMap) -> tuple[float, bool] | None:
     return float(away), bool(above[[0, -1]].any() or above[:, [0, -1]].any())
 
 
+def has_threshold(scene: Scene) -> bool:
+    """Whether a threshold of skin says something of a response: of skin in normal displacement, and
+    of the kernel alone.
+    """
+    kernel_alone = not scene.body.of_kind.discretise
+    return kernel_alone or (scene.body.is_skin and scene.reading.is_plain)
+
+
 def above_threshold(scene: Scene, answers: Sequence[Answer]) -> str:
     """Whether a response is above threshold at the selected point, at which line, and how far from
     the path it is; nothing of a body that is not skin.
     """
     kernel, waves = answers[0], answers[-1]
     own = waves is not kernel
-    if scene.body.of_kind.discretise and not (scene.body.is_skin and scene.reading.is_plain):
+    if not has_threshold(scene):
         return ""
     unit = "m" if own else "Pa"
     lines = [x for x in waves.lines if x.frequency > 0]

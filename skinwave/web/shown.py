@@ -13,7 +13,7 @@ from skinwave.scene import Body, Scene
 from skinwave.web import drawings, guided, measured, model, moving, plots
 from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.level_view import LEVELS, level_plot
-from skinwave.web.levels import above_threshold
+from skinwave.web.levels import above_threshold, has_threshold
 from skinwave.web.model import Answer
 from skinwave.web.plots import Curves
 
@@ -100,8 +100,7 @@ def third_plot(state: Any, scene: Scene, curves: Curves) -> plots.PlotlyFigure:
             state.problem = str(error)
     if state.third in LEVELS and curves.levels is not None:
         return level_plot(curves.levels, None if curves.stale else curves.waves)
-    skin = (scene.body.is_skin and scene.reading.is_plain) or not scene.body.of_kind.discretise
-    found = plots.spectrum_plot(curves, state.highest, with_threshold=skin)
+    found = plots.spectrum_plot(curves, state.highest, with_threshold=has_threshold(scene))
     return plots.in_decibel(found) if state.decibel else found
 
 
