@@ -6,8 +6,12 @@ focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
 
     u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(x_p - X(a), w) exp(-2 pi i n a) da
 
-where Q is the transform of the pressure at the focus. A recorded path may be long and run through
-once; with splines B_j(r) that interpolate g(r, w) = sum_j g_j(w) B_j(r), it moves the probe by
+where Q is the transform of the pressure at the focus. With splines B_j(r) that interpolate g(r, w)
+= sum_j g_j(w) B_j(r), the path and the probes are apart from the body,
+
+    h_n = sum_j g_j(w) int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
+
+and a recorded path, which may be long and run through once, moves the probe by
 
     u(w) = sum_j g_j(w) int q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
 
