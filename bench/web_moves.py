@@ -23,8 +23,8 @@ def there(page: Page) -> list[str]:
 
 @contextmanager
 def unless_gone(control: Any) -> Iterator[None]:
-    """A move that nothing comes of if an earlier one, answered late, takes its control away: foci
-    with paths of their own have no common speed.
+    """A move that nothing comes of if an earlier one, whose effect is late, takes its control away:
+    foci with paths of their own have no common speed.
     """
     try:
         yield
