@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
 WRAPPED = 1e-5
 AT_ONCE = 2**19  # pairs of frequency and distance: some ten megabytes
+STEPS_PER_WIDTH = 6  # distances of a spline in a standard deviation of the focal spot
+FEWEST_STEPS = 8  # of them
 FEW_DISTANCES = 40  # are integrated one by one, without a spline
 ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
 FAINT = 1e-7  # of the strongest harmonic of the path, which a transient leaves out
@@ -267,10 +269,10 @@ def _circling(
     shares = through(np.eye(len(table)))(distance) * path_weights(pressure)
     h = path_fourier(np.einsum("mcpk,jpk->cjpmk", field.weights(away), shares))
     orders, _ = path_strengths(pressure, FAINT)
-    h[..., orders] *= foci_harmonics(pressure, orders)
+    h = h[..., orders] * foci_harmonics(pressure, orders)
     u = np.zeros((len(w), *h.shape[2:-1]), np.complex128)
     gain = cache(partial(_gain, pressure, window, dt))
-    for n in orders:
+    for n, of_path in zip(orders, np.moveaxis(h, -1, 0), strict=True):
         parts = finer(highest(pressure, abs(n) * f_d), dt)
 
         def turned(late: float, n: int = n, parts: int = parts) -> Complex:
@@ -278,7 +280,7 @@ def _circling(
             return gained * np.exp(2j * np.pi * n * f_d * t)
 
         transformed = transform(turned, w, dt, parts)[:, None, None]
-        u += np.tensordot(g, h[..., n], axes=([0, 2], [0, 1])) * transformed
+        u += np.tensordot(g, of_path, axes=([0, 2], [0, 1])) * transformed
     return u
 
 
@@ -306,9 +308,9 @@ def _recorded(
     """Transform (f, p, m) of the field at the probes under foci that run any path."""
     path, width = pressure.tacton.trajectory, _width(pressure)
     furthest = np.linalg.norm(probes[:, None] - path.outline, axis=2).max()
-    table = _table(furthest, width)
+    table = distance_table(furthest, width)
     g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
-    carriers = _spline(table, np.eye(len(table)))
+    carriers = radial_spline(table, np.eye(len(table)))
     parts = finer(reached(pressure), dt)
 
     def load(late: float, probe: Floats, component: int, integral: int) -> Floats:
@@ -331,13 +333,27 @@ def _recorded(
     return u
 
 
-def _table(furthest: float, width: float) -> Floats:
-    """Distances (j,) in metre to interpolate between: g is as smooth as the focal spot."""
-    return np.linspace(0, furthest, max(8, int(np.ceil(furthest / width * 6))))
+def distance_table(furthest: float, width: float) -> Floats:
+    """Distances (j,) in metre up to `furthest` to interpolate between: the response is as smooth as
+    the focal spot, of standard deviation `width` in metre.
+    """
+    steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))
+    return np.linspace(0, furthest, steps)
 
 
-def _spline(table: Floats, values: Complex | Floats, axis: int = 0) -> "CubicSpline":
-    """A spline that is flat at distance 0."""
+def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> "CubicSpline":
+    """Cubic spline through values at distances, flat at distance 0.
+
+    Parameters
+    ----------
+    table : (j,) float, metre, from 0
+    values : array of j along `axis`
+    axis : int
+
+    Returns
+    -------
+    CubicSpline of a distance (...), which replace that axis
+    """
     from scipy.interpolate import CubicSpline  # which takes long to import
 
     flat = (1, np.zeros(np.delete(values.shape, axis), values.dtype))
@@ -373,8 +389,8 @@ def _interpolation(
     unique = np.unique(distance)
     if len(unique) <= FEW_DISTANCES:
         return unique, lambda values: lambda r: values[..., np.searchsorted(unique, r)]
-    table = _table(distance.max(), width)
-    return table, partial(_spline, table, axis=-1)
+    table = distance_table(distance.max(), width)
+    return table, partial(radial_spline, table, axis=-1)
 
 
 def _response_at(

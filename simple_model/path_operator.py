@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simple_model.compliance import Compliance
+from simple_model.flat_body import distance_table, radial_spline
 from simple_model.focus import spot_width
 from simple_model.load_spectrum import Complex, load_lines, path_fourier, path_samples
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import point_response
 
-PER_WIDTH = 6  # distances of the spline in a standard deviation of the focal spot
-FEWEST = 8  # of them
 AT_ONCE = 2**20  # values of the splines, some ten megabytes
 
 
@@ -89,19 +88,15 @@ def path_operator(
             "the steady lines of a path need a Gaussian focus and a path that is repeated; take "
             "finite elements, or motion from rest"
         )
-    from scipy.interpolate import CubicSpline  # which takes long to import
-
     load = load_lines(pressure, threshold)
     frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
     distinct, orders = np.unique(load.harmonics, return_inverse=True)
     knots, width = path_samples(pressure), spot_width(pressure.height)
     places = np.atleast_2d(np.asarray(probes, np.float64))
     away = np.linalg.norm(places[:, None] - knots, axis=-1)
-    steps = max(FEWEST, int(np.ceil(away.max() / width * PER_WIDTH)))
-    table = np.linspace(0, away.max(), steps)
-    flat = (1, np.zeros(steps))  # at distance 0
-    splines = CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))
-    blocks = np.array_split(away, max(1, away.size * steps // AT_ONCE))
+    table = distance_table(away.max(), width)
+    splines = radial_spline(table, np.eye(len(table)))
+    blocks = np.array_split(away, max(1, away.size * len(table) // AT_ONCE))
     parts = [path_fourier(splines(part).swapaxes(1, 2))[..., distinct] for part in blocks]
     return PathOperator(
         width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
