@@ -23,6 +23,7 @@ from fem.sparsity import starts_of_kept
 
 Array = NDArray[Any]  # float64 or complex128
 BACKENDS = ("pardiso", "cholmod", "superlu")
+SPARSE = 0.1  # share of n^2 in the upper triangle; blocks of denser matrices may crash PARDISO
 BLOCKS = 80  # %: how much alike the patterns of rows are that PARDISO takes as a block
 
 
@@ -176,7 +177,8 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     handle, settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
     settings[0], settings[1], settings[7] = 1, 2, 0  # own settings, METIS, no refinement
     settings[9], settings[23] = 16, 1  # perturbation of pivots, two-level factorisation
-    settings[36] = -BLOCKS  # blocks of variable size
+    if len(values) < SPARSE * n * n:
+        settings[36] = -BLOCKS  # blocks of variable size
 
     def call(phase: int, b: Array | None = None) -> Array:
         right = 1 if b is None or b.ndim == 1 else b.shape[1]

@@ -41,11 +41,12 @@ from skinwave.models.reduction import (
     respond,
     select_lines,
 )
+from skinwave.models.symmetry import axes_of_probes, even_part, mirrored_axes
 from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = 4  # of what is cached of a body
+FORMAT = 5  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points", "inertia")
 OTHERS = ("relaxing", "relaxation_times", "read", "sag", "carried")
@@ -100,13 +101,16 @@ def prepare(
     """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
     cache, once per machine.
 
+    Of a body that is its own mirror image only the part on one side is modelled where all probes
+    lie on the plane: they see no more of it (`skinwave.models.symmetry`).
+
     Parameters
     ----------
     body : Body
     probes : (p, 2) float, metre
     progress, h, solver : as for `simulate`
     tolerance : relative error of the reduction
-    symmetry : as in `bodies.build.build`: for all Tactons that have it
+    symmetry : as in `bodies.build.build`: of the load of all Tactons, wherever the probes lie
     reading : what the probes read; with symmetry, of normal motion alone
     load : what pushes, with its gravity; with symmetry, a pressure
 
@@ -115,6 +119,9 @@ def prepare(
     `Prepared`
     """
     clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
+    alike = mirrored_axes(body, reading, load)
+    seen = axes_of_probes(probes, alike)
+    symmetry = "".join(axis for axis in "xy" if axis in symmetry or axis in seen)
     (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
     outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
@@ -225,7 +232,7 @@ def _prepared_anew(
     operators = assembled(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        P, points = surface_load(build, load)
+        P, points = even_part(*surface_load(build, load), build.symmetry)
         still = sag(build, operators, outputs, load, solver)
         motion = load.support_motion
         reduced, model = reduce_body(

@@ -11,10 +11,10 @@ from skinwave.bodies.coat import AT, layer_name, thicknesses
 from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import air_mass
-from skinwave.load import PRESSURE
 from skinwave.models.plate_modes import middle_compliance
+from skinwave.models.symmetry import mirrored_axes
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain, spot_scale
-from skinwave.scene import FLAT, Body, Scene
+from skinwave.scene import Body, Scene
 
 STIFF = 30.0  # times the modulus below, from where the error of a coat is stated
 LOWEST = 20.0  # Hz at which air is estimated where no line is higher
@@ -31,12 +31,6 @@ class PlanRow:
 
 def symmetry(scene: Scene) -> str:
     """Symmetry axes: across their middle planes the load is its own mirror image at all times."""
-    if not scene.body.of_kind.is_symmetric or scene.body.placement != FLAT:
-        return ""
-    if not scene.reading.asked.is_normal:  # others change sign, or are recovered across it
-        return ""
-    if scene.load.moving != PRESSURE:  # which may have a direction
-        return ""
     if not isinstance(scene.pressure.profile, str):  # which may have no symmetry
         return ""
     path = scene.tacton.trajectory
@@ -44,7 +38,7 @@ def symmetry(scene: Scene) -> str:
     return "".join(
         axis
         for axis, x in zip("xy", path_points.T, strict=True)
-        if np.abs(x).max() < 1e-9 and axis in scene.body.symmetry
+        if np.abs(x).max() < 1e-9 and axis in mirrored_axes(scene.body, scene.reading, scene.load)
     )
 
 

@@ -17,6 +17,7 @@ from skinwave.models.laws import check_laws
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
 from skinwave.models.reduction import BAND
+from skinwave.models.symmetry import axes_of_probes, mirrored_axes
 from skinwave.planning.estimates import (
     cutoff_frequency,
     has_wavenumber_solution,
@@ -250,19 +251,31 @@ def _section(body: Body) -> str:
     return "a homogeneous flat slab" if layers == 1 else f"a flat slab of {layers} layers"
 
 
+def _symmetry_row(scene: Scene, axes: str) -> PlanRow:
+    """Row of the part that symmetry of the load, and the places of probes, leave to be modelled."""
+    among = mirrored_axes(scene.body, scene.reading, scene.load)
+    seen = [a for a in axes_of_probes(scene.probe_points, among) if a not in axes]
+    reasons = []
+    if axes:
+        reasons.append(f"the load is its own mirror image across {' and '.join(axes)} = 0")
+    if seen:
+        reasons.append(
+            f"probes at {' = '.join(seen)} = 0 see the even part of the motion across it alone"
+        )
+    return PlanRow(
+        what="symmetry",
+        value=("none", "half", "a quarter")[len(axes) + len(seen)],
+        reason="; ".join(reasons) or "all of the body is modelled",
+    )
+
+
 def _element_rows(
     scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
 ) -> list[PlanRow]:
     effort = found.prepared.effort
     kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
     return [
-        PlanRow(
-            what="symmetry",
-            value={"": "none", "x": "half", "y": "half", "xy": "a quarter"}[axes],
-            reason=f"the load is its own mirror image across {' and '.join(axes)} = 0"
-            if axes
-            else "all of the body is modelled",
-        ),
+        _symmetry_row(scene, axes),
         PlanRow(
             what="element size",
             value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} dofs",
