@@ -362,7 +362,7 @@ def test_preparing_says_what_it_cost(monkeypatch):
     )  # fmt: skip
     assert list(dict.fromkeys(phases)) == ["mesh", "assemble", "factorise", "reduce"]
     assert prepared.effort.solver == fem.available()[0]
-    assert prepared.effort.dofs > 1000
+    assert prepared.effort.dofs > 500  # of a quarter
     assert prepared.effort.peak_memory > 1e7
     assert 0 < prepared.effort.estimate <= 1e-3
 
