@@ -1,10 +1,11 @@
 """Python functions in processes of their own: none imports from the working folder, none outlives
 the process that started it.
 
-`apart` calls one function, `helper` and `pool` many; `meshes.subprocess_call` runs programs. Three
-more have processes that are none of these, with what they share here: a page's process serves
-pages until it is told to end (`web.processes`), the one that computes for it sends its progress and
-is ended in the middle of it (`web.worker`), and `rerun` has a command go on in the terminal.
+`apart` calls one function, `side_by_side`, `helper` and `pool` many; `meshes.subprocess_call` runs
+programs. Three more have processes that are none of these, with what they share here: a page's
+process serves pages until it is told to end (`web.processes`), the one that computes for it sends
+its progress and is ended in the middle of it (`web.worker`), and `rerun` has a command go on in the
+terminal.
 
 Only what Python has loaded anyway is imported here, because the command line begins with it.
 """
@@ -14,13 +15,13 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    from concurrent.futures import Executor, Future
     from multiprocessing.process import BaseProcess
 
 P = ParamSpec("P")
@@ -112,6 +113,46 @@ def apart(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         return other.submit(function, *args, **kwargs).result()
 
 
+def side_by_side(
+    calls: Sequence[Callable[[], T]],
+    may_begin: Callable[[int, Collection[int]], bool],
+    begun: Callable[[int], None],
+    most: int = 2,
+) -> "Iterator[tuple[int, Future[T]]]":
+    """Call functions, some at once, each in a new process on one thread.
+
+    Parameters
+    ----------
+    calls : functions, in the order in which they are begun if they may
+    may_begin : whether call `k` may run beside those `running`, which it may beside none
+    begun : called with the number of each as it begins
+    most : how many at once
+
+    Yields
+    ------
+    Number and future of each, as it ends.
+    """
+    from concurrent.futures import FIRST_COMPLETED, wait
+
+    left = list(range(len(calls)))
+    running: dict[Future[T], tuple[int, ExitStack]] = {}
+    with environment(SAFE_PATH), ExitStack() as every:
+        while left or running:
+            busy = [k for k, _ in running.values()]
+            ready = next((k for k in left if not busy or may_begin(k, busy)), None)
+            if ready is not None and len(busy) < most:
+                own = every.enter_context(ExitStack())
+                executor = own.enter_context(pool(1, as_worker))
+                begun(ready)
+                left.remove(ready)
+                running[executor.submit(calls[ready])] = ready, own
+                continue
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                k, own = running.pop(future)
+                own.close()
+                yield k, future
+
+
 @contextmanager
 def helper() -> "Iterator[Executor]":
     """A process beside this one, on one thread; what it has not done when this ends is given up."""
@@ -125,9 +166,8 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
     given up.
     """
     from concurrent.futures import Future, ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
+    from multiprocessing import get_context
 
-    others = set(active_children())
     with environment(SAFE_PATH):  # the `python -c` of multiprocessing looks in it first
         executor = ProcessPoolExecutor(count, get_context("spawn"), initializer=begin)
         submit: Callable[..., Future[Any]] = executor.submit
@@ -136,9 +176,9 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
             yield executor
         finally:
             manager: Any = executor._executor_manager_thread
+            own = list((executor._processes or {}).values())
             executor.shutdown(wait=False, cancel_futures=True)
-            # A daemon is none of the executor's, but may have been started meanwhile.
-            stop(child for child in set(active_children()) - others if not child.daemon)
+            stop(own)
             # As it ends, Python wakes this thread up, and prints a traceback if its pipe is closed
             # at that moment.
             if manager is not None:

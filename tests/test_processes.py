@@ -7,7 +7,9 @@ import subprocess
 import sys
 import sysconfig
 import time
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from test_ended_anywhere import hand
 
 import skinwave
 from meshes import subprocess_call
-from skinwave.processes import as_part, ended_by_signals, environment, pool
+from skinwave.processes import as_part, ended_by_signals, environment, pool, side_by_side
 
 ROOT = Path(skinwave.__file__).parents[1]
 THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich", "PIL", "dask",
@@ -232,6 +234,28 @@ def test_a_pool_ends_its_own_processes_only():
         beside.join()
 
 
+def test_calls_side_by_side_are_apart_and_wait_for_what_they_must():
+    calls = [partial(divmod, 1, 0), os.getpid, os.getpid, partial(os._exit, 1), os.getpid]
+    events: list[str] = []
+    for k, future in side_by_side(
+        calls, lambda k, running: k != 1 or 0 not in running, lambda k: events.append(f"begins {k}")
+    ):
+        events.append(f"ends {k}")
+        if k == 0:
+            with pytest.raises(ZeroDivisionError):
+                future.result()
+        elif k == 3:
+            with pytest.raises(BrokenProcessPool):
+                future.result()
+        else:
+            assert future.result() != os.getpid()
+    # Two at once, but the second not beside the first.
+    assert events[:2] == ["begins 0", "begins 2"]
+    assert events.index("ends 0") < events.index("begins 1")
+    assert sorted(events) == [f"{what} {k}" for what in ("begins", "ends") for k in range(5)]
+    assert "PYTHONSAFEPATH" not in os.environ
+
+
 def test_the_environment_is_as_before(monkeypatch):
     for before in (None, "", "1"):
         monkeypatch.delenv("SOME_NAME", raising=False)
@@ -343,6 +367,11 @@ CALLS = {
     "apart": ASIDE.format("apart", "apart(meshes.palm_mesh, meshes.Palm(), 3e-3)"),
     "helper": ASIDE.format("helper", "with helper() as aside:\n            "
                            "aside.submit(meshes.palm_mesh, meshes.Palm(), 3e-3).result()"),
+    "side_by_side": ASIDE.format(
+        "side_by_side",
+        "call = functools.partial(meshes.palm_mesh, meshes.Palm(), 3e-3)\n        "
+        "list(side_by_side([call], bool, bool))",
+    ).replace("import meshes", "import functools, meshes"),
 }  # fmt: skip
 # Processes of `apart` and of `helper` begin and end alike, by `as_part`.
 ENDS = [
@@ -351,6 +380,7 @@ ENDS = [
     ("here", signal.SIGKILL),
     ("apart", signal.SIGINT),
     ("helper", signal.SIGTERM),
+    ("side_by_side", signal.SIGINT),
     ("helper", signal.SIGKILL),
 ]
 

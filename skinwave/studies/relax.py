@@ -1,13 +1,14 @@
 """Model hierarchy from the paper's model to the richest one: effect and cost of each assumption.
 
 Each step of the hierarchy drops one more assumption; leave-one-out models, which drop all but one,
-are run beside it. Each is computed in a process of its own, so that its memory is its own. A body
-that several steps share is meshed and reduced once, by the first of them; its seconds and memory
-count in all of them.
+are run beside it. Each is computed in a process of its own, so that its memory is its own, and two
+at once. A body that several steps share is meshed and reduced once, by the first of them; its
+seconds and memory count in all of them.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -26,7 +27,7 @@ from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
 from skinwave.models import named
 from skinwave.planning.assessment import sentences
-from skinwave.processes import apart, environment
+from skinwave.processes import environment, side_by_side
 from skinwave.run import ASSESSED
 from skinwave.scene import Body, Scene, check_motion
 from skinwave.simulation import compute
@@ -43,8 +44,8 @@ from skinwave.studies.assumptions import (
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
 FIRST = "as published"  # by the model point-kernel-published
 # With a tenth of the damping a body may take more moments than a reduced one has; in elements so
-# much larger it takes as many, and that is known at an eighth of the cost.
-ALMOST_UNDAMPED, COARSER = "all but: little loss", 2.0
+# much larger it takes as many, and that is known at a tenth of the cost.
+ALMOST_UNDAMPED, COARSER = "all but: little loss", 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -158,33 +159,90 @@ def hierarchy_of(
         if tuple(n for n in names if n != name) not in asked and can_be_alone(name, names, scene)
     ]
     todo = [*up, *aside, *leave_one_out]
-    found: list[HierarchyStep] = []
     with TemporaryDirectory(prefix="skinwave-") as cache:
-        for k, (name, dropped) in enumerate(todo):
-            progress(name, k / len(todo))
-            found.append(_whole(_answered(drawn, scene, name, dropped, h, cache), found))
+        steps = _computed([_asked(drawn, scene, *each, h, cache) for each in todo], progress)
     first, second = len(up), len(up) + len(aside)
     return Hierarchy(
-        scene=scene, steps=tuple(found[:first]), side_steps=tuple(found[first:second]),
-        leave_one_out=tuple(found[second:]),
+        scene=scene, steps=tuple(steps[:first]), side_steps=tuple(steps[first:second]),
+        leave_one_out=tuple(steps[second:]),
     )  # fmt: skip
 
 
-def _answered(
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Asked:
+    """Step to be computed by a call, if there is any, and whether that reduces a whole body."""
+
+    step: HierarchyStep
+    call: Callable[[], tuple[Response, float, int]] | None = None
+    reduces: bool = False
+
+    def shares(self, others: Iterable[HierarchyStep]) -> bool:
+        """Whether one of the others is by the same model of the same body."""
+        own = (self.step.body, self.step.model)
+        return any(own == (other.body, other.model) for other in others)
+
+
+def _asked(
     drawn: Callable[[Scene, tuple[str, ...]], tuple[Scene, str]], scene: Scene, name: str,
     dropped: tuple[str, ...], h: float | None, cache: str,
-) -> HierarchyStep:  # fmt: skip
+) -> _Asked:  # fmt: skip
     step: dict[str, Any] = {"name": name, "dropped": dropped, "model": "none"}
     try:
         changed, model = drawn(scene, dropped)
         step |= {"model": model, "body": changed.body}
-        size = h or default_size(scene.body) if named(model).is_reduced else h
-        if size and named(model).is_reduced and name == ALMOST_UNDAMPED:
-            apart(_tried, changed, model, COARSER * size, cache)
-        response, seconds, memory = apart(_timed, changed, model, size, cache)
+        is_reduced = named(model).is_reduced
+        size = h or default_size(scene.body) if is_reduced else h
+    except (ValueError, ArithmeticError) as error:
+        return _Asked(step=HierarchyStep(**step, error=str(error)))
+    tried = COARSER * size if size and is_reduced and name == ALMOST_UNDAMPED else None
+    return _Asked(
+        step=HierarchyStep(**step),
+        call=partial(_timed, changed, model, size, cache, tried=tried),
+        reduces=is_reduced and tried is None,
+    )
+
+
+def _computed(asked: Sequence[_Asked], progress: Progress) -> list[HierarchyStep]:
+    """Steps in order, two of them computed at once; bodies are reduced one after another, whose
+    memory would not be small together, and as soon as they can be.
+    """
+    found = {k: each.step for k, each in enumerate(asked) if not each.call}
+    computed: list[HierarchyStep] = []
+
+    def is_large(k: int) -> bool:
+        reduced = (step for step in computed if step.response)
+        return asked[k].reduces and not asked[k].shares(reduced)
+
+    def is_first(k: int) -> bool:
+        return asked[k].reduces and not asked[k].shares(each.step for each in asked[:k])
+
+    order = sorted((k for k, each in enumerate(asked) if each.call), key=lambda k: not is_first(k))
+
+    def may_begin(number: int, running: Collection[int]) -> bool:
+        return not (is_large(order[number]) and any(is_large(order[n]) for n in running))
+
+    def begun(number: int) -> None:
+        progress(asked[order[number]].step.name, len(computed) / len(order))
+
+    calls = [call for k in order if (call := asked[k].call)]
+    for number, future in side_by_side(calls, may_begin, begun):
+        k = order[number]
+        found[k] = _result(asked[k].step, future, computed)
+        computed.append(found[k])
+    return [found[k] for k in range(len(asked))]
+
+
+def _result(
+    step: HierarchyStep,
+    future: Future[tuple[Response, float, int]],
+    before: Sequence[HierarchyStep],
+) -> HierarchyStep:
+    """Step with its response, or with what it was refused for."""
+    try:
+        response, seconds, memory = future.result()
     except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
-        return HierarchyStep(**step, error=str(error))
-    return HierarchyStep(**step, response=response, seconds=seconds, memory=memory)
+        return replace(step, error=str(error))
+    return _whole(replace(step, response=response, seconds=seconds, memory=memory), before)
 
 
 def _whole(step: HierarchyStep, before: Sequence[HierarchyStep]) -> HierarchyStep:
@@ -199,16 +257,21 @@ def _whole(step: HierarchyStep, before: Sequence[HierarchyStep]) -> HierarchySte
     return replace(step, seconds=step.seconds + missing, memory=memory)
 
 
-def _tried(scene: Scene, model: str, h: float, cache: str) -> None:
+def _tried(scene: Scene, model: str, h: float) -> None:
     """Refuse a body that cannot be reduced on a coarse mesh either, if it has one."""
-    with environment({"SKINWAVE_CACHE": cache}), suppress(ValueError):
+    with suppress(ValueError):
         try:
             compute(scene, model, h=h)
         except NotReduced as error:
             raise ArithmeticError(str(error)) from None
 
 
-def _timed(scene: Scene, model: str, h: float | None, cache: str) -> tuple[Response, float, int]:
+def _timed(
+    scene: Scene, model: str, h: float | None, cache: str, *, tried: float | None
+) -> tuple[Response, float, int]:
+    with environment({"SKINWAVE_CACHE": cache}):
+        if tried:
+            _tried(scene, model, tried)
     started = time.perf_counter()
     with environment({"SKINWAVE_CACHE": cache}):
         response = compute(scene, model, h=h)
