@@ -33,6 +33,7 @@ from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_products, jacobians, shape_nodes
 from fem.materials import Material
 from fem.maxwell import Branch, MaxwellBranch, on_free
+from fem.memory import check_memory
 from fem.plane_stiffness import (
     SIDES,
     Tension,
@@ -132,12 +133,15 @@ def assemble(
         If a region has no material, or no degree of freedom is left.
     MeshError
         If a facet set is unknown or an element is inverted.
+    MemoryError
+        If there is no memory for the matrices.
     """
     materials, region = by_region(mesh, material)
-    pattern = SparsityPattern.of(mesh.tets, len(mesh.points))
     free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
+    check_memory(len(free))
+    pattern = SparsityPattern.of(mesh.tets, len(mesh.points))
 
     share = tension.share if tension else None
     volume = _volume(mesh, pattern, materials, region, axes, stiffener)
