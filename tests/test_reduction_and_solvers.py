@@ -5,6 +5,7 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 from dataclasses import replace
 from itertools import islice
 
@@ -16,7 +17,7 @@ from scipy.signal import lfilter
 import fem
 import meshes
 import skinwave
-from fem import linear_solver, memory, products
+from fem import linear_solver, memory, products, reduced
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load_spectrum import reduced_lines
 from skinwave.bodies.build import build as build_body
@@ -177,6 +178,22 @@ def test_a_floating_body_is_refused_with_the_cure(backend):
     singular = sparse.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
     with pytest.raises(ValueError, match="is the body constrained anywhere"):
         fem.factorise(singular, backend=backend)
+
+
+def test_how_long_error_estimates_take_changes_no_model(stiff, monkeypatch):
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    outputs = fem.probe_operator(mesh, np.array([[0.0, 0.0], [0.004, 0.001]]))
+    prompt = fem.reduce(stiff[0], outputs, tolerance=1e-4)
+
+    def late(*arguments, look=reduced._look):
+        time.sleep(0.05)  # in which some more moments are computed
+        return look(*arguments)
+
+    monkeypatch.setattr(reduced, "_look", late)
+    slow = fem.reduce(stiff[0], outputs, tolerance=1e-4)
+    assert (slow.moments, slow.estimate) == (prompt.moments, prompt.estimate)
+    np.testing.assert_array_equal(slow.basis, prompt.basis)
+    np.testing.assert_array_equal(slow.K, prompt.K)
 
 
 def body(kind, h=0.1 / 24):
