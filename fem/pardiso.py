@@ -42,7 +42,7 @@ PHASES = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
 
 
 class PardisoError(ArithmeticError):
-    """What PARDISO reports, by the number of its error."""
+    """Failure of PARDISO, by the number of its error."""
 
 
 @cache

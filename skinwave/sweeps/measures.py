@@ -10,7 +10,7 @@ from simple_model import Response, named_lines, point_kernel, sensation_level
 from simple_model.quantities import DISPLACEMENT
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import ASSESSED, Run
+from skinwave.run import ASSESSED, SUPPORT, Run
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import DesignPoint
 
@@ -66,8 +66,11 @@ def _others(scene: Scene) -> list[str]:
 
 
 def _columned(scene: Scene) -> Iterable[str]:
-    """Lines that have columns: the strongest of the load, and those that claims are about."""
-    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
+    """Lines that have columns: the strongest of the load, those that claims are about, and that
+    of a support that moves.
+    """
+    found = named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
+    return [*found, *([SUPPORT] if scene.load.support_motion else [])]
 
 
 def commanded(case: DesignPoint) -> dict[str, Any]:
