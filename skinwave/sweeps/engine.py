@@ -13,7 +13,6 @@ from importlib.util import find_spec
 from typing import Any
 
 from skinwave.effort import usable_cores
-from skinwave.effort import usable_cores
 from skinwave.processes import as_worker, guarded, pool
 
 LOCAL = ("processes", "threads")
