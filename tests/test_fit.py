@@ -189,6 +189,26 @@ def test_gain_and_pressure_have_no_interval_but_their_product(scene, lines):
     assert found.values["gain"] * found.values[PRESSURE] == pytest.approx(0.8 * 50, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("limits", "times", "said"),
+    [
+        (["gain=0.0001:0.001"], 0, f"neither {MODULUS} nor gain"),
+        (["gain=0.0001:0.1", f"{PRESSURE}=0.001:1"], 0, f"neither gain nor {PRESSURE}"),
+        (["gain=0.2:5"], 1e3, f"neither {MODULUS} nor gain"),
+    ],
+)
+def test_noise_determines_no_combination(scene, lines, limits, times, said):
+    """As many directions that are not resolved as keys: no interval, of width zero or any other."""
+    measured = spectra(scene, lines, 0.05)
+    noise = np.random.default_rng(5).standard_normal((2, *measured.values.shape)) * 1e-3
+    values = times * measured.values if times else noise[0] + 1j * noise[1]
+    found = fit(scene, replace(measured, values=values), [f"{MODULUS}=8000:80000", *limits],
+                starts=1)  # fmt: skip
+    told = cautions(found)
+    assert not any("is determined" in text for text in told)
+    assert sum(f"the data determine {said}" in text for text in told) == 1, told
+
+
 def test_a_parameter_without_effect_is_named(scene, lines):
     keys = [*vary("gain"), "body.size_x_mm=60:100"]
     found = fit(scene, spectra(scene, lines, 0.01), keys, starts=1)

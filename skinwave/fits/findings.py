@@ -1,9 +1,11 @@
 """Sentences on a fit: what was found, and what of it is not to be trusted."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from skinwave.fits.fit import Fit
-from skinwave.fits.identify import Direction, Estimate, combined
+from skinwave.fits.identify import Direction, Estimate, combined, sharing
 from skinwave.fits.measured_lines import some
 from skinwave.fits.parameters import DELAY
 from skinwave.measurements.alignment import opposite_sign
@@ -51,7 +53,7 @@ def cautions(found: Fit) -> list[str]:
         "or closer limits"
     ] * (not solution.converged)
     said += [_at_limit(found, each) for each in found.estimates if each.at_limit]
-    said += [_unresolved(found, each) for each in found.unresolved]
+    said += [_unresolved(found, each) for each in sharing(found.unresolved)]
     said += _beyond_errors(found) + _coloured(found) + _elsewhere(found)
     said += _left_out(found)
     named = {key for each in found.unresolved for key in each.keys}
@@ -75,24 +77,36 @@ def _at_limit(found: Fit, each: Estimate) -> str:
     )
 
 
-def _unresolved(found: Fit, direction: Direction) -> str:
-    """Sentence on keys of which the data determine a combination, or nothing."""
-    keys = direction.keys
+def _unresolved(found: Fit, directions: Sequence[Direction]) -> str:
+    """Sentence on keys of which the data determine a combination, or nothing, by directions that
+    share them.
+    """
+    keys = tuple(dict.fromkeys(key for each in directions for key in each.keys))
     if len(keys) == 1:
         return f"the data do not determine {keys[0]} between its limits; fix it, or measure more"
-    together = f"{', '.join(keys[:-1])} and {keys[-1]}"
-    said = f"the data do not resolve {together} from each other"
-    if np.isfinite(direction.exponent):
-        value, low, high = combined(found.solution, direction)
-        power = round(direction.exponent, 2)
-        product = (
-            f"{keys[0]} times {keys[1]}" if power == 1
-            else f"{keys[0]} over {keys[1]}" if power == -1
-            else f"{keys[0]} times {keys[1]} to the power of {power:g}"
-        )  # fmt: skip
-        middle, least, most = shown(value, low, high)
-        said += f"; only {product} is determined, {middle} (95 % interval {least} to {most})"
+    if len(directions) >= len(keys):
+        none = f"neither {keys[0]} nor {keys[1]}" if len(keys) == 2 else f"none of {_list(keys)}"
+        return f"the data determine {none} between their limits; fix them, or measure more"
+    said = f"the data do not resolve {_list(keys)} from each other"
+    if np.isfinite(directions[0].exponent):
+        value, low, high = combined(found.solution, directions[0])
+        if np.isfinite(low):
+            middle, least, most = shown(value, low, high)
+            said += f"; only {_product(directions[0])} is determined, {middle} "
+            said += f"(95 % interval {least} to {most})"
     return f"{said}; fix {'one' if len(keys) == 2 else 'some'} of them"
+
+
+def _list(keys: Sequence[str]) -> str:
+    return f"{', '.join(keys[:-1])} and {keys[-1]}"
+
+
+def _product(direction: Direction) -> str:
+    """Words for the combination of two keys that a direction leaves."""
+    (first, second), power = direction.keys, round(direction.exponent, 2)
+    if abs(power) == 1:
+        return f"{first} {'times' if power == 1 else 'over'} {second}"
+    return f"{first} times {second} to the power of {power:g}"
 
 
 def _beyond_errors(found: Fit) -> list[str]:
