@@ -14,6 +14,7 @@ from skinwave.fits.findings import cautions, shown
 from skinwave.fits.fit import fit
 from skinwave.fits.identify import correlations, estimates, whiteness, width
 from skinwave.fits.observed import Data, is_steady
+from skinwave.fits.page import fitted_scene
 from skinwave.fits.parameters import Parameter, check, parse
 from skinwave.fits.predicted import predicted_lines, target
 from skinwave.fits.problem import Problem
@@ -23,6 +24,7 @@ from skinwave.measurements import Measurement
 from skinwave.measurements.writing import write
 from skinwave.scene_file import loads
 from skinwave.simulation import compute
+from skinwave.spreads import OF_PRESETS, spreads_of
 from skinwave.sweeps.variation import varied
 
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"
@@ -207,6 +209,35 @@ def test_noise_determines_no_combination(scene, lines, limits, times, said):
     told = cautions(found)
     assert not any("is determined" in text for text in told)
     assert sum(f"the data determine {said}" in text for text in told) == 1, told
+
+
+def test_the_fitted_scene_has_the_spreads_of_the_estimates(scene, lines):
+    """Quantiles 2.5 and 97.5 % are the interval, and the loss keeps the spread of the preset."""
+    measured = spectra(scene, lines, 0.03)
+    found = fit(scene, measured, [*vary("gain", MODULUS, "delay_ms"), "body.thickness_mm=10:20"],
+                starts=1)  # fmt: skip
+    text = fitted_scene(found)
+    assert "correlations of the estimates are dropped, as 0." in text
+    given = {each.key: each for each in spreads_of(loads(text))}
+    assert given.keys() == {MODULUS, VISCOSITY, "body.thickness_mm", PRESSURE}
+    for each in (one for one in found.estimates if "." in one.key):
+        ends = given[each.key].distribution.quantile(each.value, [0.025, 0.975])
+        assert ends == pytest.approx([each.low, each.high], rel=0.01)
+    losses = OF_PRESETS["palm"].losses
+    assert given[VISCOSITY].value == 5
+    assert given[VISCOSITY].distribution == losses
+
+
+def test_what_is_not_resolved_is_anywhere_between_its_limits_in_the_fitted_scene(scene, lines):
+    measured = spectra(scene, lines, 0.01, delay=0)
+    tie = [f"{VISCOSITY}={MODULUS} / 5000"]
+    found = fit(scene, measured, vary("gain", MODULUS, PRESSURE), tie=tie, starts=1)
+    text = fitted_scene(found)
+    given = {each.key: each for each in spreads_of(loads(text))}
+    assert given.keys() == {MODULUS, PRESSURE}
+    assert given[PRESSURE].distribution.width == (10, 200)
+    assert f"{PRESSURE} is not resolved by the measurement" in text
+    assert f"{VISCOSITY} was tied" in text
 
 
 def test_a_parameter_without_effect_is_named(scene, lines):
