@@ -131,6 +131,19 @@ def test_delay_and_gain_are_those_given(models):
     assert main_column(late).differs.any()
 
 
+def test_one_repetition_has_a_noise_where_some_lines_have_none(models):
+    measured = record(models[True][-1], np.random.default_rng(4), repetitions=1)
+    found = compare_measured(Measured(measurement=measured), models[True])
+    variance = found.lines.variance.copy()
+    variance[1] = np.nan
+    part = replace(found, lines=replace(found.lines, variance=variance, borrowed=2))
+    assert part.noise == pytest.approx(found.noise, rel=0.5)
+    assert (
+        "of 2 lines too close to others that of the next ones, and unknown for 1 line."
+        in (measured_page.remarks(part)[0])
+    )
+
+
 def test_a_measurement_with_its_sign_turned_is_told(models):
     rng = np.random.default_rng(8)
     run = models[True][-1]
@@ -270,6 +283,10 @@ def test_claims_that_a_record_cannot_decide_say_why():
     )  # fmt: skip
     unknown = claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.1}, np.nan)
     assert "its noise is unknown" in unknown["M1"][1]
+    three = {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.05}
+    part = claims_of(AM, three | {"4f_AM": 0.01}, np.array([1e-3, 1e-3, 1e-3, np.nan])[:, None])
+    assert part["M1"][0] == HOLDS  # which is about the three others alone
+    assert "the noise of 4f_AM is unknown" in part["S1"][1]
     f = np.arange(0, 1000.0)
     peaks = np.exp(-((f - 140.3) ** 2) / 4)[:, None] * np.ones(2)
     assert claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.1}, 1e-3, (f, peaks))["S5"] == (

@@ -163,9 +163,7 @@ def remarks(found: MeasuredComparison) -> list[str]:
     said = f"{measurement.name or 'The measurement'}: {measurement.record.words} at "
     said += f"{len(measurement.places)} place{'s' * (len(measurement.places) > 1)}, "
     if r == 1:
-        unknown = np.isnan(found.lines.variance).any()
-        how = "is unknown" if unknown else "is that in the bins beside each line"
-        said += f"one repetition, whose noise {how}."
+        said += f"one repetition, whose noise {_noise_of_one(found)}."
     else:
         said += f"{r} repetitions, whose spread is the noise"
         step = f"; they are out of step by up to {1e3 * np.ptp(shifts):.3g} ms, and were shifted"
@@ -179,6 +177,22 @@ def remarks(found: MeasuredComparison) -> list[str]:
         *_changes(found),
         *measurement.remarks,
     ]
+
+
+def _noise_of_one(found: MeasuredComparison) -> str:
+    """Where the noise of a single repetition is from."""
+    lines = found.lines
+    unknown = int(np.isnan(lines.variance).any(axis=1).sum())
+    if unknown == len(lines.frequencies):
+        return "is unknown"
+    said = "is that in the bins beside each line"
+    if lines.borrowed:
+        said += f", of {_count(lines.borrowed)} too close to others that of the next ones"
+    return said + (f", and unknown for {_count(unknown)}" if unknown else "")
+
+
+def _count(lines: int) -> str:
+    return f"{lines} line{'s' * (lines > 1)}"
 
 
 def _opposite(column: Column) -> list[str]:

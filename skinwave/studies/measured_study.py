@@ -92,8 +92,13 @@ class MeasuredComparison:
 
     @property
     def noise(self) -> float:
-        """Misfit that noise alone would leave; nan if it is unknown."""
-        return float(np.sqrt(self.lines.variance.sum() / (np.abs(self.lines.mean) ** 2).sum()))
+        """Misfit that noise alone would leave; nan if it is unknown, and where it is of some lines
+        they count as the others do.
+        """
+        known = self.lines.variance[np.isfinite(self.lines.variance)]
+        whole = float((np.abs(self.lines.mean) ** 2).sum())
+        return float(np.sqrt(known.mean() * self.lines.variance.size / whole)) if len(known) else (
+            np.nan)  # fmt: skip
 
     def is_numerical(self, column: Column) -> np.ndarray:
         """Mask (f, p) of differences no larger than the numerical error that a model's waveform is
