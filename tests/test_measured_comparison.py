@@ -107,6 +107,27 @@ def test_a_model_three_tenths_too_stiff_is_found_out(models):
     assert {*np.unique(same.findings(main_column(same)))} == {AGREES, SILENT}
 
 
+def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_tacton():
+    """The true delay is 0; 393 ms off, where 108 of 500 ms overlap, the misfit is a tenth less."""
+    slow = replace(CIRCLE, speed=8.0)
+    scene = scene_of(duration=0.5, am_frequency=140.0, trajectory=slow)
+    true, stiff = (runs_of(scene, stiffness)[-1] for stiffness in (0.8, 1.0))
+    noise = 1e-5 * np.random.default_rng(3).normal(size=(4, *true.response.values.shape))
+    measured = Measurement(
+        quantity="velocity",
+        places=scene.probe_points,
+        times=true.response.times,
+        values=true.response.values + noise,
+    )
+    found = compare_measured(Measured(measurement=measured), [stiff])
+    column = main_column(found)
+    assert column.misfit > 0.2
+    assert abs(column.alignment.delay) < 1e-3
+    assert not any("lie within the Tacton" in said for said in measured_page.remarks(found))
+    far = compare_measured(Measured(measurement=measured, delay=-0.3926), [stiff])
+    assert any("only 107 of the 500 ms" in said for said in measured_page.remarks(far))
+
+
 def test_differences_within_the_numerical_error_are_marked(models):
     rng = np.random.default_rng(2)
     rough = [replace(run, response=replace(run.response, expected_error=0.5))

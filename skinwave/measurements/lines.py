@@ -98,8 +98,8 @@ def lines_of(
 
     Repetitions give the noise: the variance of their mean. Of a single one it is that in the bins
     beside each line, by their median, and where lines leave too few of these the larger of that of
-    the next lines on both sides, at the same place. Repetitions that are out of step (F test at 0.1 %, as of a
-    trigger that jitters) are shifted by the delay that fits each best.
+    the next lines on both sides, at the same place. Repetitions that are out of step (F test at
+    0.1 %, as of a trigger that jitters) are shifted by the delay that fits each best.
 
     Parameters
     ----------

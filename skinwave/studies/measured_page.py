@@ -19,6 +19,7 @@ from skinwave.studies.measured_study import (
     MeasuredComparison,
     body_columns,
     main_column,
+    overlap,
 )
 from skinwave.studies.measured_tables import (
     claims_table,
@@ -27,6 +28,7 @@ from skinwave.studies.measured_tables import (
     differences_table,
 )
 
+SURELY = 0.85  # of the record, or of the Tacton, that is within the other at the true delay
 FEW = 4  # repetitions: of fewer the noise is poorly known
 STEADY, CLEARLY = 0.8, 6.0  # least over largest amplitude; standard errors between them
 MOST_NAMED = 3  # lines that a sentence names
@@ -173,6 +175,7 @@ def remarks(found: MeasuredComparison) -> list[str]:
     return [
         said,
         *_opposite(main),
+        *_outside(found, main),
         *([f"Not compared, since record or model cannot resolve them: {lost}."] if lost else []),
         *_changes(found),
         *measurement.remarks,
@@ -199,6 +202,21 @@ def _opposite(column: Column) -> list[str]:
     """A sentence where the other sign of the measurement fits as well."""
     said = opposite_sign(f"the {label(column.run.column)}", has_delay=True)
     return [f"{said[0].upper()}{said[1:]}."] * column.may_be_turned
+
+
+def _outside(found: MeasuredComparison, column: Column) -> list[str]:
+    """A sentence where much of the record lies outside the Tacton at its delay."""
+    times, delay = found.measurement.times, column.alignment.delay
+    if found.measurement.is_spectrum:
+        return []
+    inside, most = overlap(found.measurement, column.run, delay), float(np.ptp(times))
+    if inside > SURELY * min(most, float(np.ptp(column.run.response.times))):
+        return []
+    return [
+        f"At its delay of {1e3 * delay:.3g} ms only {1e3 * max(inside, 0.0):.3g} of the "
+        f"{1e3 * most:.3g} ms of the record lie within the Tacton, and another delay may be the "
+        "true one: give --delay, or cut off what lies before and after."
+    ]
 
 
 def _changes(found: MeasuredComparison) -> list[str]:
