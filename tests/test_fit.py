@@ -11,10 +11,10 @@ from simple_model.load_spectrum import synthesise
 from skinwave import cli
 from skinwave.bodies.analytic import compliance
 from skinwave.fits.findings import cautions, shown
-from skinwave.fits.fit import fit
+from skinwave.fits.fit import fit, sampled
 from skinwave.fits.identify import correlations, estimates, whiteness, width
 from skinwave.fits.observed import Data, is_steady
-from skinwave.fits.page import fitted_scene
+from skinwave.fits.page import fitted_scene, summary
 from skinwave.fits.parameters import Parameter, check, parse
 from skinwave.fits.predicted import predicted_lines, target
 from skinwave.fits.problem import Problem
@@ -240,6 +240,14 @@ def test_what_is_not_resolved_is_anywhere_between_its_limits_in_the_fitted_scene
     assert f"{VISCOSITY} was tied" in text
 
 
+def test_short_chains_of_the_posterior_are_told(scene, lines):
+    found = sampled(fit(scene, spectra(scene, lines, 0.01), vary("gain"), starts=1), 12)
+    assert any("autocorrelation times long, and below 50" in said for said in cautions(found))
+    assert 0 < summary(found)["posterior_autocorrelation_times"] < 50
+    long = replace(found, posterior=replace(found.posterior, lengths=60.0))
+    assert not any("autocorrelation" in said for said in cautions(long))
+
+
 def test_a_parameter_without_effect_is_named(scene, lines):
     keys = [*vary("gain"), "body.size_x_mm=60:100"]
     found = fit(scene, spectra(scene, lines, 0.01), keys, starts=1)
@@ -299,6 +307,18 @@ def test_steady_waveforms_are_fitted_as_lines(scene, lines):
     assert found.values[MODULUS] == pytest.approx(30e3, rel=0.01)
     assert found.values["delay_ms"] == pytest.approx(-0.3, abs=0.02)
     assert found.whiteness.is_white
+
+
+def test_clipping_is_told(scene, lines):
+    f, a = lines
+    x = synthesise(f, a / (2j * np.pi * f)[:, None], np.arange(800) / 4000)
+    cut = np.clip(x, None, 0.6 * x.max(axis=0))
+    given = {"quantity": "displacement", "places": scene.probe_points}
+    for values, is_told in ((x, False), (cut, True)):
+        measured = Measurement(times=np.arange(800) / 4000, values=values[None], **given)
+        found = fit(scene, measured, vary("gain"), starts=1)
+        told = [said for said in cautions(found) if "the record is clipped" in said]
+        assert bool(told) == is_told
 
 
 def test_waveforms_from_rest_are_fitted_with_their_transient(scene, lines):

@@ -192,6 +192,21 @@ def test_a_record_that_begins_before_the_motion_is_told(models):
     assert "cut off what lies before and after the Tacton" in said[1][-1]
 
 
+def test_clipping_and_hum_on_a_line_of_the_load_are_told():
+    scene = scene_of(am_frequency=120.0, duration=0.5)
+    runs = runs_of(scene)
+    clean = record(runs[-1], np.random.default_rng(8))
+    top = 0.7 * np.abs(clean.values).max()
+    hum = 0.3 * clean.values.std() * np.sin(2 * np.pi * 60 * clean.times)[:, None]
+    said = [
+        " ".join(measured_page.remarks(compare_measured(Measured(measurement=m), runs)))
+        for m in (clean, replace(clean, values=clean.values.clip(-top, top)),
+                  replace(clean, values=clean.values + hum))
+    ]  # fmt: skip
+    assert ["is clipped" in text for text in said] == [False, True, False]
+    assert ["mains hum of 60 Hz, and f_AM" in text for text in said] == [False, False, True]
+
+
 def test_a_record_is_drawn_on_the_clock_of_the_model(models):
     run = models[True][-1]
     found = compare_measured(

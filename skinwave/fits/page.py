@@ -223,6 +223,7 @@ def summary(found: Fit) -> dict[str, Any]:
         "widened": dict(
             zip(solution.problem.parameters.keys, found.widenings.tolist(), strict=True)
         ),
+        "posterior_autocorrelation_times": found.posterior and found.posterior.lengths,
         "left_out": [
             {
                 "line": line.name,

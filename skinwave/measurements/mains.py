@@ -1,6 +1,6 @@
 """Mains hum: lines at multiples of one frequency near 50 or 60 Hz."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
@@ -34,14 +34,7 @@ def hum_of(
     names by number
     """
     found: dict[int, str] = {}
-    for mains in MAINS:
-        at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
-        first = next((n for n in (1, 2) if at[n] is not None), 0)
-        if at[1] is None and (at[2] is None or at[3] is None):
-            continue
-        if at[first] in driven:
-            continue
-        line = lines[at[first]]  # type: ignore[index]
+    for mains, line, first in _bases(lines, driven):
         base, spread = line.frequency / first, line.error / first
         for k, other in enumerate(lines):
             n = round(other.frequency / base)
@@ -54,6 +47,25 @@ def hum_of(
                 )
                 found.setdefault(k, multiple if n > 1 else f"mains {mains:g} Hz")
     return found
+
+
+def mains_in(lines: Sequence[SpectralLine], driven: Container[int] = ()) -> list[float]:
+    """Mains frequencies in Hz, as found, of the hum among lines; arguments as of `hum_of`."""
+    return [line.frequency / first for _, line, first in _bases(lines, driven)]
+
+
+def _bases(
+    lines: Sequence[SpectralLine], driven: Container[int]
+) -> Iterator[tuple[float, SpectralLine, int]]:
+    """Mains frequencies that lines have, the line that tells of each, and which multiple it is."""
+    for mains in MAINS:
+        at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
+        first = next((n for n in (1, 2) if at[n] is not None), 0)
+        if at[1] is None and (at[2] is None or at[3] is None):
+            continue
+        k = at[first]
+        if k is not None and k not in driven:
+            yield mains, lines[k], first
 
 
 def _nearest(lines: Sequence[SpectralLine], frequency: float, within: float) -> int | None:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from skinwave import document
 from skinwave.document import Markup, paragraph
 from skinwave.measurements.alignment import opposite_sign
+from skinwave.measurements.flaws import flaws
 from skinwave.measurements.significance import radius
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label, measured
@@ -178,6 +179,7 @@ def remarks(found: MeasuredComparison) -> list[str]:
         *_outside(found, main),
         *([f"Not compared, since record or model cannot resolve them: {lost}."] if lost else []),
         *_changes(found),
+        *(f"{said[0].upper()}{said[1:]}." for said in flaws(measurement, found.scene.pressure)),
         *measurement.remarks,
     ]
 
