@@ -4,10 +4,9 @@ import numpy as np
 
 from simple_model.line_names import line_names
 from simple_model.pressure import MovingPressure
-from skinwave.measurements.inspection import clipped_samples, kept_lines
+from skinwave.measurements.clipping import clipped_samples
 from skinwave.measurements.mains import MAINS, WANDER, mains_in
 from skinwave.measurements.measurement import Measurement
-from skinwave.measurements.summary import places_words
 
 STRONG = 1e-2  # of the strongest line of the load: what hum may be mistaken for
 MULTIPLES = 7  # of the mains frequency, which a hum may have
@@ -34,6 +33,8 @@ def _clipping(measurement: Measurement) -> list[str]:
     cut = clipped_samples(measurement)
     if not cut.any():
         return []
+    from skinwave.measurements.summary import places_words  # which loads statistics
+
     return [
         f"the record is clipped: {int(cut.sum()):,} samples in runs at the same extreme, at "
         f"{places_words(measurement, np.flatnonzero(cut.sum(axis=0)))}, which makes lines weaker "
@@ -53,6 +54,8 @@ def _hum(measurement: Measurement, pressure: MovingPressure) -> list[str]:
     near = np.abs(f[:, None] - multiples) <= apart + WANDER * multiples
     if not near.any():
         return []
+    from skinwave.measurements.inspection import kept_lines  # likewise
+
     found = kept_lines(measurement)
     driven = [k for k, x in enumerate(found) if (np.abs(f - x.frequency) <= apart).any()]
     return [

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simple_model.trajectory import Floats
-from skinwave.measurements.clipping import clipped
+from skinwave.measurements.clipping import clipped_samples
 from skinwave.measurements.mains import hum_of
 from skinwave.measurements.measurement import Measurement
 from skinwave.measurements.noise_floor import floor_of
@@ -86,13 +86,6 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
         kept=kept, noise=noise, clipped=clipped_samples(measured), constant=constant,
         missing=(*_missing(measured), *said),
     )  # fmt: skip
-
-
-def clipped_samples(measured: Measurement) -> np.ndarray:
-    """Samples (r, p) that are cut off, by repetition and place; none of spectra."""
-    if measured.is_spectrum:
-        return np.zeros((len(measured.values), measured.values.shape[2]), int)
-    return np.array([[clipped(waveform) for waveform in run.T] for run in measured.values])
 
 
 def kept_lines(measured: Measurement) -> tuple[SpectralLine, ...]:

@@ -1,10 +1,12 @@
 """Mains hum: lines at multiples of one frequency near 50 or 60 Hz."""
 
 from collections.abc import Container, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skinwave.measurements.spectral_lines import SpectralLine
+if TYPE_CHECKING:
+    from skinwave.measurements.spectral_lines import SpectralLine
 
 MAINS = (50.0, 60.0)
 WANDER = 0.004  # of its frequency: how far the mains of any grid are from it
@@ -13,7 +15,7 @@ HIGHEST = 20  # multiple
 
 
 def hum_of(
-    lines: Sequence[SpectralLine], duration: float, driven: Container[int] = ()
+    lines: Sequence["SpectralLine"], duration: float, driven: Container[int] = ()
 ) -> dict[int, str]:
     """Names of lines that may be mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
 
@@ -49,14 +51,14 @@ def hum_of(
     return found
 
 
-def mains_in(lines: Sequence[SpectralLine], driven: Container[int] = ()) -> list[float]:
+def mains_in(lines: Sequence["SpectralLine"], driven: Container[int] = ()) -> list[float]:
     """Mains frequencies in Hz, as found, of the hum among lines; arguments as of `hum_of`."""
     return [line.frequency / first for _, line, first in _bases(lines, driven)]
 
 
 def _bases(
-    lines: Sequence[SpectralLine], driven: Container[int]
-) -> Iterator[tuple[float, SpectralLine, int]]:
+    lines: Sequence["SpectralLine"], driven: Container[int]
+) -> Iterator[tuple[float, "SpectralLine", int]]:
     """Mains frequencies that lines have, the line that tells of each, and which multiple it is."""
     for mains in MAINS:
         at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
@@ -68,7 +70,7 @@ def _bases(
             yield mains, lines[k], first
 
 
-def _nearest(lines: Sequence[SpectralLine], frequency: float, within: float) -> int | None:
+def _nearest(lines: Sequence["SpectralLine"], frequency: float, within: float) -> int | None:
     """Number of the line nearest to a frequency, if it is within so many Hz."""
     if not lines:
         return None
