@@ -88,6 +88,30 @@ def test_any_key_of_a_scene_can_be_varied(scene):
     assert len(cases(scene, combinations(varied("body.thickness_mm=10,10.0,15")))) == 2
 
 
+def test_the_spreads_of_presets_can_be_varied(scene):
+    """All moduli or all losses of a material times a factor, by the keys that samples have."""
+    texts = ("body.material.modulus_scale=factor(1,3)", "body.material.loss_scale=0.5:2")
+    met = combinations(varied(*texts), "sobol", 4)
+    found = cases(scene, met)
+    plain = read(scene).body.solid
+    for case, each in zip(found, met, strict=True):
+        modulus, loss = each.values()
+        assert case.scene.body.solid == plain.scaled(modulus=modulus).scaled(loss=loss)
+        assert case.keys["body.material.modulus_scale"] == modulus
+    with pytest.raises(ValueError, match=r"no material for body.layers.3.material.loss_scale"):
+        cases(scene, combinations(varied("body.layers.3.material.loss_scale=1,2")))
+    with pytest.raises(ValueError, match="must be a number above 0"):
+        cases(scene, combinations(varied("body.material.loss_scale=0,-1")))
+
+
+def test_a_sweep_is_not_had_again_but_by_its_command(scene, capsys):
+    swept("--vary", "tacton.duration_s=0.01", *(f"--vary={each}" for each in SMALL),
+          "--model", "flat-body-harmonic")  # fmt: skip
+    said = refused(capsys, "rerun", "short-sweep")
+    assert "'sweep' is none of run" in said
+    assert "type it again, with another --out: skinwave sweep short.toml" in said
+
+
 def test_rows_say_what_was_commanded_and_what_came_out(scene):
     asked = ("tacton.speed_m_per_s=4,6", "body=skin-slab,none", "tacton.duration_s=0.3")
     rows = swept("--vary", *asked, "--csv")
