@@ -14,6 +14,7 @@ from meshes.tetmesh import Floats, Ints
 
 ORDER = 3.0  # of convergence of the motion at one line, measured 3 to 4
 LEAST = 1e-4  # of the largest density: no axis has cells without bound
+PER_CELL = 24  # degrees of freedom of ten-node tetrahedra, in a large grid
 EVEN = (2, 2, 1)  # numbers of cells along x, y and z are multiples of these
 
 Lines = tuple[Floats, Floats, Floats]  # metre, increasing, along x, y and z
@@ -51,7 +52,7 @@ def equidistributed(
     rates = [density ** (1 / (1 + order)) for density in densities]
     sums = np.array([size @ rate for size, rate in zip(sizes, rates, strict=True)])
     shares = sums ** ((1 + order) / order)
-    counts = shares * (dofs / 24 / shares.prod()) ** (1 / 3)
+    counts = shares * (dofs / PER_CELL / shares.prod()) ** (1 / 3)
     found = []
     for a, (line, size, rate) in enumerate(zip(lines, sizes, rates, strict=True)):
         per_metre = np.maximum(rate * counts[a] / sums[a], 1 / coarsest[a])
