@@ -5,6 +5,8 @@ Local numbering is VTK's: corners 0 1 2 3, then the mid-side nodes of the edges
 are seen anticlockwise from outside the body.
 """
 
+from __future__ import annotations
+
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -97,14 +99,14 @@ class TetMesh:
         """Three displacement components per node."""
         return 3 * len(self.points)
 
-    def to_pyvista(self) -> "pv.UnstructuredGrid":
+    def to_pyvista(self) -> pv.UnstructuredGrid:
         """The mesh as a grid of pyvista, in metre: linear or quadratic tetrahedra, `region` as cell
         data, and each facet set as field data, such as "facets:top".
         """
         return vtk_grid.to_grid(self.points, self.tets, self.region, self.facets)
 
     @classmethod
-    def from_pyvista(cls, grid: "pv.UnstructuredGrid") -> "TetMesh":
+    def from_pyvista(cls, grid: pv.UnstructuredGrid) -> TetMesh:
         """The mesh of a grid of tetrahedra of 4 nodes, or of 10, in metre.
 
         Raises

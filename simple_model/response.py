@@ -1,5 +1,7 @@
 """Response of the probes, as every model returns it, and its spectral lines."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -197,7 +199,7 @@ class Response:
             quantity=self.quantity,
         )  # fmt: skip
 
-    def plot(self, probes: Sequence[int] | None = None, *, ax: "Axes | None" = None) -> "Axes":
+    def plot(self, probes: Sequence[int] | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the waveforms of all probes, or of those of some numbers, and return the axes."""
         chosen = slice(None) if probes is None else list(probes)
         ax = drawing.new_axes(ax)
@@ -208,25 +210,25 @@ class Response:
         ax.set_ylabel(f"{self.record.words}, {self.record.shown}")
         return ax
 
-    def to_xarray(self) -> "xr.DataArray":
+    def to_xarray(self) -> xr.DataArray:
         """The values as an array with dimensions time and probe, times in s and x, y in metre of
         the probes as coordinates, units as attributes.
         """
         return conversion.to_xarray(self)
 
-    def to_pandas(self) -> "pd.DataFrame":
+    def to_pandas(self) -> pd.DataFrame:
         """The values as a table, rows by time_s and columns by x_m and y_m of the probes, the unit
         in its `attrs`.
         """
         return conversion.to_pandas(self)
 
     @classmethod
-    def from_xarray(cls, array: "xr.DataArray") -> "Response":
+    def from_xarray(cls, array: xr.DataArray) -> Response:
         """The response of such an array; its effort and load are not in it."""
         return _converted(**conversion.of_xarray(array))
 
     @classmethod
-    def from_pandas(cls, table: "pd.DataFrame") -> "Response":
+    def from_pandas(cls, table: pd.DataFrame) -> Response:
         """The response of such a table; its effort and load are not in it."""
         return _converted(**conversion.of_pandas(table))
 

@@ -1,5 +1,7 @@
 """Motion of a whole body, with its expected error and all warnings."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -52,7 +54,7 @@ class Field:
         """
         return field_plot.frame(self.times, self.strongest if time is None else time)
 
-    def to_pyvista(self, time: float | None = None) -> "pv.UnstructuredGrid":
+    def to_pyvista(self, time: float | None = None) -> pv.UnstructuredGrid:
         """The mesh at rest as a grid of pyvista, in metre, with its `displacement` (n, 3) in metre
         at the time nearest to one in s, or when it is largest; `time_s` in its field data.
         """
@@ -61,13 +63,13 @@ class Field:
         grid.field_data["time_s"] = self.times[k : k + 1]
         return grid
 
-    def plot(self, time: float | None = None, *, ax: "Axes | None" = None) -> "Axes":
+    def plot(self, time: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the displacement into the body of the upper surface, seen from above, at the time
         nearest to one in s, or when it is largest; colours are those of all times.
         """
         return field_plot.draw(self, self.frame(time), ax)
 
-    def animate(self, frames: int = 40, *, ax: "Axes | None" = None) -> "FuncAnimation":
+    def animate(self, frames: int = 40, *, ax: Axes | None = None) -> FuncAnimation:
         """The same as a film of so many of its times, evenly spaced; `.save("film.gif")` writes it,
         `.to_jshtml()` shows it in a notebook.
         """

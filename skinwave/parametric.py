@@ -7,6 +7,8 @@ ratios and the elements are fixed: with a thickness the nodes of one mesh move. 
 of a slab with absorbing sides is as wide as the fastest shear waves need.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache as cached

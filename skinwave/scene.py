@@ -1,5 +1,7 @@
 """A scene: what is commanded, what it acts on, where it is probed. Physics only, one TOML file."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -212,7 +214,7 @@ class Scene:
         """Quantity of the probes, and their depths."""
         return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
 
-    def plot(self, *, ax: "Axes | None" = None) -> "Axes":
+    def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw body, path, foci at the start and probes from above, and return the axes."""
         return scene_plot.draw(self, ax)
 

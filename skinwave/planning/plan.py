@@ -1,5 +1,7 @@
 """Plan of a scene: the cheapest model, extent and element size within a tolerance, with reasons."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Sweeps of a scene in Python: the table that the command line writes, as an object."""
 
+from __future__ import annotations
+
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -59,13 +61,13 @@ class SweepTable:
         choose("column", column, self.columns)
         return [row.get(column) for row in self.rows]
 
-    def to_pandas(self) -> "pd.DataFrame":
+    def to_pandas(self) -> pd.DataFrame:
         """The table with a row for each run; lists are entries, units end the names of columns."""
         return library("pandas").DataFrame([dict(row) for row in self.rows])
 
     def plot(
-        self, column: str = "peak_um", x: str = "", by: str = "", *, ax: "Axes | None" = None
-    ) -> "Axes":
+        self, column: str = "peak_um", x: str = "", by: str = "", *, ax: Axes | None = None
+    ) -> Axes:
         """Draw a column over a key, with a curve for each value of another; those that were varied
         if they are not given. Of what is told at every probe the largest, or that of "peak_um[2]".
         """
