@@ -59,7 +59,9 @@ def key(*parts: object) -> str:
 
 
 def digest(*parts: object) -> str:
-    """SHA-256 in hexadecimal of arrays, by type, shape and bytes, and of the repr of all else."""
+    """SHA-256 in hexadecimal of arrays, by type, shape and bytes, and of the repr of all else, which
+    has to be of all that it is: that of a scene, response, plan or mesh is a summary.
+    """
     found = hashlib.sha256()
     for part in parts:
         if isinstance(part, np.ndarray):

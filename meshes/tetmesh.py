@@ -89,6 +89,13 @@ class TetMesh:
         object.__setattr__(self, "facets", MappingProxyType(facets))
         object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
 
+    def __repr__(self) -> str:
+        elements = f"{len(self.tets):,} tetrahedra of {self.tets.shape[1]} nodes"
+        regions = len(np.unique(self.region))
+        said = [f"{len(self.points):,} nodes", elements, f"{regions} region{'s' * (regions != 1)}"]
+        sets = f"; facets {', '.join(sorted(self.facets))}" if self.facets else ""
+        return f"<TetMesh: {', '.join(said)}{sets}>"
+
     @property
     def order(self) -> int:
         """Polynomial order of the elements: 1 or 2."""

@@ -18,6 +18,7 @@ from simple_model.quantities import (
     PRESSURE,
     STRAIN,
     VELOCITY,
+    NotOfThis,
     Quantity,
     quantity,
 )
@@ -134,11 +135,11 @@ class Response:
 
         Raises
         ------
-        ValueError
+        ValueError, which is an AttributeError, too
             If they are of another quantity.
         """
         if self.record not in (DISPLACEMENT, PRESSURE):
-            raise ValueError(f"this response is of {self.quantity}; take its `values`")
+            raise NotOfThis(f"this response is of {self.quantity}; take its `values`")
         return self.values
 
     @property
@@ -161,7 +162,7 @@ class Response:
         strain is known.
         """
         if self.record.field != STRAIN or self.unit != "1":
-            raise ValueError(
+            raise NotOfThis(
                 f"this response is of {self.record.words}, from which no strain follows; simulate "
                 'the scene with quantity = "strain_xx" or another strain'
             )
@@ -173,11 +174,11 @@ class Response:
 
         Raises
         ------
-        ValueError
+        ValueError, which is an AttributeError, too
             If its load is unknown.
         """
         if self.load is None:
-            raise ValueError(
+            raise NotOfThis(
                 "the load of this response is unknown, and so are its lines; take "
                 "simple_model.phasors(response, frequencies)"
             )
@@ -231,6 +232,9 @@ class Response:
     def from_pandas(cls, table: pd.DataFrame) -> Response:
         """The response of such a table; its effort and load are not in it."""
         return _converted(**conversion.of_pandas(table))
+
+    def __repr__(self) -> str:
+        return response_page.line(self)
 
     def _repr_html_(self) -> str:
         return response_page.html(self)

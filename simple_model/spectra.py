@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from simple_model.choices import choose
 from simple_model.drawing import curves, new_axes
+from simple_model.numbers import counted
 from simple_model.quantities import Quantity, quantity
 from simple_model.trajectory import Floats
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DEEPEST = 1e-4  # of the largest amplitude, -80 dB: shown
+LISTED = 5  # names of lines where they are printed
 ROOM = 0.03  # of the highest frequency, between names
 LOUD = 1e-3  # of it, from which on frequencies are shown
 
@@ -34,6 +36,10 @@ class Spectrum:
     def record(self) -> Quantity:
         """The record of its quantity."""
         return quantity(self.quantity)
+
+    def __repr__(self) -> str:
+        said = f"{len(self.frequencies):,} frequencies to {self.frequencies[-1]:.5g} Hz"
+        return f"<Spectrum of {self.record.words}: {said}, {counted(len(self.probes), 'probe')}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
         """Draw the spectrum at every probe, amplitudes to -80 dB of the largest on a logarithmic
@@ -82,6 +88,13 @@ class Lines:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def __repr__(self) -> str:
+        strongest = np.argsort(-np.abs(self.amplitudes).max(axis=1, initial=0.0), kind="stable")
+        named = ", ".join(self.names[k] for k in strongest[:LISTED])
+        said = f"{counted(len(self), 'line')}, {counted(len(self.probes), 'probe')}"
+        said += f"; the strongest: {named}" if named else ""
+        return f"<Lines of {self.record.words}: {said}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
         """Draw the moduli at every probe, each line with its name."""

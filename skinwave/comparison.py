@@ -49,6 +49,9 @@ class Agreement:
     frequencies: Floats
     probes: Floats
 
+    def __repr__(self) -> str:
+        return notebook.agreement_line(self)
+
     def _repr_html_(self) -> str:
         return notebook.agreement_page(self)
 

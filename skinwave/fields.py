@@ -12,6 +12,7 @@ import numpy as np
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
+from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.effort import Progress, SkinwaveWarning
 from skinwave.models.reduction import from_rest, oscillating
@@ -38,6 +39,17 @@ class Field:
     displacement: Floats
     effort: Effort
     expected_error: float = np.nan
+
+    def __repr__(self) -> str:
+        size = 1e6 * float(np.sqrt((self.displacement**2).sum(axis=2).max(initial=0.0)))
+        said = [
+            f"{counted(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
+            f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm",
+            f"{self.mesh!r}"[1:-1],
+            f"expected error {stated_error(self.expected_error)}",
+            counted(len(self.effort.warnings), "warning"),
+        ]
+        return f"<Field: {'; '.join(said)}>"
 
     @property
     def strongest(self) -> float:

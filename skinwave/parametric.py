@@ -102,6 +102,11 @@ class ParametricBody:
     bases: tuple[LineBasis, ...]
     effort: Effort
 
+    def __repr__(self) -> str:
+        free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
+        order = f"{len(self.parts)} geometries of order {self.outputs.shape[-1]}"
+        return f"<ParametricBody of {self.scene!r}: {free}; {order}>"
+
 
 def prepare(
     scene: Scene,

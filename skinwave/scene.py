@@ -218,6 +218,9 @@ class Scene:
         """Draw body, path, foci at the start and probes from above, and return the axes."""
         return scene_plot.draw(self, ax)
 
+    def __repr__(self) -> str:
+        return scene_plot.line(self)
+
     def _repr_html_(self) -> str:
         return scene_plot.page(self)
 

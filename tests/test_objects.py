@@ -1,6 +1,7 @@
 """Records draw and convert themselves: responses, meshes, fields, scenes, plans, sweeps."""
 
 import ast
+import inspect
 import sys
 from dataclasses import replace
 from itertools import pairwise
@@ -15,15 +16,18 @@ import meshes
 import skinwave
 from simple_model import Effort, Response, phasors
 from simple_model.focus import spot_width
+from simple_model.numbers import stated_error
 from skinwave import window
 from skinwave.cli import main
 from skinwave.fields import Field
 from skinwave.models import BUILT_IN, named
 from skinwave.pictures import scene_plot
 from skinwave.pictures.styles import style
+from skinwave.planning.budget import error_budget
 from skinwave.planning.extent import PlanRow
 from skinwave.reports.album import Album
 from skinwave.reports.chosen import only
+from skinwave.sweeps.in_python import SweepTable
 
 # What is tested here is not how accurate a model is.
 pytestmark = pytest.mark.filterwarnings("ignore::skinwave.SkinwaveWarning")
@@ -286,6 +290,58 @@ def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
     assert "less &lt;than&gt; asked" in plan._repr_html_()
     assert "too &lt;coarse&gt;" in wave()._repr_html_()
     assert "100 Hz" in scene._repr_html_()
+
+
+def test_records_print_as_a_short_line(scene, field):
+    response = skinwave.simulate(scene, "flat-body")
+    table = SweepTable(rows=({"status": "done", "focus.height_mm": 200},), varied=("height",))
+    agreement = skinwave.compare(response, response, (100.0,))
+    for record in (scene, response, response.spectrum(), response.lines, skinwave.plan(scene),
+                   agreement, field, field.mesh, table):  # fmt: skip
+        assert repr(record) == str(record)
+        assert len(repr(record)) < 260
+        assert "array" not in repr(record)
+    assert repr(scene) == (
+        "<Scene 'disc <b>': AM 100 Hz, circle of 20 mm at 4 m/s, 0.1 s; slab of 100 x 100 x 15 mm, "
+        "palm; 3 probes, displacement into the body>"
+    )
+    assert "(1,000 times, 3 probes) from 0 to 99.9 ms, at most" in repr(response)
+    assert "expected error 3.0 %; 1 warning>" in repr(wave())
+
+
+def test_scenes_that_differ_have_different_keys_in_the_cache(scene):
+    """Keys are of the records that a scene has, whose repr is of all of their numbers."""
+    thicker = replace(scene.body, depth=0.015000001)
+    assert meshes.cache.key(thicker) != meshes.cache.key(scene.body)
+    louder = replace(scene.pressure, peak_pressure=scene.pressure.peak_pressure * (1 + 1e-12))
+    assert meshes.cache.key(louder) != meshes.cache.key(scene.pressure)
+
+
+def test_an_expected_error_is_said_alike_everywhere(scene):
+    said = "below 0.50 %"
+    found = skinwave.simulate(scene, "flat-body")
+    assert stated_error(found.expected_error) == said
+    assert error_budget(scene, found.expected_error).words.count(f"numerical {said}") == 1
+    for record in (found, skinwave.plan(scene, model="flat-body")):
+        assert said in record._repr_html_()
+        assert f"expected error {said}" in repr(record)
+    assert [stated_error(x) for x in (0.0213, 1.5, np.nan)] == ["2.1 %", "150 %", "not known"]
+
+
+@pytest.mark.parametrize("quantity", ["pressure", "strain_xz", "displacement", "acceleration"])
+def test_what_a_response_has_not_is_looked_for_without_an_error(quantity):
+    response = wave(quantity=quantity)
+    found = dict(inspect.getmembers(response))
+    assert found["record"] is response.record
+    has = {name: hasattr(response, name) for name in ("velocity", "acceleration", "strain")}
+    assert has == {
+        "velocity": quantity == "displacement",
+        "acceleration": quantity in ("displacement", "acceleration"),
+        "strain": quantity == "strain_xz",
+    }
+    assert not hasattr(response, "lines")
+    with pytest.raises(ValueError, match="the load of this response is unknown"):
+        _ = response.lines
 
 
 def test_the_page_of_a_scene_has_its_load_and_its_regions():

@@ -60,6 +60,9 @@ class Plan:
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
 
+    def __repr__(self) -> str:
+        return notebook.plan_line(self)
+
     def _repr_html_(self) -> str:
         return notebook.plan_page(self)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from simple_model import drawing
 from simple_model.choices import choose
 from simple_model.conversion import library
+from simple_model.numbers import counted
 from skinwave.effort import Progress
 from skinwave.numbers import significant
 from skinwave.progress_bar import reported
@@ -80,6 +81,11 @@ class SweepTable:
         curves(ax, finished(self.rows), column, x, by or (others[0] if others else None))
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
         return ax
+
+    def __repr__(self) -> str:
+        said = f"{counted(len(self), 'run')} over {', '.join(self.varied)}"
+        said += f"; {len(self.columns)} columns"
+        return f"<SweepTable: {said}{f', {len(self.failed)} failed' * bool(self.failed)}>"
 
     def _repr_html_(self) -> str:
         names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
