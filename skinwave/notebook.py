@@ -58,7 +58,7 @@ def plan_page(plan: "Plan") -> str:
         ax.set_aspect("equal")
         ax.set_xlabel("x, mm")
         ax.set_ylabel("y, mm")
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize="small")
+        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=drawing.small())
 
     kind = plan.body.of_kind
     image = drawing.picture(draw, 3.2, 3.0) if kind.discretise and kind.is_bounded else b""
@@ -99,7 +99,7 @@ def _draw_misfits(ax: "Axes", found: "Agreement") -> None:
     ax.bar(probes + 0.2, 100 * found.shape_misfit, 0.4, label="shape", color="#E69F00")
     ax.set_xlabel("probe")
     ax.set_ylabel("misfit, %")
-    ax.legend(frameon=False, fontsize="small")
+    ax.legend(frameon=False, fontsize=drawing.small())
 
 
 def _draw_lines(ax: "Axes", found: "Agreement") -> None:
@@ -114,6 +114,6 @@ def _draw_lines(ax: "Axes", found: "Agreement") -> None:
     ax.set_xticks(range(len(found.probes)))
     ax.set_ylabel("line, dB re reference")
     if len(found.frequencies):
-        ax.legend(frameon=False, fontsize="small")
+        ax.legend(frameon=False, fontsize=drawing.small())
     else:
         ax.text(0.5, 0.6, "no line was asked for", transform=ax.transAxes, ha="center")

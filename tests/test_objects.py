@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from legible import illegible, sizes, texts
 
 import meshes
 import skinwave
@@ -27,6 +28,7 @@ from skinwave.planning.budget import error_budget
 from skinwave.planning.extent import PlanRow
 from skinwave.reports.album import Album
 from skinwave.reports.chosen import only
+from skinwave.sweeps import sweep_figures
 from skinwave.sweeps.in_python import SweepTable
 
 # What is tested here is not how accurate a model is.
@@ -61,6 +63,11 @@ def closed_figures():
 @pytest.fixture(scope="module")
 def scene():
     return skinwave.loads(SCENE)
+
+
+def replace_duration(scene, duration):
+    tacton = replace(scene.tacton, duration=duration)
+    return replace(scene, pressure=replace(scene.pressure, tacton=tacton))
 
 
 def wave(frequency=130.0, quantity="displacement", n=1000, warnings=("too <coarse>",)):
@@ -484,6 +491,31 @@ def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
     assert style("talk", 7.0).size(6.0, 3.0) == (7.0, 3.5)
     with pytest.raises(ValueError, match="one column of a journal is 3.5 inch"):
         style("print", 90.0)
+
+
+@pytest.mark.parametrize("width", [3.5, 7.0])
+def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene, width):
+    waves = skinwave.simulate(replace_duration(scene, 0.3), "flat-body-harmonic", 0.999)
+    with skinwave.paper(width):
+        drawn = [scene.plot(), waves.plot(), waves.spectrum().plot(), waves.lines.plot()]
+    rows = [{"tacton.speed_m_per_s": float(v), "tacton.size_mm": float(d), "status": "done",
+             "peak_um": v * d, "level_db": v, "rayleigh_speed_m_per_s": 5.0}
+            for v in (4, 8) for d in (10, 20)]  # fmt: skip
+    by, chosen = "tacton.size_mm", style("print", width)
+    figures = [ax.figure for ax in drawn]
+    figures += [sweep_figures.line_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
+                sweep_figures.heat_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
+                sweep_figures.speed_figure(rows, by, chosen)]  # fmt: skip
+    for figure in figures:
+        assert sizes(figure) == {8.0}
+        assert illegible(figure) == []
+
+
+def test_a_figure_without_lines_says_why(scene):
+    short = skinwave.simulate(replace_duration(scene, 0.02), "flat-body-harmonic", 0.999)
+    assert len(short.lines) == 0
+    assert any("no line of the load is resolved" in text.get_text()
+               for text, _ in texts(short.lines.plot().figure))  # fmt: skip
 
 
 def test_chosen_columns_of_a_folder_alone():

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
+from simple_model.drawing import small
 from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
@@ -244,7 +245,7 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
                 box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small", bbox=box)
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize=small(), bbox=box)
 
 
 def _spread(ax: Axes, runs: list[Run]) -> None:
@@ -259,7 +260,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
     if path:
         ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
-        ax.text(path, -58, " focus path", fontsize="small", color="0.4", va="bottom")
+        ax.text(path, -58, " focus path", fontsize=small(), color="0.4", va="bottom")
     ax.set_ylim(-60, 4)
     ax.grid(alpha=0.25)
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 BODY, PATH, FOCUS, PROBE = "#e8d5c4", "#222222", "#D55E00", "#0072B2"
 REACH = 4.0  # widths of a focal spot that its contour is looked for in
 HALF = 0.5  # of the pressure at a focus: its contour
+NARROW = 0.5  # inch for each point of its letters, below which a legend has one column
 MOST_NUMBERED = 20  # probes
 MARGIN = 5e-3  # metre beside what there is to see
 
@@ -36,8 +37,10 @@ def draw(scene: "Scene", ax: "Axes | None") -> "Axes":
     ax.set_aspect("equal")
     ax.set_xlabel("x, mm")
     ax.set_ylabel("y, mm")
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, fontsize="small",
-              borderaxespad=0.2, handlelength=1.5, columnspacing=1.0)  # fmt: skip
+    narrow = ax.figure.get_figwidth() < NARROW * drawing.small()  # type: ignore[union-attr]
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=1 if narrow else 2, frameon=False,
+              fontsize=drawing.small(), borderaxespad=0.2, handlelength=1.5,
+              columnspacing=1.0)  # fmt: skip
     return ax
 
 
@@ -176,4 +179,4 @@ def _draw_probes(ax: "Axes", probes: Floats) -> None:
     ax.plot(x, y, ls="none", marker="o", ms=4, color=PROBE, label="probes")
     for k in range(min(len(probes), MOST_NUMBERED)):
         ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=PROBE,
-                    fontsize="small")  # fmt: skip
+                    fontsize=drawing.small())  # fmt: skip
