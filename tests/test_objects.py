@@ -2,8 +2,11 @@
 
 import ast
 import inspect
+import re
 import sys
+import tomllib
 from dataclasses import replace
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +21,7 @@ import skinwave
 from simple_model import Effort, Response, phasors
 from simple_model.focus import spot_width
 from simple_model.numbers import stated_error
-from skinwave import window
+from skinwave import citations, window
 from skinwave.cli import main
 from skinwave.fields import Field
 from skinwave.models import BUILT_IN, named
@@ -236,6 +239,23 @@ def test_a_grid_has_the_displacement_of_a_time(field):
             field.to_pyvista(time)
 
 
+def test_grids_of_pyvista_have_an_accessor(field):
+    import pyvista as pv
+
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    import_module(declared["pyvista.accessors"]["skinwave"])  # as pyvista does where it is used
+    grid = field.to_pyvista(0.0032)
+    assert np.array_equal(grid.skinwave.to_mesh().tets, field.mesh.tets)
+    moved = grid.skinwave.displaced(1e3)
+    assert moved.points == pytest.approx(grid.points + 1e3 * grid["displacement"])
+    away = np.linalg.norm(grid.skinwave.displaced().points - grid.points, axis=1)
+    assert away.max() == pytest.approx(0.05 * grid.length)
+    with pytest.raises(ValueError, match="no point data of the name displacement"):
+        field.mesh.to_pyvista().skinwave.displaced()
+    with pytest.raises(ValueError, match="tetrahedra"):
+        pv.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid().skinwave.to_mesh()
+
+
 def test_paraview_reads_what_a_field_saves(field, tmp_path):
     import pyvista as pv
 
@@ -392,6 +412,18 @@ def test_references_are_those_of_the_models():
     assert "Kausel" in found.references[2]
     assert "10.1145/3613905.3650981" in str(found)
     assert len(found.references) == 3
+    cited = dict(line.split(": ", 1) for line in (ROOT / "CITATION.cff").read_text().split("\n")
+                 if re.match(r"(version|date-released): ", line))  # fmt: skip
+    assert cited["version"] == citations.VERSION
+    assert str(citations.RELEASED) == cited["date-released"][:4]
+    made = replace(
+        wave(), model="flat-body", effort=Effort(versions={"skinwave": citations.VERSION})
+    )
+    assert f"Version {citations.VERSION}, {citations.RELEASED}. Software" in str(
+        skinwave.cite(made)
+    )
+    made = replace(made, effort=Effort(versions={"skinwave": "0.3.0"}))
+    assert "Version 0.3.0. Software" in str(skinwave.cite(made)), "of another year, perhaps"
     assert {name for name in BUILT_IN if not named(name).sources} == {
         "point-kernel", "point-kernel-published",
     }  # fmt: skip
@@ -443,6 +475,9 @@ def test_progress_is_shown_where_it_is_asked_for(scene, capsys):
     assert "lines" in capsys.readouterr().err.split("\n")
     skinwave.simulate(small, "fem", 0.9, h=10e-3)
     assert not capsys.readouterr().err
+    for model in ("flat-body", "flat-body-harmonic"):
+        skinwave.simulate(scene, model, 0.9, progress=True)
+        assert "wavenumber integral" in capsys.readouterr().err.split("\n")
 
 
 def test_figures_are_put_into_windows(monkeypatch):
