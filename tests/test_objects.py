@@ -416,12 +416,10 @@ def test_references_are_those_of_the_models():
                  if re.match(r"(version|date-released): ", line))  # fmt: skip
     assert cited["version"] == citations.VERSION
     assert str(citations.RELEASED) == cited["date-released"][:4]
-    made = replace(
-        wave(), model="flat-body", effort=Effort(versions={"skinwave": citations.VERSION})
-    )
-    assert f"Version {citations.VERSION}, {citations.RELEASED}. Software" in str(
-        skinwave.cite(made)
-    )
+    now = {"skinwave": citations.VERSION}
+    made = replace(wave(), model="flat-body", effort=Effort(versions=now))
+    said = f"Version {citations.VERSION}, {citations.RELEASED}. Software"
+    assert said in str(skinwave.cite(made))
     made = replace(made, effort=Effort(versions={"skinwave": "0.3.0"}))
     assert "Version 0.3.0. Software" in str(skinwave.cite(made)), "of another year, perhaps"
     assert {name for name in BUILT_IN if not named(name).sources} == {

@@ -38,7 +38,7 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
         panel = 72 * size[0] / (1 if narrow else count) - 8 * style.font  # points
         for ax, run in zip(axes, runs, strict=False):
             _draw(ax, run, probe, HEIGHT * small() / panel * np.log(HIGHEST / LOWEST))
-        _legend(figure, axes, runs)
+        _legend(figure, list(axes), runs)
         x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
         asked = runs[0].response.record if runs else DISPLACEMENT
         between = "\n" if style.columns else " "  # letters of print are large beside its figures
