@@ -12,7 +12,7 @@ SHOWN = 0.05  # of the length of a grid, by which it is displaced at most where 
 
 @pv.register_dataset_accessor("skinwave", pv.UnstructuredGrid)
 class GridAccessor:
-    """What skinwave makes of a grid of tetrahedra, in metre."""
+    """Mesh and displaced shape of a grid of tetrahedra, in metre."""
 
     def __init__(self, grid: pv.UnstructuredGrid) -> None:
         self._grid = grid

@@ -20,7 +20,7 @@ from skinwave.run import Run
 
 LOWEST_LEVEL = -30.0  # dB re threshold, below which lines are left out
 MOST_NAMED = 9  # lines of a panel
-HEIGHT = 1.4  # of a name, which stands, over the size of its letters
+HEIGHT = 1.8  # of a name, which stands, over the size of its letters
 
 
 def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
@@ -121,9 +121,11 @@ def _shown(run: Run, probe: int) -> list[str]:
 
 
 def _named(run: Run, shown: Sequence[str], apart: float) -> list[str]:
-    """The highest lines whose names have room."""
+    """The highest lines within the axis whose names have room."""
     chosen: list[str] = []
     for name in shown:
+        if not LOWEST <= run.listed[name] <= HIGHEST:
+            continue
         near = (abs(np.log(run.listed[name] / run.listed[other])) for other in chosen)
         if len(chosen) < MOST_NAMED and all(distance > apart for distance in near):
             chosen.append(name)
