@@ -18,6 +18,8 @@ without that volumetric locking makes displacements some wavelengths away severa
 small.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -62,6 +64,8 @@ UNPROJECTED = (
 
 
 # K of shares (r,) of each material's moduli, and M of their densities (r,), on all dofs.
+Materials = Material | Mapping[int, Material]
+Fixed = str | Mapping[str, str] | ArrayLike
 Volume = tuple[Callable[[Floats], sparse.csr_array], Callable[[Floats], sparse.csr_array]]
 
 
@@ -94,15 +98,15 @@ class Operators:
 
 def assemble(
     mesh: TetMesh,
-    material: Material | Mapping[int, Material],
+    material: Materials,
     *,
-    fixed: str | Mapping[str, str] | ArrayLike = "clamped",
+    fixed: Fixed = "clamped",
     absorbing: str | Ints | None = None,
     drag: Floats | None = None,
     support: Support | None = None,
     coat: Coat | None = None,
     tension: Tension | None = None,
-    axes: Floats = SIDES,
+    axes: Floats | None = None,
     stiffener: sparse.csr_array | None = None,
 ) -> Operators:
     """Assemble the operators of a body.
@@ -118,7 +122,8 @@ def assemble(
     support : springs and dashpots of a surface as functions of position, or None
     coat : thin layers at a surface, in place of the material that is meshed there, or None
     tension : in-plane tension of a sheet along its sides, or None
-    axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched
+    axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched,
+        those of the coordinates if not given
     stiffener : (3 n, 3 n) N/m, elastic stiffness beside that of the elements, such as that of a
         `shallow_shell`, which scales with the modulus of the first material; or None
 
@@ -144,6 +149,7 @@ def assemble(
     pattern = SparsityPattern.of(mesh.tets, len(mesh.points))
 
     share = tension.share if tension else None
+    axes = SIDES if axes is None else axes
     volume = _volume(mesh, pattern, materials, region, axes, stiffener)
     beside = sparse.csr_array((mesh.n_dofs, mesh.n_dofs))  # of K
     if support is not None and support.stiffness.any():

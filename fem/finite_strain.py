@@ -11,6 +11,8 @@ in the linear `assembly`, whose K is the tangent at rest. Orthotropic sheets add
 in-plane stress, and tension its forces on the normal displacement, as in `plane_stiffness`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -80,7 +82,7 @@ class Part:
     along: Floats | None = None
 
     @staticmethod
-    def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> "Part":
+    def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> Part:
         """The part of a mesh of n nodes."""
         rows = np.arange(G[..., 0].size).repeat(nodes.shape[1])
         columns = np.broadcast_to(nodes[:, None, None, :], G.shape).ravel()

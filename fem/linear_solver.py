@@ -4,6 +4,8 @@ All of them factorise symmetric matrices, real or complex. MKL PARDISO and CHOLM
 they are installed; SciPy's SuperLU needs nothing.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -11,6 +11,8 @@ stiffness is so much softer in its plane that the tension would bend it otherwis
 of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 

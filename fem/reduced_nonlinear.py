@@ -12,6 +12,8 @@ condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); the equations ar
 Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -253,7 +255,7 @@ class _Plane:
     solve: Callable[[Floats], Floats]
 
     @staticmethod
-    def of(part: Part, fixed: NDArray[np.bool_], solver: str) -> "_Plane":
+    def of(part: Part, fixed: NDArray[np.bool_], solver: str) -> _Plane:
         n = part.D.shape[1]
         horizontal = np.zeros((n, 3), bool)
         horizontal[np.unique(part.nodes), :2] = True

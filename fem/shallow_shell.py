@@ -11,6 +11,8 @@ gradient at rest has the slopes of z0. The membrane stiffness of the elements th
 away: it is that of a flat sheet, which a curled one escapes from.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Line table of a response: the lines of its load by name, and all other peaks of its spectrum."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 

@@ -7,6 +7,8 @@ ratios and the elements are fixed: with a thickness the nodes of one mesh move. 
 of a slab with absorbing sides is as wide as the fastest shear waves need.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache as cached
@@ -99,6 +101,11 @@ class ParametricBody:
     frequencies: Floats
     bases: tuple[LineBasis, ...]
     effort: Effort
+
+    def __repr__(self) -> str:
+        free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
+        order = f"{len(self.parts)} geometries of order {self.outputs.shape[-1]}"
+        return f"<ParametricBody of {self.scene!r}: {free}; {order}>"
 
 
 def prepare(

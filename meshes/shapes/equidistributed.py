@@ -6,6 +6,8 @@ I_a = int g_a^(1 / (1 + r)) dx.
 The product of the three numbers is used best where all three axes leave the same error.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

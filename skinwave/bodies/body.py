@@ -1,5 +1,7 @@
 """A body and its kind, and the registry of kinds."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf, isfinite
@@ -164,7 +166,7 @@ class Body:
             )
 
     @property
-    def of_kind(self) -> "BodyKind":
+    def of_kind(self) -> BodyKind:
         """The registered record of its kind."""
         return kind_of(self.kind)
 
@@ -311,7 +313,7 @@ class BodyKind:
     is_symmetric: bool = False
     is_bounded: bool = True
     may_be_layered: bool = True
-    actual_size: Callable[["Body", float], float] | None = None
+    actual_size: Callable[[Body, float], float] | None = None
     conforming: bool = False
     may_be_coated: bool = False
     normal_patch: float = 0.0

@@ -1,5 +1,7 @@
 """Parts of a body: its layers, the relief of a palm, and its placement under the device."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite

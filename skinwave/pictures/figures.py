@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
+from simple_model.drawing import small
 from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
@@ -35,6 +36,7 @@ WHOLE = (
     "spectrum, dB re the model's largest line",
 )
 WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
+BROAD = 2.7  # width of a line's name over the size of its letters
 IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
@@ -239,12 +241,18 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
     ax.set_yticks(np.arange(FLOOR, 1, 20))
     ax.grid(alpha=0.25)
     if named:
+        points, marked = small(), list[float]()
+        panel = 72 * ax.get_position().width * ax.figure.get_figwidth()  # type: ignore[union-attr]
+        apart = BROAD * points / panel * HIGHEST
         for name, frequency in runs[0].frequencies.items():
             if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
+                if any(abs(frequency - other) < apart for other in marked):
+                    continue
+                marked.append(frequency)
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
                 box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small", bbox=box)
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize=points, bbox=box)
 
 
 def _spread(ax: Axes, runs: list[Run]) -> None:
@@ -259,7 +267,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
     if path:
         ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
-        ax.text(path, -58, " focus path", fontsize="small", color="0.4", va="bottom")
+        ax.text(path, -58, " focus path", fontsize=small(), color="0.4", va="bottom")
     ax.set_ylim(-60, 4)
     ax.grid(alpha=0.25)
 

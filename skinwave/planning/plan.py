@@ -1,5 +1,7 @@
 """Plan of a scene: the cheapest model, extent and element size within a tolerance, with reasons."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -58,6 +60,9 @@ class Plan:
     rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return notebook.plan_line(self)
 
     def _repr_html_(self) -> str:
         return notebook.plan_page(self)

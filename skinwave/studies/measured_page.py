@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
+from simple_model.numbers import stated_error
 from skinwave import document
 from skinwave.document import Markup, paragraph
 from skinwave.measurements.alignment import opposite_sign
@@ -120,8 +121,8 @@ def conclusion(found: MeasuredComparison, column: Column) -> str:
 def _numerical(found: MeasuredComparison, column: Column) -> str:
     """How many of the differences may be numerical."""
     few = int((column.differs & found.is_numerical(column)).sum())
-    error = significant(100 * column.run.response.expected_error, 2)
-    return f" ({few} of them within the model's numerical error of {error} %)" if few else ""
+    error = stated_error(column.run.response.expected_error)
+    return f" ({few} of them within the model's numerical error of {error})" if few else ""
 
 
 def _detectable(found: MeasuredComparison) -> float:

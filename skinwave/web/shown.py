@@ -7,6 +7,7 @@ import numpy as np
 
 from simple_model import MovingPressure, named_lines, published
 from simple_model.line_names import line_names
+from simple_model.numbers import stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.propagation import share_outside
 from skinwave.scene import Body, Scene
@@ -142,7 +143,7 @@ def warnings(answers: Sequence[Answer]) -> list[str]:
 def expected(answer: Answer) -> str:
     """Expected relative error of a response, in words, if it has one."""
     error = getattr(answer.response, "expected_error", np.nan)
-    return f"Expected numerical error: {100 * error:.2g} %" if error > 0 else ""
+    return f"Expected numerical error: {stated_error(error)}" if error > 0 else ""
 
 
 def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
