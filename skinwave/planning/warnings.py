@@ -14,6 +14,7 @@ from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
 
+NONLINEAR = "use --model fem-nonlinear"
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its band is up to 0.3
 
@@ -59,7 +60,7 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth
     if factor <= LINEAR:
         return ()
-    cure = "use --model fem-nonlinear" if clamped else "take a thicker sheet or a lower pressure"
+    cure = NONLINEAR if clamped else "take a thicker sheet or a lower pressure"
     return (
         f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
         f"of it; {cure}",

@@ -49,6 +49,7 @@ from skinwave.models.reduction import (
     select_lines,
 )
 from skinwave.planning.assessment import sentences
+from skinwave.planning.warnings import NONLINEAR
 from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
 from skinwave.web.free_bodies import FreeBody, can_be_free, covers, free_body, reduced_at
@@ -68,6 +69,8 @@ from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
 from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, tabulate, wavenumbers
 
 TAIL = 0.4  # s that motion may last after the Tacton
+# What a warning says instead of the name of a model, of which a page has linear ones alone.
+ON_PAGE = "save the scene and compute it with the model fem-nonlinear, which a page has not"
 FINER = 8  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
@@ -192,7 +195,8 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
     response = answer.response
     if is_tabulated(scene.body) and scene.body.sides == "absorbing":
         return answer  # an infinite slab, whose sides reflect nothing
-    said = sentences(scene, response, h=default_size(scene.body))
+    found = sentences(scene, response, h=default_size(scene.body))
+    said = tuple(sentence.replace(NONLINEAR, ON_PAGE) for sentence in found)
     effort = replace(response.effort, warnings=said)
     return replace(answer, response=replace(response, effort=effort))
 
