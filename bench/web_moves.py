@@ -130,7 +130,7 @@ def select(page: Page, rng: random.Random) -> None:
 def button(page: Page, rng: random.Random) -> None:
     page.evaluate(
         "id => document.getElementById(id)?.click()",
-        rng.choice(["undo", "redo", "pin", "swap", "solid", "theme", "cancel", "body-play"]),
+        rng.choice(["undo", "redo", "pin", "swap", "solid", "theme", "cancel", "play"]),
     )
 
 

@@ -1073,7 +1073,7 @@ def test_foci_follow_paths_of_their_own(session):
     with session.state:
         moves.own_path(session, 2, 2, "4,5")
     assert session.state.paths.endswith(", square/20/4.5/20")
-    assert session.state.foci_at[2] == [14.5, -30]
+    assert session.state.foci_track[0][2] == [14.5, -30]
     before = session.state.kernel_map
     with session.state:
         moves.own_path(session, 0, 1, "far")
@@ -1113,9 +1113,8 @@ def test_foci_follow_paths_of_their_own(session):
 def test_foci_run_once_along_their_own_path(session):
     with session.state:
         moves.turn(session, {"paths": "line/20/-20/0, line/10/20/0"})
-    with session.state:
-        session.state.phase = 50
-    assert session.state.foci_at == [[-10, 0], [25, 0]]
+    assert session.state.foci_track[50] == [[-10, 0], [25, 0]]
+    assert len(session.state.foci_track) == 100
 
 
 def test_what_is_saved_can_be_opened(session, monkeypatch):

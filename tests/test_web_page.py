@@ -29,9 +29,10 @@ class Logs:
         self.asked, self.errors = [], []
 
 
-def opened(browser, address, query="", **viewport):
-    size = {"width": 1280, "height": 720} | viewport
-    page, logs = browser.new_page(viewport=size), Logs()
+def opened(browser, address, query="", motion="reduce"):
+    """A page at rest, unless a reader's system asks for no less "motion"."""
+    size = {"width": 1280, "height": 720}
+    page, logs = browser.new_page(viewport=size, reduced_motion=motion), Logs()
     page.set_default_timeout(PATIENCE)
     page.on("request", lambda request: logs.asked.append(request.url))
     page.on("pageerror", lambda error: logs.errors.append(str(error)))
@@ -47,6 +48,7 @@ def visit(browser, address):
 
 
 def begun(page, query):
+    page.evaluate("() => window.trame.state.set('solid', false)")
     page.evaluate("q => window.trame.trigger('restart', [q])", query)
     state_becomes(page, "query", query)
     return page
@@ -216,10 +218,12 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(bare):
     page.locator("#foci-field").fill("3")
     choose(page, "sharing", "in turn")
     query_has(page, "sharing=time_multiplexed")
-    assert len(state(page, "foci_at")) == 3
+    page.wait_for_function("() => window.trame.state.get('foci_track')[0].length === 3")
     page.locator("#phases-field").fill("0, 25, 50")
     query_has(page, "phases=0")
-    page.wait_for_function("() => Math.abs(window.trame.state.get('foci_at')[1][1] + 10) < 0.01")
+    page.wait_for_function(
+        "() => Math.abs(window.trame.state.get('foci_track')[0][1][1] + 10) < 0.01"
+    )
     assert page.locator("#kernel-map circle").count() == 3
     for shape in ("point", "line", "triangle", "square"):
         page.locator(f"#shape-{shape}").click()
@@ -618,9 +622,9 @@ def test_curves_are_drawn_read_and_zoomed_by_keys(page):
 def test_the_body_moves_in_three_dimensions(page):
     page.locator("#solid").click()
     page.wait_for_function("() => window.trame.state.get('body_motion').frames")
-    play, now = page.locator("#body-play"), page.locator("#body-now")
-    if play.get_attribute("aria-label") == "Pause":
-        play.click()
+    play, now = page.locator("#play"), page.locator("#body-now")
+    assert play.inner_text() == "▶ Play", "less motion is asked for"
+    assert page.locator(".sw-play:visible").count() == 1
     assert re.fullmatch(r"\d+\.\d\d of \d+\.\d\d ms", now.inner_text())
     stopped = ink(page, "body-view")
     assert len(stopped) > 50, "next to nothing is drawn"
@@ -638,6 +642,8 @@ def test_the_body_moves_in_three_dimensions(page):
     page.wait_for_function("t => !document.getElementById('body-now').textContent.startsWith(t)",
                            arg=f"{half:.2f}")  # fmt: skip
     photographed(page, "body")
+    page.locator("#body-view").press(" ")
+    assert play.inner_text() == "▶ Play"
     page.locator("#solid").click()
     page.wait_for_selector("#wave-map")
 
@@ -723,10 +729,13 @@ def test_a_spectrum_in_decibel_help_and_the_level_over_a_control(bare):
 
 def test_one_button_plays_foci_and_cursors_and_cursors_are_shared(bare):
     value = "plot => window.trame.utils.plots.shown[plot].value"
+    focus = "Number(document.querySelector('#kernel-map .sw-focus').getAttribute('cx'))"
+    before = bare.evaluate(focus)
     bare.locator("#play").click()
     bare.wait_for_function("() => window.trame.utils.plots.shown.waveform_plot.value > 1")
-    bare.wait_for_function("() => window.trame.state.get('phase') > 0")
+    bare.wait_for_function(f"before => Math.abs({focus} - before) > 1", arg=before)
     bare.locator("#play").click()
+    bare.wait_for_function("() => window.trame.state.get('phase') > 0")
     bare.wait_for_function(f"() => ({value})('waveform_plot') === null")
     bare.locator("#commanded_plot").hover(position={"x": 200, "y": 60})
     assert bare.evaluate(value, "waveform_plot") == bare.evaluate(value, "commanded_plot") > 0

@@ -60,7 +60,6 @@ SET: dict[str, Callable[[Any], bool]] = {
     "span": lambda given: is_text(given) and given in SPANS,
     "highest": lambda given: is_number(given) and given in HIGHEST,
     "third": lambda given: is_text(given) and given in THIRD,
-    "phase": lambda given: is_number(given) and 0 <= given <= 100,
     "pulse": lambda given: is_number(given) and given >= 0,
     "rhythm_span": lambda given: is_number(given) and given >= 0,
     "opened": is_file,

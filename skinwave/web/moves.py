@@ -32,7 +32,7 @@ def connect(session: Session) -> None:
     watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
         (controlled, KEYS), (hold, ("hold",)),
         (look, ("span", "highest", "third", "decibel", "against")),
-        (phase, ("phase",)), (solid, ("solid",)), (opened, ("opened",)),
+        (solid, ("solid",)), (opened, ("opened",)),
         (published, ("published",)), (measurement, ("measured_file",)),
     )  # fmt: skip
     for answered, keys in watched:
@@ -217,11 +217,6 @@ def hold(session: Session) -> None:
         state.held_frequency = session.scene.tacton.drawing_frequency
     elif not state.hold:
         state.errors = {key: said for key, said in state.errors.items() if key != "hold"}
-
-
-def phase(session: Session) -> None:
-    """The foci are to be seen elsewhere on their path."""
-    shown.foci(session.state, session.scene)
 
 
 def published(session: Session) -> None:

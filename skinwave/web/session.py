@@ -68,7 +68,7 @@ class Session:
         self._beside: asyncio.TimerHandle | None = None
         self._resting: asyncio.TimerHandle | None = None
         self.state.update({**self.good, **shown.first(own)})
-        self.state.client_only("draft", "helped", "hue")
+        self.state.client_only("draft", "helped", "hue", "phase")
 
     @property
     def values(self) -> Values:
@@ -245,7 +245,6 @@ def draw(session: Session) -> None:
 
 def _beside(session: Session, curves: plots.Curves) -> None:
     """Maps, table and sentences beside the curves."""
-    shown.foci(session.state, session.scene)
     shown.answers(session.state, session.scene, curves)
     session.state.differs = (
         shown.differs(controls.values_in(session.state.pinned_query), session.good)

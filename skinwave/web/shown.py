@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import MovingPressure, named_lines, published
+from simple_model import MovingPressure, Tacton, named_lines, published
 from simple_model.line_names import line_names
 from simple_model.quantities import DISPLACEMENT
 from skinwave.propagation import share_outside
@@ -19,6 +19,7 @@ from skinwave.web.plots import Curves
 
 NAMED = 3  # lines that a sentence names
 PRESENT = 1e-2  # of the strongest line of a load: one that is named
+PHASES = 100  # of a drawing period, at which foci can be seen
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
 THIRD = ("spectrum", "dispersion", *LEVELS)  # what the third plot shows
 
@@ -36,15 +37,15 @@ def first(own: Body | None) -> dict[str, Any]:
         "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "third": THIRD[0],
-        "dark": False, "solid": False, "decibel": False, "against": False, "helped": "",
+        "dark": False, "solid": True, "decibel": False, "against": False, "helped": "",
         "measured_file": None, "measured_said": "", "pinned_path": "", "hue": 0,
         "summary": [], "uncertainty": [], "warnings": [], "expected": "", "published": False,
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "body_layers": [],
-        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
-        "lines_unit": "µm",
+        "path": "", "influenced": "", "own_speeds": "", "foci_track": [], "rows": [],
+        "unresolved": "", "lines_unit": "µm",
         "kernel_map": _map(None), "wave_map": _map(None), "pinned_map": _map(None),
         "body_shape": {}, "body_motion": {},
     }  # fmt: skip
@@ -64,6 +65,7 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
     kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
     bands = curves.bands
     state.update({
+        "foci_track": foci_track(tacton),
         "lines_unit": scene.reading.asked.shown,
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
@@ -168,12 +170,11 @@ def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> Non
     state.commanded_plot = plots.commanded_plot(scene.pressure, *between)
 
 
-def foci(state: Any, scene: Scene) -> None:
-    """The foci where they are at the chosen part of a drawing period."""
-    tacton = scene.tacton
-    part = state.phase / 100 / tacton.n_paths
-    at = tacton.trajectory.at_phase([(part + phase) % 1 for phase in tacton.foci])
-    state.foci_at = [[round(1e3 * float(x), 2), round(-1e3 * float(y), 2)] for x, y in at]
+def foci_track(tacton: Tacton) -> list[list[list[float]]]:
+    """Places of the foci at each per cent of a drawing period, x and -y in mm as on a map."""
+    parts = np.arange(PHASES) / PHASES / tacton.n_paths
+    at = [tacton.trajectory.at_phase((parts + phase) % 1) for phase in tacton.foci]
+    return np.round(np.stack(at, axis=1) * [1e3, -1e3], 2).tolist()
 
 
 def _measured(curves: Curves) -> str:
