@@ -1175,6 +1175,9 @@ def test_zooming_in_shows_the_carrier(session):
         low, high = session.state.commanded_plot["x"]["range"]
         assert 0 <= low < high <= 1000
     with session.state:
+        moves.zoom(session, 990.0, 1015.0)  # moved beyond the end
+    assert session.state.commanded_plot["x"]["range"] == pytest.approx([975, 1000])
+    with session.state:
         moves.zoom(session)
     assert "envelope" in session.state.commanded_plot["title"]
 

@@ -203,10 +203,11 @@ def zoom(session: Session, start: float | None = None, end: float | None = None)
     if start is None or end is None:
         session.zoomed = None
     else:
-        start, end = numbers(start, end)
+        start, end = (given / 1e3 for given in numbers(start, end))
         last = session.scene.tacton.duration
-        start = min(max(0.0, start / 1e3), last - SHORTEST)
-        session.zoomed = (start, min(max(end / 1e3, start + SHORTEST), last))
+        wide = min(max(end - start, SHORTEST), last)
+        start = min(max(0.0, start), last - wide)
+        session.zoomed = (start, start + wide)
     shown.commanded(session.state, session.scene, session.zoomed)
 
 
