@@ -3,6 +3,8 @@ differences, measurements, examples, help.
 """
 
 import base64
+import re
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
@@ -56,11 +58,36 @@ def test_levels_of_steady_lines_are_those_of_the_lines_in_the_response(responses
     assert levels.kernel_level(scene) == pytest.approx(max(in_pressure), abs=0.1)
 
 
-def test_a_level_is_not_known_where_another_table_would_be_needed(responses, shown):
-    assert np.isnan(responses.level(scenes.scene_of(AT_20 | {"height": 30.0})))
-    assert np.isfinite(responses.level(scenes.scene_of(AT_20 | {"height": 230.0})))
+def test_levels_of_waves_are_known_at_all_heights_whose_tables_are_made_where_they_lack(shown):
+    """The present height is of one range of tables, most that are shown of another."""
+    own = waves.BodyResponses()
+    own(shown[0], silent)
+    _, scene_of_each = level_view.variants("level by height", AT_20)
+    some = slice(None, None, 6)
+    known = np.array([own.level(scene) for scene in scene_of_each[some]])
+    assert np.isfinite(known).all()
+    for scene, level in list(zip(scene_of_each[some], known, strict=True))[:2]:
+        lines = own(scene, silent).lines
+        assert level == pytest.approx(max(line.sensation for line in lines), abs=0.1)
+    assert scene_of_each[0].pressure.height < 0.16 < scene_of_each[-1].pressure.height
     at_depth = scenes.scene_of(AT_20 | {"depth": 2.0})
-    assert np.isnan(responses.level(at_depth)), "a threshold is that of the surface"
+    assert np.isnan(own.level(at_depth)), "a threshold is that of the surface"
+
+
+def test_the_highest_level_is_of_waves_only_where_all_of_theirs_are_known(shown):
+    found, _ = level_view.variants("level by size", AT_20)
+    waves_of = found.kernel[::-1].copy()
+    whole = replace(found, waves=waves_of)
+    assert (whole.of, whole.best) == ("waves", found.at[waves_of.argmax()])
+    assert "(highest: waves)" in level_view.level_plot(whole, shown[2])["title"]
+    partly = waves_of.copy()
+    partly[:-1] = np.nan
+    part = replace(found, waves=partly)
+    assert (part.of, part.best) == ("kernel", found.best)
+    plot = level_view.level_plot(part, shown[2])
+    assert "(highest: kernel)" in plot["title"]
+    assert any(f"(at 1 of {len(found.at)})" in curve["name"] for curve in plot["data"])
+    assert plot["names"][0]["y"] == pytest.approx(max(found.kernel), abs=1e-3)
 
 
 def test_the_sentence_on_what_is_above_threshold_says_what_line_and_map_say(shown):

@@ -47,6 +47,7 @@ def first(own: Body | None) -> dict[str, Any]:
         "path": "", "influenced": "", "own_speeds": "", "foci_track": [], "rows": [],
         "unresolved": "", "lines_unit": "µm",
         "kernel_map": _map(None), "wave_map": _map(None), "pinned_map": _map(None),
+        "insets": {}, "levels_of": "", "layers_open": False,
         "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -57,6 +58,7 @@ def plotted(state: Any, scene: Scene, curves: Curves) -> None:
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
         "spectrum_plot": third_plot(state, scene, curves),
+        "levels_of": curves.levels.of if curves.levels else "",
     })  # fmt: skip
 
 
