@@ -176,6 +176,7 @@ def pin(session: Session) -> None:
     """Keep what is shown, to compare with; or let go of what was kept."""
     session.pinned = () if session.pinned else session.answers
     if session.pinned:
+        session.state.solid = False  # maps of both stand beside each other
         session.state.pinned_query = controls.to_query(session.values)
         session.state.pinned_path = session.state.path
     session.state.pinned = bool(session.pinned)

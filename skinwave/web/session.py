@@ -76,6 +76,11 @@ class Session:
         return {key: self.state[key] for key in KEYS}
 
     @property
+    def pinned_body(self) -> str:
+        """Name of the body that is pinned."""
+        return shown.body_named(controls.values_in(self.state.pinned_query)["body"])
+
+    @property
     def answers(self) -> tuple[Answer, ...]:
         """The point kernel's response and, if it is that of the controls, the body's."""
         current = None if self.state.waves_stale else self.waves
@@ -237,6 +242,7 @@ def draw(session: Session) -> None:
             kernel=session.kernel, waves=session.waves, published=session.published,
             pinned=session.pinned, bands=session.bands, stale=bool(session.state.waves_stale),
             levels=session.levels, measured=session.measured,
+            body=shown.body_named(session.good["body"]), pinned_body=session.pinned_body,
         )  # fmt: skip
         shown.commanded(session.state, session.scene, session.zoomed)
         shown.plotted(session.state, session.scene, curves)
