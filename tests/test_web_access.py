@@ -277,7 +277,8 @@ def session():
     ("key", "value", "taken"),
     [
         ("am", 77, True), ("am", "7", True), ("body", "none", True), ("opened", None, True),
-        ("phase", 50, True), ("span", "whole Tacton", False), ("drawer", None, True),
+        ("phase", 50, False), ("span", "whole Tacton", False), ("drawer", None, True),
+        ("layers_open", True, True),
         ("opened", [{"content": b"name = 'a'", "name": "a"}], True),
         ("opened", {"content": [b"a", b"b"]}, True), ("opened", {"content": "a"}, False),
         ("opened", "a", False), ("opened", [1], False), ("opened", [{}, {}], False),

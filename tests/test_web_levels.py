@@ -9,6 +9,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from PIL import Image
 
 from simple_model import sensation_level
@@ -19,6 +20,7 @@ from skinwave.web import (
     controls,
     downloads,
     drawings,
+    layer_values,
     level_view,
     levels,
     measured,
@@ -29,7 +31,7 @@ from skinwave.web import (
 )  # fmt: skip
 from skinwave.web.controls import STARTS
 from skinwave.web.examples import EXAMPLES
-from skinwave.web.help import HELP
+from skinwave.web.help import BAR, HELP
 from skinwave.web.plots import Curves
 
 AT_20 = STARTS | {"x": 20.0, "duration": 0.5}
@@ -190,8 +192,29 @@ def test_examples_set_what_the_controls_take(name):
 
 
 def test_there_is_help_at_each_control():
-    shown_as_others = {"shape", "paths", "layers", "body"}  # buttons, a table, sliders and a list
-    assert set(HELP) == set(controls.KEYS) - shown_as_others
+    """On the page itself, at each that can be turned, chosen or opened."""
+    pytest.importorskip("trame_vuetify")
+    from skinwave.web import layout
+
+    beside = {"hold", "published", "opened", "measured_file"}
+    assert set(HELP) == set(controls.KEYS) | set(layer_values.PARTS) | beside
+    page = layout.rendered()
+    for key, said in HELP.items():
+        assert str(escape(said)) in page, key
+    for key in (set(HELP) - {"layers"}) - set(layer_values.PARTS):
+        assert f'id="help-{key}"' in page, key
+    for part in layer_values.PARTS:
+        assert f':id="`help-{part}-${{k}}`"' in page, part
+    bar = page[page.index("<VAppBar ") : page.index("</VAppBar>")]
+    named = set(re.findall(r'(?<![:\w])id="([\w-]+)"', bar))
+    aside = {"help-bar", "highest-level", "redo", "swap", "theme", "about"}  # what others say, too
+    inside = {name for name in named if name.startswith(("preset-", "save-")) or name in HEARD}
+    assert named - aside - inside == set(BAR)
+    for key, (_, said) in BAR.items():
+        assert str(escape(said)) in page, key
+
+
+HEARD = {"hear"}  # in the menu of what is saved
 
 
 @pytest.mark.parametrize("suffix", downloads.PATTERNS)

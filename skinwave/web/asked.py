@@ -55,7 +55,18 @@ def is_file(given: Any) -> bool:
 SET: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(KEYS, lambda given: is_number(given) or is_text(given)),
     **dict.fromkeys(
-        ("hold", "solid", "published", "dark", "about", "drawer", "decibel", "against"), is_switch
+        (
+            "hold",
+            "solid",
+            "published",
+            "dark",
+            "about",
+            "drawer",
+            "decibel",
+            "against",
+            "layers_open",
+        ),
+        is_switch,
     ),
     "span": lambda given: is_text(given) and given in SPANS,
     "highest": lambda given: is_number(given) and given in HIGHEST,
