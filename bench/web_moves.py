@@ -11,7 +11,10 @@ from playwright.sync_api import TimeoutError as NotThere
 
 from skinwave.web.controls import CHOICES, NUMBERS, presets
 
-SAVED = ("scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "report-html")
+SAVED = (
+    "scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "column-pdf",
+    "report-html",
+)  # fmt: skip
 PULSES = ("", "100/50", "40/20, 10/30", "5/5")
 Page = Any
 

@@ -50,6 +50,7 @@ from skinwave.web import (
     moves,
     moving,
     plots,
+    saved_figure,
     scenes,
     shown,
     slabs,
@@ -1287,6 +1288,50 @@ def test_what_is_saved_can_be_opened(session, monkeypatch):
     with session.state:
         session.state.opened = {"content": kept.encode()}
     assert session.state.problem == ""
+
+
+def test_a_figure_is_as_wide_as_asked_and_shows_what_the_plots_show(session, monkeypatch):
+    async def here(make, *given):
+        return make(*given)
+
+    monkeypatch.setattr(downloads, "elsewhere", here)
+    answer = waves.BodyResponses()(session.scene, nothing, moving=True)
+    with session.state:
+        told(session, "answer", session.number, answer)
+        session.state.solid = False
+        session.state.decibel = True
+        moves.pin(session)
+        session.state.against = True
+        moves.look(session)
+    figure = downloads.offered(session)["figure"]
+    said = asyncio.run(figure("svg", 3.5, "spectrum_plot:50:260")).decode()
+    width = float(re.search(r'<svg[^>]*width="([\d.]+)pt"', said)[1])
+    assert width == pytest.approx(72 * 3.5, abs=0.1)
+    for words in (
+        "A: skin slab (flat-body), µm", "threshold (±5 dB)", "less the", "dB re 1 Pa", "+30 dB",
+        "Commanded signal", "250",
+    ):  # fmt: skip
+        assert re.search(f">[^<]*{re.escape(words)}", said), words
+    assert ">300<" not in said, "beyond what is zoomed to"
+    sizes = {float(size) for size in re.findall(r"font(?:-size)?: ?(?:\w+ )?([\d.]+)px", said)}
+    assert 8 in sizes
+    assert max(sizes) == 8
+    pdf = asyncio.run(figure("pdf", 7))
+    assert b"/Type3" not in pdf
+    with session.state:
+        session.state.solid = True
+    seen = saved_figure.seen(session, saved_figure.view_of("body:2.5:-0.5:0.95:0.5:1 foci:25"))
+    assert seen["foci"] == session.state.foci_track[25]
+    again = saved_figure.figure_of(seen, "svg", 7.0).decode()
+    assert "2.5 ms into the" in again
+
+
+def test_a_figure_has_the_colours_of_the_page(session):
+    here = saved_figure._colours("paper-sheet")
+    assert here["waves"] == "#d55e00"
+    assert saved_figure._colours("skin-slab")["waves"] == "#0072b2"
+    roles = {curve["role"] for curve in session.state.spectrum_plot["data"]}
+    assert roles | {f"mode{n}" for n in range(1, 7)} <= set(here)
 
 
 def test_a_report_says_how_often_paths_of_their_own_are_drawn():

@@ -319,7 +319,9 @@ def test_what_can_be_chosen_on_the_page_is_taken():
         ("entered", ["am"]), ("entered", ["none-such", 1]), ("entered", [None, 1]),
         ("preset", ["none-such"]), ("cancel", [1]), ("undo", [0]), ("restart", [{"am": 1}]),
         ("figure", ["pgf"]), ("figure", ["ps"]), ("figure", [7]),
-        ("figure", ["svg/../../x"]), ("figure", []), ("report", ["/etc/passwd"]),
+        ("figure", ["svg/../../x"]), ("figure", []),
+        ("figure", ["svg", 99]), ("figure", ["svg", "wide"]), ("figure", ["svg", 7, "body:1"]),
+        ("figure", ["svg", 7, "spectrum_plot:a:b"]), ("report", ["/etc/passwd"]),
         ("scene_toml", ["/etc/passwd"]), ("waveform_csv", [0, 0]),
     ],
 )  # fmt: skip

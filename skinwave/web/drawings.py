@@ -27,7 +27,7 @@ def picture(found: AreaMap) -> str:
     """RMS of a map as the address of a PNG, from dark (none) to light (its largest)."""
     largest = float(np.nanmax(found.rms, initial=0.0)) or 1.0
     relative = np.nan_to_num(found.rms / largest)
-    return _png(_shades()[np.round(255 * relative).astype(int)], np.isnan(found.rms))
+    return _png(shades()[np.round(255 * relative).astype(int)], np.isnan(found.rms))
 
 
 def difference(found: AreaMap, reference: AreaMap) -> str:
@@ -36,9 +36,8 @@ def difference(found: AreaMap, reference: AreaMap) -> str:
     """
     levels = [20 * np.log10(np.maximum(each.rms / (np.nanmax(each.rms, initial=0.0) or 1.0), LEAST))
               for each in (found, reference)]  # fmt: skip
-    part = np.clip(np.nan_to_num(levels[0] - levels[1]) / DEEPEST, -1, 1)[..., None]
-    way = np.where(part > 0, INTO, OUT)
-    return _png(STILL + np.abs(part) * (way - STILL), np.isnan(found.rms))
+    part = np.clip(np.nan_to_num(levels[0] - levels[1]) / DEEPEST, -1, 1)
+    return _png(signed_shade(part, root=False), np.isnan(found.rms))
 
 
 def _png(colours: Floats, outside: NDArray[np.bool_]) -> str:
@@ -141,20 +140,23 @@ def _gradient(colours: Floats, places: Floats) -> str:
 
 
 @cache
-def _shades() -> NDArray[np.float64]:
+def shades() -> NDArray[np.float64]:
     """Colours (256, 3) from least to most, distinguishable with every kind of colour vision."""
     from matplotlib import colormaps
 
     return np.asarray(np.round(255 * colormaps["cividis"](np.arange(256))[:, :3]))
 
 
-def _signed_shades() -> str:
-    """As body.js colours motion: by the root of its share of the largest."""
-    part = np.linspace(-1, 1, 41)
-    way = np.where(part[:, None] > 0, INTO, OUT)
-    return _gradient(STILL + np.sqrt(np.abs(part))[:, None] * (way - STILL), (part + 1) / 2)
+def signed_shade(part: Floats, root: bool = True) -> Floats:
+    """Colours (..., 3) of 0..255 of a share -1..1 of the largest; by its `root` as body.js colours
+    motion into the body.
+    """
+    way = np.where(part[..., None] > 0, INTO, OUT)
+    strength = np.sqrt(np.abs(part)) if root else np.abs(part)
+    return np.asarray(STILL + strength[..., None] * (way - STILL))
 
 
-SEQUENTIAL = _gradient(_shades()[::15], np.linspace(0, 1, 18))
+_PARTS = np.linspace(-1, 1, 41)
+SEQUENTIAL = _gradient(shades()[::15], np.linspace(0, 1, 18))
 DIVERGING = _gradient(np.array([OUT, STILL, INTO]), np.array([0.0, 0.5, 1.0]))
-SIGNED = _signed_shades()
+SIGNED = _gradient(signed_shade(_PARTS), (_PARTS + 1) / 2)
