@@ -15,6 +15,7 @@ from skinwave.planning.goal_oriented import widest_on_path
 from skinwave.planning.refinement import Refined, enough
 from skinwave.scene import Scene
 
+NONLINEAR = "use --model fem-nonlinear"
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its band is up to 0.3
 
@@ -91,7 +92,7 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth
     if factor <= LINEAR:
         return ()
-    cure = "use --model fem-nonlinear" if clamped else "take a thicker sheet or a lower pressure"
+    cure = NONLINEAR if clamped else "take a thicker sheet or a lower pressure"
     return (
         f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
         f"of it; {cure}",

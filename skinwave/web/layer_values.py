@@ -13,6 +13,7 @@ from typing import Any
 from fem.materials import Material
 from skinwave.scene import Body, Layer, solid_of
 
+PARTS = ("thickness", "modulus", "loss")
 THICKNESS = 0.01, 60.0  # mm; a slab of 60 mm is a half-space to the skin's waves
 MODULUS = 0.1, 10_000.0  # kPa
 LOSS, LOSS_AT = (0.0, 3.0), 200.0  # of a loss factor; Hz
