@@ -37,6 +37,7 @@ from fem.finite_strain import (
 )
 from fem.linear_solver import factorise
 from fem.sheet_reading import SheetReading, modal_slopes
+from fem.sparsity import restricted
 from fem.static import modes
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
@@ -260,7 +261,7 @@ class _Plane:
         horizontal = np.zeros((n, 3), bool)
         horizontal[np.unique(part.nodes), :2] = True
         moving = np.flatnonzero(horizontal.ravel() & ~fixed)
-        K = tangent(part, np.zeros((n, 3)))[moving][:, moving]
+        K = restricted(tangent(part, np.zeros((n, 3))), moving)
         return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
 
     def incompatible(self, e: Floats) -> Floats:

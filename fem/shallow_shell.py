@@ -20,7 +20,7 @@ from scipy import sparse
 
 from fem.elements import triangle_rule
 from fem.finite_strain import Membrane, membrane_part, tangent_blocks
-from fem.sparsity import from_components, slabs
+from fem.sparsity import slabs
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 
@@ -31,7 +31,7 @@ def shell_stiffness(
     slopes: Callable[[Floats], Floats],
     *,
     meshed: float = 0.0,
-) -> sparse.csr_array:
+) -> sparse.bsr_array:
     """Membrane stiffness of a shallow shell.
 
     Parameters
@@ -56,5 +56,4 @@ def shell_stiffness(
         found = (tangent_blocks(part, slab, F[slab], unstressed[slab]) for F in (curved, flat))
         return next(found) - meshed * next(found)
 
-    summed = part.pattern.sum(((slab, blocks(slab)) for slab in slabs(len(part.nodes))), 6)
-    return from_components(part.pattern, summed)
+    return part.pattern.blocks((slab, blocks(slab)) for slab in slabs(len(part.nodes)))
