@@ -106,7 +106,7 @@ class MovingNodes:
     free: Ints
 
     @staticmethod
-    def of(mesh: TetMesh, free: Ints) -> "MovingNodes":
+    def of(mesh: TetMesh, free: Ints) -> MovingNodes:
         """Those of a mesh with free degrees of freedom (f,)."""
         nodes = np.unique(free // 3)
         number = np.full(len(mesh.points), len(nodes))
