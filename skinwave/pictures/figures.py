@@ -36,7 +36,8 @@ WHOLE = (
     "spectrum, dB re the model's largest line",
 )
 WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
-BROAD = 2.7  # width of a line's name over the size of its letters
+LETTER, GAP = 0.45, 0.3  # of a line's name, and between two, over the size of its letters
+LAID_OUT = 1.2  # width of a panel with the margins of a figure, over that before
 IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
@@ -241,14 +242,15 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
     ax.set_yticks(np.arange(FLOOR, 1, 20))
     ax.grid(alpha=0.25)
     if named:
-        points, marked = small(), list[float]()
-        panel = 72 * ax.get_position().width * ax.figure.get_figwidth()  # type: ignore[union-attr]
-        apart = BROAD * points / panel * HIGHEST
+        points, marked = small(), list[tuple[float, float]]()  # places and half widths, Hz
+        share = LAID_OUT * ax.get_position().width
+        panel = 72 * share * ax.figure.get_figwidth()  # type: ignore[union-attr]
         for name, frequency in runs[0].frequencies.items():
             if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
-                if any(abs(frequency - other) < apart for other in marked):
+                half = (LETTER * len(name) + GAP) * points / panel * HIGHEST / 2
+                if any(abs(frequency - other) < half + width for other, width in marked):
                     continue
-                marked.append(frequency)
+                marked.append((frequency, half))
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
                 box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
