@@ -33,6 +33,7 @@ from skinwave.fits.parameters import (
     of_scene,
 )
 from skinwave.models import Model, check_reading, named
+from skinwave.models.affine_scenes import has_affine_operators
 from skinwave.models.free_materials import free_keys
 from skinwave.parametric import ParametricBody
 from skinwave.scene import SAMPLE_RATE, Scene, check_load
@@ -158,7 +159,7 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
     scene = aim.varied({})
-    if not parametric.has_affine_operators(scene.body):
+    if not has_affine_operators(scene.body):
         return aim
     try:
         free_keys(scene.body, ranges)

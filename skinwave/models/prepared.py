@@ -41,7 +41,7 @@ from skinwave.models.reduction import (
     respond,
     select_lines,
 )
-from skinwave.models.symmetry import axes_of_probes, even_part, mirrored_axes
+from skinwave.models.symmetry import axes_of_probes, even_part, mirrored, mirrored_axes
 from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
@@ -124,7 +124,7 @@ def prepare(
     symmetry = "".join(axis for axis in "xy" if axis in symmetry or axis in seen)
     (progress or silent)("mesh", 0.0)
     build = meshed(body, h, clock, silent, symmetry)
-    outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
+    outputs, solids = probe_rows(body, build, mirrored(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
     name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
     with clock("read from cache"):
@@ -254,14 +254,6 @@ def _prepared_anew(
         probes=probes, read=model.outputs, sag=still, carried=arrays["carried"],
         body=replace(reduced, effort=effort),
     )  # fmt: skip
-
-
-def _mirrored(probes: Floats, symmetry: str) -> Floats:
-    """Mirror images of the probes in the part that is modelled."""
-    kept = probes.copy()
-    for axis in ("xy".index(a) for a in symmetry):
-        kept[:, axis] = np.abs(kept[:, axis])
-    return kept
 
 
 def answer(

@@ -45,6 +45,14 @@ def axes_of_probes(probes: Floats, among: str) -> str:
     return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < ON_PLANE)
 
 
+def mirrored(probes: Floats, axes: str) -> Floats:
+    """Mirror images (p, 2) of probes in the part with positive coordinates along axes, of "xy"."""
+    kept = probes.copy()
+    for axis in ("xy".index(a) for a in axes):
+        kept[:, axis] = np.abs(kept[:, axis])
+    return kept
+
+
 def even_part(P: sparse.csr_array, points: Floats, axes: str) -> tuple[sparse.csr_array, Floats]:
     """Load operator of the even part of a load, on the part of a body with positive coordinates.
 

@@ -22,6 +22,7 @@ from simple_model.material import Material
 from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.effort import Progress
+from skinwave.models.affine_scenes import has_affine_operators
 from skinwave.models.free_materials import (
     Reference,
     meshed_materials,
@@ -31,7 +32,6 @@ from skinwave.models.free_materials import (
 )
 from skinwave.models.laws import relaxing
 from skinwave.models.reduction import BAND, ReducedBody, reduced_variant
-from skinwave.parametric import has_affine_operators
 from skinwave.scene import Body, Layer, solid_of
 from skinwave.web.layer_values import loss_factor
 
