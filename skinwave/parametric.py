@@ -35,18 +35,15 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent
 from skinwave.models.affine_scenes import check_scene
-from skinwave.models.free_materials import (
+from skinwave.models.free_keys import (
     FreeKey,
-    Reference,
     free_keys,
-    meshed_materials,
     meshing_shares,
-    reference_of,
-    solids_of,
     training_shares,
     values_at,
     with_values,
 )
+from skinwave.models.free_materials import Reference, meshed_materials, reference_of, solids_of
 from skinwave.models.full import spent
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import line_factor, load_lines_at, probe_rows, spread, surface_load

@@ -19,14 +19,8 @@ from skinwave import parametric
 from skinwave.bodies import hands
 from skinwave.bodies.absorbing_layer import layer_drag
 from skinwave.bodies.build import build, operators
-from skinwave.models.free_materials import (
-    free_keys,
-    meshed_materials,
-    reference_of,
-    solids_of,
-    values_at,
-    with_values,
-)
+from skinwave.models.free_keys import free_keys, values_at, with_values
+from skinwave.models.free_materials import meshed_materials, reference_of, solids_of
 from skinwave.models.loads import surface_load, surface_motion
 from skinwave.models.prepared import answer as own_answer
 from skinwave.models.prepared import components

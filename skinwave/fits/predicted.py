@@ -34,7 +34,7 @@ from skinwave.fits.parameters import (
 )
 from skinwave.models import Model, check_reading, named
 from skinwave.models.affine_scenes import has_affine_operators
-from skinwave.models.free_materials import free_keys
+from skinwave.models.free_keys import free_keys
 from skinwave.parametric import ParametricBody
 from skinwave.scene import SAMPLE_RATE, Scene, check_load
 from skinwave.simulation import compute

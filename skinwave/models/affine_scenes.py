@@ -7,7 +7,7 @@ import numpy as np
 from simple_model.load_spectrum import load_lines
 from simple_model.quantities import STRAIN
 from skinwave.bodies.mounting import FRAME
-from skinwave.models.free_materials import FreeKey
+from skinwave.models.free_keys import FreeKey
 from skinwave.models.laws import check_laws
 from skinwave.scene import Body, Scene, check_load
 

@@ -14,7 +14,7 @@ import numpy as np
 from simple_model import named_lines
 from skinwave import parametric
 from skinwave.models.affine_scenes import check_scene
-from skinwave.models.free_materials import FreeKey, free_keys, with_values
+from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.parametric import ParametricBody
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Load, Reading, Scene
