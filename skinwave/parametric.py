@@ -291,6 +291,7 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
     small = operators_of(affine, solids_of(prepared.reference, body))
     return Prepared(
         probes=prepared.scene.probe_points, read=outputs, reading=prepared.scene.reading,
+        load=prepared.scene.load,
         body=reduced_variant(small, load, points, prepared.effort),
     )  # fmt: skip
 

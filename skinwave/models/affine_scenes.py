@@ -9,7 +9,7 @@ from simple_model.quantities import STRAIN
 from skinwave.bodies.mounting import FRAME
 from skinwave.models.free_keys import FreeKey
 from skinwave.models.laws import check_laws
-from skinwave.scene import Body, Scene, check_load
+from skinwave.scene import Body, Scene
 
 MOST_LINES = 400
 
@@ -37,14 +37,29 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    check_load(scene, "a body with free materials")
+    _check_load(scene)
     check_laws(scene.body, scene.pressure)
     _check_body(scene.body)
     _check_reading(scene, keys)
-    if (count := len(np.unique(load_lines(scene.pressure).frequencies))) > MOST_LINES:
+    each = [load_lines(pressure).frequencies for pressure in scene.loads]
+    if (count := len(np.unique(np.concatenate(each)))) > MOST_LINES:
         raise ValueError(
             f"the load has {count:,} lines, the limit with free materials is {MOST_LINES}; leave "
             "out the rhythm or signal"
+        )
+
+
+def _check_load(scene: Scene) -> None:
+    if scene.load.gravity:
+        raise ValueError(
+            "a body with free materials has no gravity: the static deflection is that of each "
+            "modulus and density; leave gravity out, or reduce the body of each material"
+        )
+    if scene.load.support_motion:
+        raise ValueError(
+            f"a body with free materials has no {scene.load.support_motion.words}, whose inertial "
+            "force goes with the density; leave support_motion out, or reduce the body of each "
+            "material"
         )
 
 
