@@ -28,6 +28,7 @@ from skinwave.fits.problem import Problem
 from skinwave.fits.profile import Profile, profiles
 from skinwave.fits.solve import Solution, solve
 from skinwave.measurements import Measurement
+from skinwave.models.flat_body import FLAT_BODY
 from skinwave.scene import Scene
 
 STARTS = 8
@@ -176,4 +177,4 @@ def _model(scene: Scene, model: str) -> str:
     if model != "auto":
         return model
     flat = has_exact_waves(scene.body) or scene.body.of_kind.is_plate
-    return "flat-body" if flat else "fem"
+    return FLAT_BODY.name if flat and FLAT_BODY.takes_load(scene) else "fem"

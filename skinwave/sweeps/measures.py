@@ -23,8 +23,8 @@ TEXTS = (
 NUMBERS = (
     "tolerance", "asked_h_mm", "h_mm", "expected_error", "drawing_frequency_hz",
     "rayleigh_speed_m_per_s", "spread_6db_mm", "spread_20db_mm", "kernel_spread_6db_mm",
-    "kernel_spread_20db_mm", "seconds", "dofs", "reduced_dofs", "steps", "reduction_error",
-    "energy_imbalance", "radiated", "peak_memory_gib",
+    "kernel_spread_20db_mm", "seconds", "dofs", "reduced_dofs", "reduced_together", "steps",
+    "reduction_error", "energy_imbalance", "radiated", "peak_memory_gib",
 )  # fmt: skip
 AT_PROBES = (
     "probe_x_mm", "probe_y_mm", "peak_um", "rms_um", "level_db", "kernel_peak_pa", "kernel_rms_pa",
