@@ -8,15 +8,17 @@ what is left between the two is large deflection, and the start.
 
 import time
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Response
-from skinwave.inference.assess import RESOLVED, as_run, claim_of, run_of
+from skinwave.inference.assess import as_run, claim_of, run_of
 from skinwave.inference.design import PARAMETERS, Candidate, thickness
-from skinwave.inference.ranking import Row, is_plausible, nearest
+from skinwave.inference.nearest_sheets import distinct
+from skinwave.inference.ranking import Row
 from skinwave.inference.scenes import scene_of
 from skinwave.models import named
 from skinwave.models.stretching import MOST_MODES, unstretched_lines
@@ -26,6 +28,7 @@ from skinwave.simulation import compute
 from skinwave.studies.paper15 import tactons
 
 MODEL = "fem-nonlinear"
+HIGHEST = 420.0  # Hz: 2 f_AM, the highest of the lines that decide M4 and M5
 STEP = 1e-4  # s; the frequency of a mode at 420 Hz is 0.6 % low
 ALONE = tuple(name for name, each in tactons()
               if each.am_frequency and not each.trajectory.size)  # fmt: skip
@@ -44,21 +47,17 @@ def refusal(row: Row) -> str:
         named(MODEL).refuse(body)
     except ValueError as error:
         return str(error)
-    if (count := modes_below(body, RESOLVED)) > MOST_MODES:
+    if (count := modes_below(body, HIGHEST)) > MOST_MODES:
         return (
-            f"it has about {count:.0f} modes below {RESOLVED:.0f} Hz, and {MODEL} takes "
+            f"it has about {count:.0f} modes below {HIGHEST:.0f} Hz, of which {MODEL} takes "
             f"{MOST_MODES}"
         )
     return ""
 
 
 def stretched_sheets(rows: Sequence[Row], count: int) -> list[Row]:
-    """The nearest plausible sheets that are computed at large deflection."""
-    found: list[Row] = []
-    for row in filter(is_plausible, nearest(rows)):
-        if len(found) < count and not refusal(row):
-            found.append(row)
-    return found
+    """The nearest sheets, each of another size or support, that large deflection is computed of."""
+    return list(islice(distinct(rows, lambda row: not refusal(row)), count))
 
 
 def deciding(row: Row) -> list[str]:

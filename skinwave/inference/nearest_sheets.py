@@ -1,7 +1,8 @@
 """The sheets that come nearest to what was measured, side by side."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import islice
 
 from skinwave.inference.assess import CLAIMED
 from skinwave.inference.design import PARAMETERS, Parameter, used
@@ -14,11 +15,16 @@ SHEETS = 3  # that are shown
 
 def sheets(rows: Sequence[Row]) -> list[Row]:
     """The nearest plausible sheets, each of another size or support."""
-    found: list[Row] = []
+    return list(islice(distinct(rows), SHEETS))
+
+
+def distinct(rows: Sequence[Row], wanted: Callable[[Row], bool] = bool) -> Iterator[Row]:
+    """The plausible sheets that are wanted, nearest first, each of another size or support."""
+    there = set[tuple[str, str]]()
     for row in filter(is_plausible, nearest(rows)):
-        if all((row["size"], row["support"]) != (r["size"], r["support"]) for r in found):
-            found.append(row)
-    return found[:SHEETS]
+        if (kind := (row["size"], row["support"])) not in there and wanted(row):
+            there.add(kind)
+            yield row
 
 
 def heading(rows: Sequence[Row]) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from skinwave.inference.knowledge import Row
+from skinwave.inference.knowledge import Row, value_words
 from skinwave.inference.large_deflection import CLAIMS, claims_of, refusal
 from skinwave.inference.nearest_sheets import sheets
 from skinwave.inference.stretched_table import PHASE
@@ -93,16 +93,16 @@ def stretched_table(
 ) -> tuple[list[str], list[list[str]]]:
     """Levels that decide each claim, of plates, and of elements without and with stretching."""
     by_key = {row["key"]: row for row in rows}
-    numbers = {key: k for k, key in enumerate(dict.fromkeys(r["sheet"] for r in stretched), 1)}
     table = []
     for row in stretched:
         sheet = by_key[row["sheet"]]
+        named = f"{sheet['size']}, {value_words(sheet['support'])}"
         if row["status"] != "done":
-            table.append([str(numbers[row["sheet"]]), row["tacton"], "-", row["error"], "-", "-"])
+            table.append([named, row["tacton"], "-", row["error"], "-", "-"])
             continue
         for claim in claims_of(sheet, row["tacton"]):
             table.append([
-                f"{numbers[row['sheet']]}, {sheet['size']}, {sheet['support']}", row["tacton"],
+                named, row["tacton"],
                 claim, _level(row, claim, "linear"), _level(row, claim, "large"),
                 f"{significant(row['linear_over_thickness'], 2)} and "
                 f"{significant(row['large_over_thickness'], 2)}",
