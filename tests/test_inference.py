@@ -9,15 +9,28 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from simple_model import Response
 from simple_model.drive import DRIVES
 from simple_model.plate_modes import plate_modes
 from skinwave.cli import main
-from skinwave.inference import assess, design, drive_laws, knowledge, table
-from skinwave.inference.conclusions import conclusions, readings, sheets, together
+from skinwave.inference import (
+    assess,
+    design,
+    drive_laws,
+    knowledge,
+    large_deflection,
+    stretched_table,
+    table,
+)
+from skinwave.inference.conclusions import conclusions, readings, together
+from skinwave.inference.deflection import bound_table, shares_within
 from skinwave.inference.knowledge import Share, holds, pattern, region, told, variance_share
+from skinwave.inference.nearest_sheets import left_out, sheets
 from skinwave.inference.page import drawings, page, reading_table
-from skinwave.inference.scenes import scene_text
+from skinwave.inference.scenes import scene_of, scene_text
+from skinwave.inference.stretched_words import stretched_sentences
 from skinwave.models.plate_modes import plate_of
+from skinwave.models.stretching import unstretched_lines
 from skinwave.scene_file import loads
 from skinwave.studies.paper15 import tactons
 from skinwave.sweeps import dataset
@@ -52,7 +65,8 @@ def planted(count=400, seed=0):
             "key": f"{k:024x}", "index": k, "version": "0", "stage": table.HYPERCUBE,
             "status": "done", "error": None, "seconds": 1.0, **candidate,
             "first_mode_hz": 30.0, "mean_over_thickness": 2 * rng.random(),
-            "vibration_over_thickness": rng.random(), "second_harmonic_db": -20.0,
+            "vibration_over_thickness": rng.random(), "sag_over_thickness": 40 * rng.random() ** 3,
+            "multiple_tacton": "am140-stm30", "second_harmonic_db": -20.0,
             "M1_holds": int(candidate["drive"] in ("clipped", "compressed")), "M1_value": -40.0,
             "M2_holds": 1, "M2_value": 0.0, "M3_holds": int(rng.random() < 0.5), "M3_value": -30.0,
             "M4_holds": int(rival < 0), "M4_value": rival, "M5_holds": int(rival < -19),
@@ -111,7 +125,7 @@ def test_only_devices_that_clip_or_compress_have_a_third_harmonic():
 
 def test_claims_of_a_candidate_follow_from_its_lines():
     modes = plate_modes(design.plate(SMALL), 200.0)
-    lines = dict(assess.responses(SMALL, modes))
+    lines = dict(assess.responses(SMALL, modes, assess.modal_forces(SMALL, modes)))
     assert [*lines] == [name for name, _ in tactons()]
 
     def at(tacton, frequency):
@@ -158,8 +172,9 @@ def test_claims_of_a_candidate_follow_from_its_lines():
     np.testing.assert_allclose(gained, 2.0, rtol=1e-6)
     # A device that takes the root first has no 2 f_AM, and M1 does not hold.
     corrected = SMALL | {"drive": "force_corrected"}
+    forces = assess.modal_forces(corrected, modes)
     modulated = {n: assess.as_run(corrected, n, *each)
-                 for n, each in assess.responses(corrected, modes)}  # fmt: skip
+                 for n, each in assess.responses(corrected, modes, forces)}  # fmt: skip
     assert assess._claims([*modulated.values()])["M1_holds"] == 0
 
 
@@ -313,7 +328,11 @@ def test_a_search_stays_within_bounds_and_near_the_best():
     rows = planted(60)
     best = table.nearest(rows)
     order = [
-        (-sum(r[f"M{k}_holds"] for k in (1, 2, 3)), max(r["M4_value"], r["M5_value"] + 20))
+        (
+            r["sag_over_thickness"] >= 10,
+            -sum(r[f"M{k}_holds"] for k in (1, 2, 3)),
+            max(r["M4_value"], r["M5_value"] + 20),
+        )
         for r in best
     ]
     assert order == sorted(order)
@@ -356,3 +375,157 @@ def test_scenes_of_candidates_say_how_the_sheet_is_held(support, monkeypatch):
         own = getattr(found, name)
         assert own == (value if isinstance(value, str) else pytest.approx(np.array(value)))
     assert knowledge.value_words("two_clips") == "hung from two clips"
+
+
+def test_shares_are_told_within_bounds_of_the_deflection_too():
+    rows = planted()
+    sags = np.array([row["sag_over_thickness"] for row in rows])
+    m1 = holds(rows, "M1")
+    for bound in (10.0, 2.0, 0.5):
+        found = shares_within(rows, bound)["M1"]
+        assert (found.held, found.of) == (m1[sags < bound].sum(), (sags < bound).sum())
+        assert 0 < found.of < 400
+    header, lines = bound_table(rows)
+    assert header[1:] == ["any", "below 10 thicknesses", "below 2 thicknesses",
+                          "below half a thickness"]  # fmt: skip
+    assert lines[0][1:] == ["400", *(f"{(sags < bound).sum()}" for bound in (10, 2, 0.5))]
+    said = conclusions(rows)[-1]
+    assert f"below 2 thicknesses in {100 * (sags < 2).mean():.0f} %" in said
+    assert f"{sags.max():.3g} thicknesses at the most" in said
+    of = m1[sags < 2].mean()
+    assert f"Of the {(sags < 2).sum()} below 2 thicknesses none show all five; M1 in " in said
+    assert f"M1 in {100 * of:.0f} % (" in said.partition("below 2 thicknesses none")[2]
+
+
+def test_a_sheet_that_sags_absurdly_is_none_of_the_nearest():
+    rows = planted(60)
+    for row in rows[:5]:  # which show all
+        row |= {f"M{k}_holds": 1 for k in range(1, 6)} | {"M4_value": -25.0, "M5_value": -45.0}
+        row["sag_over_thickness"] = 900.0
+    assert all(row["sag_over_thickness"] < 10 for row in sheets(rows))
+    assert table.nearest(rows)[0]["sag_over_thickness"] < 10
+    sagging = sum(row["sag_over_thickness"] >= 10 for row in rows)
+    assert f"are not among them: {sagging} of 60" in left_out(rows)
+
+
+def test_the_sag_is_the_largest_static_deflection_of_the_sheet():
+    """A pressure that rests on the middle: the sum over modes of their static deflection there."""
+    centred = SMALL | {"off_middle": 0.0, "start_mm": 0.0, "beside_mm": 0.0}
+    modes = plate_modes(design.plate(centred), 200.0)
+    forces = assess.modal_forces(centred, modes)
+    own = {"am80": forces["am80"]}
+    f, force = own["am80"]
+    middle = float((modes.at([[0.0, 0.0]])[0] * force[f == 0].real / modes.squared).sum())
+    assert assess.sag(modes, own) == pytest.approx(middle, rel=1e-6)
+    assert assess.sag(modes, forces) > middle  # of the focus that is not modulated
+
+
+def test_elements_without_stretching_have_the_lines_of_the_plate():
+    name, tacton = next((n, t) for n, t in tactons() if n == "am140-stm20")
+    modes = plate_modes(design.plate(SMALL), 200.0)
+    of_plate = dict(assess.responses(SMALL, modes, assess.modal_forces(SMALL, modes)))[name]
+    f, u = unstretched_lines(scene_of(SMALL, tacton), h=0.07 / 16)
+    for frequency in (0.0, 190.986, 330.986):  # at 140 Hz it resonates
+        own, other = (amplitude[np.abs(each - frequency) < 1e-2].sum(axis=0)
+                      for each, amplitude in ((f, u), of_plate))  # fmt: skip
+        np.testing.assert_allclose(np.abs(own), np.abs(other), rtol=0.1)
+
+
+def stretched(row, tacton):
+    """A row as of a sheet at large deflection, where M4 holds and M1 is as it was."""
+    found = {"sheet": row["key"], "tacton": tacton, "status": "done", "seconds": 1.0,
+             "linear_over_thickness": 3.0, "large_over_thickness": 1.5}  # fmt: skip
+    for claim in large_deflection.claims_of(row, tacton):
+        linear = {"M1": -40.0, "M4": 3.0, "M5": -4.0}[claim]
+        found |= {f"{claim}_linear": linear, f"{claim}_large": linear - 7}
+        found |= {f"{claim}_linear_holds": int(claim == "M1"),
+                  f"{claim}_large_holds": int(claim != "M5")}  # fmt: skip
+    return found
+
+
+def test_the_nearest_sheets_are_computed_at_large_deflection_and_go_on(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(table, "row", without_physics)
+    monkeypatch.setattr("skinwave.inference.page.png", lambda figure: b"drawn")
+    monkeypatch.setattr(stretched_table, "stretched_row", stretched)
+    out = tmp_path / "which"
+    typed = ["infer", "--scheduler", "threads", "--seed", "2", "-o", str(out), "--samples", "40"]
+    asked = [*typed, "--large-deflection", "2", "--json"]
+    whole, computed = stretched_table.engine.run_all, []
+
+    def stops(work, items, scheduler, count, done):
+        """As Ctrl-C after three."""
+        if len(items[0]) != 2:
+            return whole(work, items, scheduler, count, done)
+        for k, item in enumerate(items[:3]):
+            computed.append(item)
+            done(k, work(item))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stretched_table.engine, "run_all", stops)
+    assert main(asked) == 1
+    monkeypatch.setattr(stretched_table.engine, "run_all", whole)
+    assert "of large deflection are missing; the same command goes on" in capsys.readouterr().err
+    rows = dataset.read(out)
+    assert len(stretched_table.read(out, rows)) == 3 == len(computed)
+    parts = sorted((out / "large-deflection" / "rows").iterdir())
+    times = [part.stat().st_mtime_ns for part in parts]
+    assert main(asked) == 0
+    assert [part.stat().st_mtime_ns for part in parts] == times
+    found = stretched_table.read(out, rows)
+    two = large_deflection.stretched_sheets(rows, 2)
+    assert [(r["sheet"], r["tacton"]) for r in found] == [
+        (sheet["key"], tacton) for sheet in two for tacton in large_deflection.deciding(sheet)
+    ]
+    for sheet in two:
+        assert sheet["support"] in ("clamped", "simply")
+        assert sheet["size"] != "A3"
+        assert sheet["sag_over_thickness"] < 10
+    said = conclusions(rows, found)
+    assert "M1 holds in 2 of 2 (2 if it does not stretch), M4 holds in 2 of 2 (0 if" in said[-1]
+    assert "M5 holds in 0 of 2 (0 if it does not stretch): M4 changes." in said[-1]
+    assert "by up to 1.5 thicknesses at the points" in said[-1]
+    assert "levels move by up to 7.0 dB" in said[-1]
+    html = unescape((out / "index.html").read_text())
+    assert all(paragraph in html for paragraph in said)
+    assert "+3.0 dB, fails" in html
+    assert "-4.0 dB, holds" in html
+    assert main([*typed, "--large-deflection", "-1"]) == 2
+    assert "--large-deflection = -1 is below 0" in capsys.readouterr().err
+
+
+def test_sheets_that_elements_do_not_stretch_say_why():
+    row = dict(planted(1)[0])
+    refused = {"corners": "clips", "two_edges": "in a frame", "clamped": "fem-nonlinear takes 160"}
+    for support, why in refused.items():
+        own = {"support": support, "size": "A3", "tension_x_n_per_m": 0, "tension_y_n_per_m": 0}
+        assert why in large_deflection.refusal(row | own)
+    assert not large_deflection.refusal(row | {"support": "simply", "size": "A6"})
+    assert "--large-deflection 3" in stretched_sentences([row], [])
+
+
+def test_a_sheet_at_large_deflection_is_read_as_it_was_measured(monkeypatch):
+    """A pair of lines that an element model would give: M1's levels, in displacement and
+    velocity.
+    """
+
+    def lines(scene):
+        return np.array([0.0, 80.0, 160.0, 240.0]), np.outer([3e-5, 1e-5, 1e-6, 1e-8], np.ones(5))
+
+    def response(scene, model, dt):
+        times = np.arange(10000) / 10000
+        f, u = lines(scene)
+        return Response(model=model, times=times, probes=scene.probe_points,
+                        values=np.cos(2 * np.pi * np.outer(times, f)) @ u)  # fmt: skip
+
+    monkeypatch.setattr(large_deflection, "unstretched_lines", lines)
+    monkeypatch.setattr(large_deflection, "compute", response)
+    row = planted(1)[0] | SMALL
+    for read, factor in (("displacement", 1), ("velocity", 3)):
+        found = large_deflection.stretched_row(row | {"quantity": read}, "am80")
+        assert found["status"] == "done", found
+        for how in ("linear", "large"):
+            assert found[f"M1_{how}"] == pytest.approx(-60 + 20 * np.log10(factor), abs=0.01)
+        assert found["M1_large_holds"] == int(read == "velocity")
+        assert found["large_over_thickness"] == pytest.approx(3e-5 * 780 / 0.080, rel=1e-6)

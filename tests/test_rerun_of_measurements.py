@@ -62,7 +62,7 @@ def test_an_inference_is_had_again_with_its_search(tmp_path, monkeypatch):
     monkeypatch.setattr(table, "row", quick_row)
     monkeypatch.setattr(table.engine, "run_all", in_this_process)
     monkeypatch.setattr("skinwave.inference.files.write", dataset.read)
-    monkeypatch.setattr("skinwave.inference.conclusions.conclusions", lambda rows: ["none"])
+    monkeypatch.setattr("skinwave.inference.conclusions.conclusions", lambda *rows: ["none"])
     monkeypatch.setattr(table, "offspring", lambda rows, count, seed: [
         {**rows[k], "height_mm": 150.5 + k + len(rows)} for k in range(count)
     ])  # fmt: skip

@@ -19,6 +19,7 @@ from skinwave.commands.common import note_central_values
 from skinwave.distributions import Distribution, called, known_to
 from skinwave.planning.budget import error_budget, mesh_row
 from skinwave.scene_file import dumps, loads
+from skinwave.simulation import compute
 from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
 from skinwave.sweeps.variation import combinations, parse
 from skinwave.uncertainty import of_sweep
@@ -300,9 +301,47 @@ def test_a_finer_mesh_than_a_tenth_of_the_material_gains_nothing():
     size = float(row.reason.rpartition("finer than ")[2].split()[0])
     assert 3 < size <= 15
     assert "below a tenth of the material's" in row.reason
-    sheet = loads('[body]\nkind = "sheet"')
-    assert isnan(error_budget(sheet).material)
-    assert "material not computed" in mesh_row(sheet, None, 0.1).value
+
+
+SHEET = """
+[tacton]
+am_frequency_hz = 140
+[body]
+kind = "sheet"
+[body.material]
+density_kg_m3 = 800
+shear_modulus_pa = { value = 1.5e9, spread = 0.002 }
+poisson = 0.3
+loss_factor = 0.05
+[focus]
+peak_pressure_pa = { value = 50, spread = 0 }
+[probes]
+points_mm = [[0, 0], [10, 0]]
+"""
+
+
+def test_the_budget_of_a_sheet_is_what_samples_of_its_modes_show():
+    scene = loads(SHEET)
+    (spread,) = (each for each in spreads_of(scene) if each.part == "material")
+
+    def moving(values):
+        found = compute(with_values(scene, values), "plate-modes").values
+        return found - found.mean(axis=0)
+
+    centre = moving({})
+    each = [moving({spread.key: float(x)}) for (x,) in samples((spread,), 16)]
+    away = np.sqrt(np.mean([np.square(x - centre).sum(axis=0) for x in each], axis=0))
+    expected = (away / np.linalg.norm(centre, axis=0)).max()
+    assert error_budget(scene).material == pytest.approx(expected, rel=0.1)
+    assert 0.001 < expected < 0.2
+    plain = loads('[tacton]\nam_frequency_hz = 140\n[body]\nkind = "sheet"')
+    assert "not computed" not in mesh_row(plain, None, 0.1).value
+
+
+def test_a_curled_sheet_has_no_budget_of_its_material():
+    curled = loads('[body]\nkind = "sheet"\n[body.mounting]\ncurl_x_mm = 1')
+    assert isnan(error_budget(curled).material)
+    assert "material not computed" in mesh_row(curled, None, 0.1).value
 
 
 def test_distributions_of_a_sweep():

@@ -193,6 +193,25 @@ def air_mass(body: Body, frequency: float) -> float:
     return 2 * AIR_DENSITY / bending_wavenumber(body, frequency)
 
 
+def refuse_open_air(body: Body) -> None:
+    """Refuse a sheet with air that flows around a free edge, which elements do not have.
+
+    Raises
+    ------
+    ValueError
+        If it has no frame.
+    """
+    if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
+        return
+    how, cure, other = f"with {body.sides} sides", "clamp them", "flat-body"
+    if body.sides == "clamped":
+        how, cure, other = f"one {body.mounting.words}", "hold all its edges", "plate-modes"
+    raise ValueError(
+        f"elements have air around a sheet in a frame, not {how}; {cure}, leave air out, or "
+        f"use --model {other}"
+    )
+
+
 def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
     """Added mass of the air around a meshed sheet, for `fem.reduce`.
 
@@ -213,14 +232,7 @@ def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
     """
     if not body.air:
         return None
-    if body.sides != "clamped" or not body.mounting.is_frame:
-        how, cure, other = f"with {body.sides} sides", "clamp them", "flat-body"
-        if body.sides == "clamped":
-            how, cure, other = f"one {body.mounting.words}", "hold all its edges", "plate-modes"
-        raise ValueError(
-            f"elements have air around a sheet in a frame, not {how}; {cure}, leave air out, or "
-            f"use --model {other}"
-        )
+    refuse_open_air(body)
     by_mass, _ = damping(body)
     sides = body.placement.rotation.T[:2]
     return added_mass(

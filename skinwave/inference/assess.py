@@ -50,8 +50,8 @@ TIMES = np.arange(2500) / 2500.0  # s: lines up to 1250 Hz, for 1 s
 CLAIMED = ("M1", "M2", "M3", "M4", "M5")
 # M4's sentence for a paper sheet adds velocity to displacement; S4 is the same of what is read.
 ASSESSED_AS = {"M4": "S4"}
+ACROSS = 41  # places along each side where the sag is looked for
 TINY = float(np.finfo(float).tiny)
-LINEAR = 0.5  # thicknesses: a plate that deflects further stretches
 
 
 def row(candidate: Candidate, release: str) -> dict[str, Any]:
@@ -68,13 +68,15 @@ def row(candidate: Candidate, release: str) -> dict[str, Any]:
 def assessed(candidate: Candidate) -> dict[str, Any]:
     """Claims and levels of a candidate, by column."""
     modes = plate_modes(plate(candidate), finest(candidate))
-    lines = dict(responses(candidate, modes))
+    forces = modal_forces(candidate, modes)
+    lines = dict(responses(candidate, modes, forces))
     runs = [as_run(candidate, name, *each) for name, each in lines.items()]
     mean, vibration = _deflections(lines)
     return {
         "first_mode_hz": float(modes.frequencies[0]),
         "mean_over_thickness": mean / thickness(candidate),
         "vibration_over_thickness": vibration / thickness(candidate),
+        "sag_over_thickness": sag(modes, forces) / thickness(candidate),
         **_claims(runs), **_rivals(runs),
     }  # fmt: skip
 
@@ -90,10 +92,11 @@ def finest(candidate: Candidate) -> tuple[float, float]:
 
 
 def responses(
-    candidate: Candidate, modes: PlateModes
+    candidate: Candidate, modes: PlateModes, forces: Mapping[str, tuple[Floats, Complex]]
 ) -> Iterator[tuple[str, tuple[Floats, Complex]]]:
-    """Name of each Tacton, and frequencies (f,) in Hz and displacement (f, p) in metre."""
-    forces = dict(_modal_forces(candidate, modes))
+    """Name of each Tacton of some `modal_forces`, and frequencies (f,) in Hz and displacement
+    (f, p) in metre.
+    """
     every = [np.concatenate(each) for each in zip(*forces.values(), strict=True)]
     outputs = modes.at(probes(candidate) - middle(candidate))
     u = steady_response(modes, every[0], every[1], outputs, candidate["loss_factor"])
@@ -102,30 +105,42 @@ def responses(
         yield tacton, (f, part)
 
 
-def _modal_forces(
-    candidate: Candidate, modes: PlateModes
-) -> Iterator[tuple[str, tuple[Floats, Complex]]]:
-    """Name of each Tacton, and frequencies (f,) in Hz and modal forces (f, m)."""
+def modal_forces(candidate: Candidate, modes: PlateModes) -> dict[str, tuple[Floats, Complex]]:
+    """Frequencies (f,) in Hz and modal forces (f, m) of each Tacton, by its name."""
     paths: dict[Trajectory, Complex] = {}
+    found = {}
     for each, tacton in tactons():
         load = pressure(candidate, tacton)
         if tacton.trajectory not in paths:
             paths[tacton.trajectory] = modal_path_forces(modes, load, middle(candidate))
         f, forces = load_lines(load).gather(paths[tacton.trajectory])
         heard = f < 0.5 / TIMES[1]
-        yield each, (f[heard], forces[heard])
+        found[each] = f[heard], forces[heard]
+    return found
+
+
+def sag(modes: PlateModes, forces: Mapping[str, tuple[Floats, Complex]]) -> float:
+    """Largest static deflection in metre under the mean of any Tacton, anywhere on the sheet."""
+    means = np.array([own[f == 0].sum(axis=0).real for f, own in forces.values()])
+    x, y = (np.linspace(-side / 2, side / 2, ACROSS)
+            for side in (modes.plate.size_x, modes.plate.size_y))  # fmt: skip
+    return float(np.abs(modes.on_grid(x, y) @ (means / modes.squared).T).max())
 
 
 def as_run(candidate: Candidate, tacton: str, f: Floats, u: Complex) -> Run:
-    """A steady response, in the quantity that the candidate reads."""
-    read = quantity(candidate["quantity"])
-    values = synthesise(f, read.factor(2j * np.pi * f)[:, None] * u, TIMES)
-    places = probes(candidate)
+    """Run of steady lines (f,) in Hz of a displacement (f, p) in metre, as a candidate reads it."""
+    rates = quantity(candidate["quantity"]).factor(2j * np.pi * f)[:, None]
+    return run_of(candidate, tacton, TIMES, synthesise(f, rates * u, TIMES))
+
+
+def run_of(candidate: Candidate, tacton: str, times: Floats, values: Floats) -> Run:
+    """Run of a waveform (t, p) of the quantity that a candidate reads."""
+    places, read = probes(candidate), candidate["quantity"]
     scene = Scene(
         pressure=pressure(candidate, dict(tactons())[tacton]), body=BODIES["paper-sheet"],
-        probes=tuple(map(tuple, places.tolist())), quantity=read.name,
+        probes=tuple(map(tuple, places.tolist())), quantity=read,
     )  # fmt: skip
-    response = Response(model=MODEL, times=TIMES, probes=places, values=values, quantity=read.name)
+    response = Response(model=MODEL, times=times, probes=places, values=values, quantity=read)
     return Run(tacton=tacton, body=BODY, scene=scene, response=response)
 
 
@@ -136,23 +151,27 @@ def _deflections(lines: Mapping[str, tuple[Floats, Complex]]) -> tuple[float, fl
 
 
 def _claims(runs: list[Run]) -> dict[str, Any]:
-    """Whether each claim holds of all Tactons that it is about, and its value. A line that it needs
-    and that is below -60 dB in load and response is in no list of lines: it does not hold, and has
-    no value.
-    """
+    """Whether each claim holds of all Tactons that it is about, and its value."""
     columns: dict[str, Any] = {}
     for claim in CLAIMED:
-        kinds, assess = CLAIMS[ASSESSED_AS.get(claim, claim)]
-        about = [run for run in runs if (run.is_am, run.is_stm) in kinds]
-        needed = set(NEEDED[claim][0] if claim in NEEDED else ["f_AM"])
-        if not all(run.frequencies.keys() >= needed for run in about):
-            columns[f"{claim}_holds"] = 0
-            continue
-        holds, value, _, _ = assess(about)
-        columns[f"{claim}_holds"] = int(holds)
-        columns[f"{claim}_value"] = float(value) if isfinite(value) else None
+        columns[f"{claim}_holds"], columns[f"{claim}_value"] = claim_of(claim, runs)
     modulated = [run for run in runs if (run.is_am, run.is_stm) in CLAIMS["M1"][0]]
     return columns | {"second_harmonic_db": min(map(_second_harmonic, modulated))}
+
+
+def claim_of(claim: str, runs: list[Run]) -> tuple[int, float | None]:
+    """Whether a claim holds of those of some runs that it is about, as 0 or 1, and its value.
+
+    A line that it needs and that is below -60 dB in load and response is in no list of lines: it
+    does not hold, and has no value.
+    """
+    kinds, assess = CLAIMS[ASSESSED_AS.get(claim, claim)]
+    about = [run for run in runs if (run.is_am, run.is_stm) in kinds]
+    needed = set(NEEDED[claim][0] if claim in NEEDED else ["f_AM"])
+    if not all(run.frequencies.keys() >= needed for run in about):
+        return 0, None
+    holds, value, _, _ = assess(about)
+    return int(holds), float(value) if isfinite(value) else None
 
 
 def _second_harmonic(run: Run) -> float:
@@ -183,6 +202,7 @@ def _rivals(runs: list[Run]) -> dict[str, Any]:
         "multiple_by_path_db": by_path(of_multiples.max(axis=1)),
         "rival_of_mean_db": max(map(_rival_of_mean, both)),
         "rival_line": strongest_rival(strongest)[0], "rival_tacton": strongest.tacton,
+        "multiple_tacton": both[int(np.argmax(of_multiples.max(axis=1)))].tacton,
         "tactons_highest": int((worst < 0).sum()),
         "tactons_much_lower": int((of_multiples.max(axis=1) < MUCH_LOWER).sum()),
     }  # fmt: skip

@@ -1,13 +1,13 @@
 """Conclusions in words, from the rows of the table alone."""
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from skinwave.inference.assess import CLAIMED
-from skinwave.inference.design import PARAMETERS, Parameter, used
+from skinwave.inference.deflection import deflection_words
+from skinwave.inference.design import PARAMETERS
 from skinwave.inference.knowledge import (
     Mask,
     Region,
@@ -15,29 +15,41 @@ from skinwave.inference.knowledge import (
     Share,
     Told,
     holds,
-    is_linear,
+    in_percent,
     pattern,
+    percent,
     region,
     sample,
     searched,
     share,
     told,
-    value_words,
     variance_share,
 )
-from skinwave.inference.table import nearest
+from skinwave.inference.nearest_sheets import rival_level
+from skinwave.inference.ranking import nearest
+from skinwave.inference.stretched_words import stretched_sentences
 from skinwave.numbers import decibel, significant
 from skinwave.studies.claims import MUCH_LOWER
 from skinwave.studies.paper15 import PATHS
 
-SHEETS = 3  # that are shown
+FIRST = 3  # parameters that are named
 CERTAIN = 0.5  # of a claim's entropy: a parameter that takes this away decides it
 BARS = (-10.0, -6.0)  # dB, of M5
 SIZES = tuple(f"{1e3 * size:g} mm" for size, _ in PATHS if size)
 
 
-def conclusions(rows: Sequence[Row]) -> list[str]:
-    """The paragraphs that the page begins with: the result, why, and what would tell more.
+def conclusions(rows: Sequence[Row], stretched: Sequence[Row] = ()) -> list[str]:
+    """The paragraphs that the page begins with: the result, why, what would tell more, and how far
+    sheets deflect.
+
+    Parameters
+    ----------
+    rows : of the table
+    stretched : of that of the nearest sheets at large deflection
+
+    Returns
+    -------
+    list of str
 
     Raises
     ------
@@ -52,14 +64,9 @@ def conclusions(rows: Sequence[Row]) -> list[str]:
     return [
         f"{_all_five(fair, searched(rows))} {_each(fair)} {_rivals(fair)}",
         " ".join(_deciders(fair)),
-        f"{_next(fair)} {_validity(fair)}",
+        _next(fair),
+        f"{deflection_words(fair)} {stretched_sentences(rows, stretched)}",
     ]
-
-
-def in_percent(found: Share) -> str:
-    """A share with its interval."""
-    low, high = found.interval
-    return f"{_percent(found.value)} % ({_percent(low)} to {_percent(high)} %)"
 
 
 def together(rows: Sequence[Row]) -> list[tuple[str, Share]]:
@@ -69,15 +76,6 @@ def together(rows: Sequence[Row]) -> list[tuple[str, Share]]:
         mask = mask & holds(rows, claim)
         found.append((" and ".join(CLAIMED[:k]), share(mask)))
     return found
-
-
-def sheets(rows: Sequence[Row]) -> list[Row]:
-    """The best rows of all, each of another size or support."""
-    found: list[Row] = []
-    for row in nearest(rows):
-        if all((row["size"], row["support"]) != (r["size"], r["support"]) for r in found):
-            found.append(row)
-    return found[:SHEETS]
 
 
 def decider(rows: Sequence[Row], mask: Mask) -> Told | None:
@@ -113,22 +111,20 @@ def _levels(rows: Sequence[Row], column: str) -> Floats:
     return np.array([row[column] for row in rows])
 
 
-def _percent(x: float) -> str:
-    return f"{100 * x:.0f}" if x > 0.1 or not x else f"{100 * x:.2g}"
-
-
 def _all_five(fair: Sequence[Row], more: Sequence[Row]) -> str:
     found, also = share(holds(fair, "all")), share(holds(more, "all"))
     _, high = found.interval
     said = f"Of {found.of:,} candidates {found.held or 'none'} show all five claims"
-    said += f", {in_percent(found)}." if found.held else f" (below {_percent(high)} %)."
+    said += f", {in_percent(found)}." if found.held else f" (below {percent(high)} %)."
     if also.of:
         said += f" A search of {also.of:,} more near the best of them found {also.held or 'none'}."
     said += _with_other_bars(fair, more)
     best = nearest([*fair, *more])[0]
     shown = [claim for claim in CLAIMED if best[f"{claim}_holds"]]
     return (
-        f"{said} The best shows {', '.join(shown)}, its other lines at {_level(best)} dB or below."
+        f"{said} The nearest, on a sheet that sags by {significant(best['sag_over_thickness'], 2)} "
+        f"thicknesses, shows {', '.join(shown)}, its other lines at {rival_level(best)} dB or "
+        "below."
     )
 
 
@@ -159,7 +155,7 @@ def _deciders(fair: Sequence[Row]) -> Iterator[str]:
             continue
         verb = "is decided by" if best.fraction > CERTAIN else "depends most on"
         yield (
-            f"{claim} {verb} the {best.parameter.words} ({_percent(best.fraction)} % of its "
+            f"{claim} {verb} the {best.parameter.words} ({percent(best.fraction)} % of its "
             f"entropy){_where(region(fair, mask))}."
         )
 
@@ -186,10 +182,10 @@ def _rivals(fair: Sequence[Row]) -> str:
     median, least = (decibel(float(x), signed=True) for x in (np.median(levels), levels.min()))
     return (
         f"The strongest rival of f_AM is {lines[common]} most often "
-        f"({_percent(counts[common] / len(fair))} %), on the path of {SIZES[largest]} in "
-        f"{_percent(on_path.value)} %; its level is {median} dB in the median and {least} dB at "
+        f"({percent(counts[common] / len(fair))} %), on the path of {SIZES[largest]} in "
+        f"{percent(on_path.value)} %; its level is {median} dB in the median and {least} dB at "
         f"the least, where M4 asks for 0 dB, and goes most with the {tells.words} "
-        f"({_percent(variance_share(fair, levels, tells))} % of its variance). {_multiples(fair)}"
+        f"({percent(variance_share(fair, levels, tells))} % of its variance). {_multiples(fair)}"
     )
 
 
@@ -205,53 +201,10 @@ def _multiples(fair: Sequence[Row]) -> str:
 
 
 def _next(fair: Sequence[Row]) -> str:
-    best = [each for each in told(fair, pattern(fair)) if each.bits > 0][:SHEETS]
+    best = [each for each in told(fair, pattern(fair)) if each.bits > 0][:FIRST]
     if not best:
         return "No parameter tells which claims hold."
     each = [f"the {t.parameter.words} ({t.bits:.2f} of {t.entropy:.2f} bits)" for t in best]
     return f"To know one thing more, {each[0]} would tell most" + (
         f", then {' and '.join(each[1:])}." if each[1:] else "."
     )
-
-
-def _validity(fair: Sequence[Row]) -> str:
-    within = is_linear(fair, "mean")
-    mean, vibration = share(within), share(is_linear(fair, "vibration"))
-    said = (
-        f"All this is of linear sheets: the mean deflection is below half a thickness in "
-        f"{_percent(mean.value)} % of them, the vibration in {_percent(vibration.value)} %"
-    )
-    if not mean.held:
-        return f"{said}."
-    highest = share(holds(fair, "M4")[within])
-    return f"{said}; of the former M4 holds in {in_percent(highest)}."
-
-
-def sheet_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    """The best sheets side by side: what they show, and their parameters."""
-    best = sheets(rows)
-
-    def line(words: str, of: Callable[[Row], str]) -> list[str]:
-        return [words, *map(of, best)]
-
-    lines = [
-        line("shows", lambda r: ", ".join(c for c in CLAIMED if r[f"{c}_holds"])),
-        line("strongest rival of f_AM", lambda r: f"{r['rival_line']}, {_level(r)} dB"),
-        line("under", lambda r: r["rival_tacton"]),
-        line("first mode, Hz", lambda r: significant(r["first_mode_hz"])),
-        line("mean deflection, thicknesses", lambda r: significant(r["mean_over_thickness"])),
-    ]
-    lines += [
-        line(f"{p.words}{f', {p.unit}' if p.unit else ''}", partial(_value, p)) for p in PARAMETERS
-    ]
-    return ["sheet", *(str(k) for k in range(1, len(best) + 1))], lines
-
-
-def _value(p: Parameter, row: Row) -> str:
-    if p.key not in used(row):
-        return "-"
-    return value_words(row[p.key]) if p.bounds is None else significant(row[p.key])
-
-
-def _level(row: Row) -> str:
-    return decibel(float(row["M4_value"]), signed=True)

@@ -1,9 +1,10 @@
-"""Files that are made of the table of an inference: its page, its figures, scenes of sheets."""
+"""Files that are made of the tables of an inference: its page, its figures, scenes of sheets."""
 
 from pathlib import Path
 from typing import Any
 
-from skinwave.inference.conclusions import sheets
+from skinwave.inference import stretched_table
+from skinwave.inference.nearest_sheets import sheets
 from skinwave.inference.page import drawings, page
 from skinwave.inference.scenes import scene_text
 from skinwave.outputs import output_file
@@ -29,8 +30,8 @@ def refuse_changed(out: Path) -> None:
 def write(out: Path) -> list[dict[str, Any]]:
     """Write index.html, its figures and scenes of the best sheets; the rows they are made of."""
     rows = dataset.read(out)
-    drawn = drawings(rows)
-    _replace(out, PAGE, page(rows, drawn).encode())
+    drawn, stretched = drawings(rows), stretched_table.read(out, rows)
+    _replace(out, PAGE, page(rows, drawn, stretched).encode())
     for each in drawn:
         _replace(out, f"{each.name}.png", each.image)
     for name, row in zip(SCENES, sheets(rows), strict=False):

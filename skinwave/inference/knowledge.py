@@ -6,20 +6,19 @@ a bin make I too large: its average over shuffled rows is taken off, and what is
 these is taken as none.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from meshes.tetmesh import Floats
-from skinwave.inference.assess import CLAIMED, LINEAR
+from skinwave.inference.assess import CLAIMED
 from skinwave.inference.design import PARAMETERS, SUPPORTS, Parameter
+from skinwave.inference.ranking import Row
 from skinwave.inference.table import HYPERCUBE, SEARCH
 
-Row = Mapping[str, Any]
 Codes = NDArray[np.int_]
 Mask = NDArray[np.bool_]
 
@@ -95,9 +94,15 @@ def share(mask: Mask) -> Share:
     return Share(held=int(mask.sum()), of=len(mask))
 
 
-def is_linear(rows: Sequence[Row], column: str) -> Mask:
-    """Whether the mean, or the vibration, of each row (r,) is below half a thickness."""
-    return np.array([row[f"{column}_over_thickness"] < LINEAR for row in rows], bool)
+def percent(x: float) -> str:
+    """A share in percent, without the sign."""
+    return f"{100 * x:.0f}" if x > 0.1 or not x else f"{100 * x:.2g}"
+
+
+def in_percent(found: Share) -> str:
+    """A share with its interval."""
+    low, high = found.interval
+    return f"{percent(found.value)} % ({percent(low)} to {percent(high)} %)"
 
 
 def told(rows: Sequence[Row], outcome: Codes) -> list[Told]:

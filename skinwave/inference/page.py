@@ -10,11 +10,9 @@ from skinwave.inference.assess import CLAIMED
 from skinwave.inference.conclusions import (
     conclusions,
     decider,
-    in_percent,
     readings,
-    sheet_table,
-    sheets,
 )
+from skinwave.inference.deflection import bound_table
 from skinwave.inference.design import MEASUREMENT, PARAMETERS, SHEET
 from skinwave.inference.figures import (
     decision_figure,
@@ -25,6 +23,7 @@ from skinwave.inference.figures import (
 from skinwave.inference.knowledge import (
     Row,
     holds,
+    in_percent,
     pattern,
     region,
     sample,
@@ -32,6 +31,8 @@ from skinwave.inference.knowledge import (
     told,
     value_words,
 )
+from skinwave.inference.nearest_sheets import heading, left_out, sheet_table, sheets
+from skinwave.inference.stretched_words import LARGE, refused_sentence, stretched_table
 from skinwave.pictures.figures import png
 from skinwave.studies.claims import MUCH_LOWER, TEXTS
 
@@ -45,13 +46,14 @@ METHOD = (
     "Information is of numbers in five bins, less what chance makes of as many rows."
 )
 LEFT_OUT = (
-    "Left out: the mean deflection, which stretches a sheet on fixed edges. A clamped disc of "
-    "office paper, 100 mm in radius, deflects by three thicknesses under 2.6 mN, and its edge "
-    "then pulls by a few N/m, within the tensions of the candidates; curl, humidity and "
-    "creases; sheets that touch or leave their support, which rattle; radiation of sound; the "
-    "flow of air around edges without a baffle; the noise and the resolution of the vibrometer; "
-    "what the device does to a focus that moves fast. M1 asks for a third harmonic, which no "
-    "linear sheet adds: of the drive laws only the clipped and the compressed ones have it."
+    "Left out of the candidates: the mean deflection, which stretches a sheet on fixed edges. A "
+    "clamped disc of office paper, 100 mm in radius, deflects by three thicknesses under 2.6 mN, "
+    "and its edge then pulls by a few N/m, within the tensions of the candidates; gravity, curl, "
+    "humidity and creases; sheets that touch or leave their support, which rattle; radiation of "
+    "sound; the flow of air around edges without a baffle; the noise and the resolution of the "
+    "vibrometer; what the device does to a focus that moves fast. M1 asks for a third harmonic, "
+    "which no linear sheet adds: of the drive laws only the clipped and the compressed ones have "
+    "it."
 )
 WHY_NOT = (
     'M4 is about all lines: f_AM is to be the highest. M5 is about "these frequency harmonics", '
@@ -105,13 +107,14 @@ def drawings(rows: Sequence[Row]) -> list[Drawing]:
     ]
 
 
-def page(rows: Sequence[Row], drawn: Sequence[Drawing]) -> str:
-    """The page, from the rows of the table alone.
+def page(rows: Sequence[Row], drawn: Sequence[Drawing], stretched: Sequence[Row] = ()) -> str:
+    """The page, from the rows of the tables alone.
 
     Parameters
     ----------
     rows : of the table
     drawn : Drawing, of the same rows
+    stretched : of the table of the nearest sheets at large deflection
 
     Returns
     -------
@@ -121,17 +124,19 @@ def page(rows: Sequence[Row], drawn: Sequence[Drawing]) -> str:
     picture = {each.name: document.picture(each.image, each.caption, each.name) for each in drawn}
     return document.page(
         TITLE,
-        *map(document.paragraph, conclusions(rows)),
+        *map(document.paragraph, conclusions(rows, stretched)),
         picture["shares"],
         document.table(*claim_table(fair)),
+        document.section("Candidates by how far they deflect",
+                         document.table(*bound_table(fair))),
         document.section("If M4 and M5 are read less strictly", picture["rivals"],
                          document.table(*reading_table(fair)), document.paragraph(WHY_NOT)),
         document.section("Which parameter decides", picture["decides"],
                          document.table(*region_table(fair)), picture["regions"]),
         document.section("What one more measurement would tell",
                          document.table(*next_table(fair)), document.paragraph(HALF_DRIVE)),
-        document.section(_sheets_heading(rows), document.table(*sheet_table(rows)),
-                         document.paragraph(AS_SCENES)),
+        *_sheets(rows),
+        *_stretched(rows, stretched),
         document.section("How it was computed", document.paragraph(METHOD),
                          document.table(*parameter_table()), document.paragraph(LEFT_OUT)),
         *_failed(rows),
@@ -193,12 +198,20 @@ def parameter_table() -> tuple[list[str], list[list[str]]]:
     return ["parameter", "of", "values, all equally likely"], rows
 
 
-def _sheets_heading(rows: Sequence[Row]) -> str:
-    best = sheets(rows)
-    full = sum(holds(best, "all")) if best else 0
-    if full == len(best) and best:
-        return "Sheets that show all five"
-    return "The sheets that come nearest" if not full else "Sheets that show all five, or nearly"
+def _sheets(rows: Sequence[Row]) -> Iterator[str]:
+    done = [row for row in rows if row["status"] == "done"]
+    parts = [document.paragraph(left_out(done))]
+    if sheets(done):
+        parts = [document.table(*sheet_table(done)), *parts, document.paragraph(AS_SCENES)]
+    yield document.section(heading(done), *parts)
+
+
+def _stretched(rows: Sequence[Row], stretched: Sequence[Row]) -> Iterator[str]:
+    if stretched:
+        yield document.section(
+            "At large deflection", document.table(*stretched_table(rows, stretched)),
+            *map(document.paragraph, filter(None, [refused_sentence(rows, stretched), LARGE])),
+        )  # fmt: skip
 
 
 def _failed(rows: Sequence[Row]) -> Iterator[str]:

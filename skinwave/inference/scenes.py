@@ -1,9 +1,11 @@
 """Scene file of a candidate, under one of the Tactons that were measured."""
 
+from dataclasses import replace
 from typing import Any
 
 import tomli_w
 
+from simple_model import Tacton
 from skinwave.inference import drive_laws
 from skinwave.inference.design import (
     CLIP_RADIUS,
@@ -13,11 +15,14 @@ from skinwave.inference.design import (
     Candidate,
     clips,
     middle,
+    pressure,
     probes,
     sizes,
     tensions,
     thickness,
 )
+from skinwave.scene import Scene
+from skinwave.scene_file import from_table
 
 EXTENSION = "skinwave.inference.registered_laws"
 TACTON = {"am_frequency_hz": 140.0, "shape": "circle", "size_mm": 20.0, "speed_m_per_s": 12.0}
@@ -25,23 +30,33 @@ TACTON = {"am_frequency_hz": 140.0, "shape": "circle", "size_mm": 20.0, "speed_m
 
 def scene_text(candidate: Candidate) -> str:
     """The scene file of a candidate under AM 140 Hz on the circle of 20 mm."""
-    table = {
-        "name": "a candidate of the sheet that was measured", "tacton": TACTON,
-        "focus": {
-            "height_mm": candidate["height_mm"], "drive": candidate["drive"],
-            "depth_of_modulation": candidate["depth_of_modulation"],
-        },
-        "body": _body(candidate),
-        "placement": {"offset_mm": _mm(middle(candidate))},
-        "probes": {
-            "points_mm": [_mm(point) for point in probes(candidate)],
-            "quantity": candidate["quantity"],
-        },
+    focus = {
+        "height_mm": candidate["height_mm"], "drive": candidate["drive"],
+        "depth_of_modulation": candidate["depth_of_modulation"],
     }  # fmt: skip
+    name = "a candidate of the sheet that was measured"
+    table = {"name": name, "tacton": TACTON, "focus": focus, **_measured(candidate)}
+    table["probes"]["quantity"] = candidate["quantity"]
     note = ""
     if candidate["drive"] in drive_laws.LAWS:
         note = f"# Read with SKINWAVE_EXTENSIONS={EXTENSION} in the environment.\n"
     return note + tomli_w.dumps(table)
+
+
+def scene_of(candidate: Candidate, tacton: Tacton) -> Scene:
+    """The scene of a candidate under a Tacton, read as displacement; its drive law need not be
+    registered.
+    """
+    return replace(from_table(_measured(candidate)), pressure=pressure(candidate, tacton))
+
+
+def _measured(candidate: Candidate) -> dict[str, Any]:
+    """Tables of the sheet, where it lies, and where it is measured."""
+    return {
+        "body": _body(candidate),
+        "placement": {"offset_mm": _mm(middle(candidate))},
+        "probes": {"points_mm": [_mm(point) for point in probes(candidate)]},
+    }
 
 
 def _body(candidate: Candidate) -> dict[str, Any]:

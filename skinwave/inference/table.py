@@ -18,8 +18,8 @@ from skinwave import record
 from skinwave.effort import Progress, one_thread, silent
 from skinwave.inference.assess import CLAIMED, row
 from skinwave.inference.design import PARAMETERS, Candidate, Parameter, name
+from skinwave.inference.ranking import Row, nearest
 from skinwave.outputs import output_file
-from skinwave.studies.claims import MUCH_LOWER
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.sweep import SweepOutcome
 
@@ -35,14 +35,15 @@ COLUMNS = {
     "error": "text", "seconds": "number",
     **{p.key: "text" if p.values else "number" for p in PARAMETERS},
     "first_mode_hz": "number", "mean_over_thickness": "number",
-    "vibration_over_thickness": "number", "second_harmonic_db": "number",
+    "vibration_over_thickness": "number", "sag_over_thickness": "number",
+    "second_harmonic_db": "number",
     **{f"{claim}_holds": "whole" for claim in CLAIMED},
     **{f"{claim}_value": "number" for claim in CLAIMED},
     "rival_db": "numbers", "rival_by_path_db": "numbers", "multiple_db": "numbers",
     "multiple_by_path_db": "numbers", "rival_of_mean_db": "number", "rival_line": "text",
-    "rival_tacton": "text", "tactons_highest": "whole", "tactons_much_lower": "whole",
+    "rival_tacton": "text", "multiple_tacton": "text",
+    "tactons_highest": "whole", "tactons_much_lower": "whole",
 }  # fmt: skip
-Row = Mapping[str, Any]
 
 
 def open_folder(out: Path, command: Mapping[str, Any]) -> None:
@@ -143,18 +144,6 @@ def offspring(rows: Sequence[Row], count: int, seed: int) -> list[Candidate]:
         {p.key: _moved(p, best[rng.integers(len(best))], parent, rng) for p in PARAMETERS}
         for parent in (best[rng.integers(len(best))] for _ in range(count))
     ]
-
-
-def nearest(rows: Sequence[Row]) -> list[Row]:
-    """Rows with a response, those first that show the most of M1 to M3, and of these those that
-    come nearest to what M4 and M5 ask.
-    """
-
-    def shortfall(row: Row) -> tuple[int, float]:
-        beyond = max(row["M4_value"], row["M5_value"] - MUCH_LOWER)
-        return -sum(row[f"{claim}_holds"] or 0 for claim in CLAIMED[:3]), beyond
-
-    return sorted((r for r in rows if r["M5_value"] is not None), key=shortfall)
 
 
 def _moved(p: Parameter, other: Row, parent: Row, rng: np.random.Generator) -> Any:

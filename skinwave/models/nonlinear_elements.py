@@ -3,6 +3,7 @@
 from functools import partial
 
 from skinwave.bodies.body import Body
+from skinwave.bodies.sheet import refuse_open_air
 from skinwave.models import Model, register
 from skinwave.models.laws import without_own_law
 from skinwave.models.linear_elements import vacuum_only
@@ -26,6 +27,7 @@ def _error(scene: Scene, h: float | None) -> float:
 
 def _refuse_of_reduced(body: Body) -> None:
     sheet_only(body, "fem-nonlinear")
+    refuse_open_air(body)
     without_own_law("fem-nonlinear", body)
 
 

@@ -18,8 +18,9 @@ from simple_model.plate_response import modal_path_forces
 from simple_model.sampling import shown
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
-from skinwave.effort import peak_memory
+from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, of_surface_motion, register
+from skinwave.models.prepared import sample_times
 from skinwave.models.sources import PLATES
 from skinwave.scene import Scene
 
@@ -74,6 +75,14 @@ def steady_answer(scene: Scene, request: Request) -> Response:
     return _response(scene, request, MODES.name, driven, values, started)
 
 
+def steady_lines(scene: Scene) -> tuple[Floats, Complex]:
+    """Frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity, in the steady
+    state; a ValueError of a load without lines.
+    """
+    driven = _driven(scene, Request(times=sample_times(scene), tolerance=ERROR, report=silent))
+    return driven.frequencies, _amplitudes(scene, driven, _motion(scene, driven))
+
+
 def answer_from_rest(scene: Scene, request: Request) -> Response:
     """The steady state and the free vibration that a start from rest leaves."""
     started, driven = time.perf_counter(), _driven(scene, request)
@@ -117,9 +126,13 @@ def _motion(scene: Scene, driven: Driven) -> Complex:
 
 def _steady(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
     """Steady state (t, p)."""
-    f = driven.frequencies
-    rates = scene.reading.asked.factor(2j * np.pi * f)[:, None]
-    return synthesise(f, motion @ driven.outputs.T * rates, times)
+    return synthesise(driven.frequencies, _amplitudes(scene, driven, motion), times)
+
+
+def _amplitudes(scene: Scene, driven: Driven, motion: Complex) -> Complex:
+    """Lines (f, p) of the quantity that is asked for."""
+    rates = scene.reading.asked.factor(2j * np.pi * driven.frequencies)[:, None]
+    return np.asarray(motion @ driven.outputs.T * rates)
 
 
 def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:

@@ -20,6 +20,7 @@ from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.load_spectrum import (
+    Complex,
     load_lines,
     path_fourier,
     path_samples,
@@ -188,6 +189,32 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
             estimate=sheet.modes.left_out,
         ),
     )  # fmt: skip
+
+
+def unstretched_lines(
+    scene: Scene, h: float | None = None, solver: str = "auto"
+) -> tuple[Floats, Complex]:
+    """Steady displacement of the modes of `reduced_answer` under each line of a load so small that
+    the sheet does not stretch: what is left of a difference is large deflection.
+
+    Parameters
+    ----------
+    scene : Scene, of the normal displacement
+    h, solver : as of a request
+
+    Returns
+    -------
+    frequencies (f,) in Hz and complex amplitudes (f, p) in metre
+    """
+    sheet = _reduced(scene.body, h or stretching_size(scene.body, reduced=True), solver)
+    hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
+    operators = sheet.modes.elastic.operators
+    K, C, one = operators.K.toarray(), operators.C.toarray(), np.eye(len(sheet.modes.hz))
+    w = 2 * pi * hz
+    z = [np.linalg.solve(K + 1j * each * C - each**2 * one, f)
+         for each, f in zip(w, forces, strict=True)]  # fmt: skip
+    shapes = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
+    return hz, np.array(z) @ shapes.T
 
 
 @lru_cache(maxsize=1)

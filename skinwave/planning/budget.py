@@ -2,13 +2,14 @@
 device leaves, all relative to the waveform of the worst probe.
 
 First order: a number is moved one standard deviation either way, the others stay; half of the
-difference of the waveforms counts, and those of independent numbers add as squares. By wavenumber
-integrals, in the steady state and about the mean; a palm is taken as flat layers as deep as its
-middle, and a body that is tilted as one that lies flat. Resonances of a sheet or of a body from a
-file depend on its sides, which these leave out: there only the effect of the pressure is known.
+difference of the waveforms counts, and those of independent numbers add as squares. In the steady
+state and about the mean: layers by wavenumber integrals, where a palm is taken as flat layers as
+deep as its middle, and a body that is tilted as one that lies flat; a held sheet by the modes of a
+linear plate. Resonances of a body from a file depend on its sides, and curled sheets have no such
+modes: there only the effect of the pressure is known.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 
@@ -20,6 +21,9 @@ from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import Complex
 from simple_model.numbers import percent, stated_error
 from skinwave.bodies.analytic import flattened
+from skinwave.models import takes
+from skinwave.models.plate_modes import MODES
+from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
 from skinwave.numbers import significant
 from skinwave.planning.extent import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
@@ -112,12 +116,13 @@ def _part(scene: Scene, spreads: Sequence[Spread]) -> float:
 
 def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
     """Half the difference (p,) of the motion at both ends of a number over that at its middle; None
-    without a wavenumber integral, or if the lines are at other frequencies.
+    without a closed form, or if the lines are at other frequencies.
     """
-    if not _has_lines(scene) or key.startswith(LEFT_OUT):
+    lines_of = _closed_form(scene)
+    if lines_of is None or (lines_of is _lines and key.startswith(LEFT_OUT)):
         return None
     try:
-        lines = [_lines(scene), *(_lines(with_values(scene, {key: end})) for end in ends)]
+        lines = [lines_of(scene), *(lines_of(with_values(scene, {key: end})) for end in ends)]
     except (ValueError, ArithmeticError):  # a number out of range, or next to no loss
         return None
     (f, centre), (f_low, low), (f_high, high) = lines
@@ -127,21 +132,31 @@ def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
     return np.linalg.norm(high - low, axis=0) / 2 / np.where(size > 0, size, np.inf)
 
 
-def _has_lines(scene: Scene) -> bool:
-    """Whether flat layers stand for a scene's body, and its load has lines."""
+def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | None:
+    """The steady lines of a scene and of those near it, by flat layers or by the modes of a plate;
+    None if neither stands for its body, or its load has no lines.
+    """
     body = scene.body
-    flat = body.of_kind.dispersion is not None and not body.of_kind.is_plate
     lossy = any(solid.has_loss for _, solid in body.strata)
-    moves = scene.tacton.trajectory.shape != "recorded" and scene.reading.is_plain
-    moves = moves and scene.load.is_normal
-    return bool(flat and lossy and moves)
+    if not lossy or scene.tacton.trajectory.shape == "recorded":
+        return None
+    if body.of_kind.is_plate:
+        return _of_plate if takes(MODES, scene) else None
+    flat = body.of_kind.dispersion is not None
+    return _lines if flat and scene.reading.is_plain and scene.load.is_normal else None
 
 
 def _lines(scene: Scene) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes."""
+    """Frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes, of flat layers."""
     pressure = replace(scene.pressure, profile="gaussian")
     compliance = layered(flattened(scene.body))
     f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=FAINT)
+    return f[f > 0], a[f > 0]
+
+
+def _of_plate(scene: Scene) -> tuple[Floats, Complex]:
+    """The same of a held sheet, in the quantity that its probes read."""
+    f, a = steady_lines_of_plate(scene)
     return f[f > 0], a[f > 0]
 
 

@@ -10,7 +10,6 @@ samples of the others would cost is said.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import isnan, sqrt
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import sample_times
 from skinwave.numbers import significant
-from skinwave.planning.budget import SIGMA, error_budget
+from skinwave.planning.budget import error_budget
 from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
 from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
@@ -106,8 +105,6 @@ class Sampler:
             some = len(found) in (FIRST, self.samples)
             yield _bands(scene, central, found, names, (first, *said)) if some else None
         budget = error_budget(scene, _numerical(scene, central))
-        if respond and isnan(budget.material):
-            budget = replace(budget, material=_of_material(scene, spreads, respond))
         first = f"Uncertainty of the waveform at the point: {budget.parts}."
         yield _bands(scene, central, found, names, (first, *said))
 
@@ -220,24 +217,6 @@ def _cost(left_out: Sequence[Spread], count: int, central: Response) -> tuple[st
         f"The spread of {keys} is not in the bands: each of {count} samples would be computed "
         f"anew{time}; skinwave run --samples {count} does.",
     )
-
-
-def _of_material(scene: Scene, spreads: Sequence[Spread], respond: Respond) -> float:
-    """Relative change of the waveform by one standard deviation of the material's numbers, as of
-    `planning.budget`, where that has no wavenumber integral.
-    """
-
-    def about_its_mean(values: Mapping[str, float]) -> Floats:
-        waveform = respond(with_values(scene, values)).values[:, 0]
-        return waveform - waveform.mean()
-
-    size, total = np.linalg.norm(about_its_mean({})), 0.0
-    for spread in spreads:
-        if spread.part == "material":
-            ends = spread.distribution.quantile(spread.value, SIGMA)
-            low, high = (about_its_mean({spread.key: float(end)}) for end in ends)
-            total += float(np.linalg.norm(high - low) / 2 / size) ** 2
-    return sqrt(total)
 
 
 def _numerical(scene: Scene, central: Response) -> float:

@@ -1,0 +1,117 @@
+"""A candidate at large deflection, under the Tactons that decide M1, M4 and M5.
+
+M1 is about each Tacton without a path; M4 and M5 are decided by the one under which, of the linear
+sheet, a rival of f_AM is strongest. The sheet is computed by `fem-nonlinear` from rest under the
+mean of the pressure, and by the modes of the same elements without stretching, in the steady state:
+what is left between the two is large deflection, and the start.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import Response
+from skinwave.inference.assess import as_run, claim_of, run_of
+from skinwave.inference.design import PARAMETERS, Candidate, thickness
+from skinwave.inference.nearest_sheets import distinct
+from skinwave.inference.ranking import Row
+from skinwave.inference.scenes import scene_of
+from skinwave.models import named
+from skinwave.models.stretching import MOST_MODES, unstretched_lines
+from skinwave.planning.sheets import modes_below
+from skinwave.run import Run
+from skinwave.simulation import compute
+from skinwave.studies.paper15 import tactons
+
+MODEL = "fem-nonlinear"
+HIGHEST = 420.0  # Hz: 2 f_AM, the highest of the lines that decide M4 and M5
+STEP = 1e-4  # s; the frequency of a mode at 420 Hz is 0.6 % low
+ALONE = tuple(name for name, each in tactons()
+              if each.am_frequency and not each.trajectory.size)  # fmt: skip
+CLAIMS = ("M1", "M4", "M5")
+
+
+def candidate_of(row: Row) -> Candidate:
+    """The candidate of a row."""
+    return {p.key: row[p.key] for p in PARAMETERS}
+
+
+def refusal(row: Row) -> str:
+    """Why a candidate's sheet is not computed at large deflection; empty if it is."""
+    body = scene_of(candidate_of(row), next(tactons())[1]).body
+    try:
+        named(MODEL).refuse(body)
+    except ValueError as error:
+        return str(error)
+    if (count := modes_below(body, HIGHEST)) > MOST_MODES:
+        return (
+            f"it has about {count:.0f} modes below {HIGHEST:.0f} Hz, of which {MODEL} takes "
+            f"{MOST_MODES}"
+        )
+    return ""
+
+
+def stretched_sheets(rows: Sequence[Row], count: int) -> list[Row]:
+    """The nearest sheets, each of another size or support, that large deflection is computed of."""
+    return list(islice(distinct(rows, lambda row: not refusal(row)), count))
+
+
+def deciding(row: Row) -> list[str]:
+    """Names of the Tactons that decide M1, M4 and M5 of a sheet."""
+    return list(dict.fromkeys((*ALONE, row["rival_tacton"], row["multiple_tacton"])))
+
+
+def claims_of(row: Row, tacton: str) -> list[str]:
+    """The claims that a Tacton decides."""
+    by = {"M1": tacton in ALONE, "M4": tacton == row["rival_tacton"],
+          "M5": tacton == row["multiple_tacton"]}  # fmt: skip
+    return [claim for claim in CLAIMS if by[claim]]
+
+
+def stretched_row(sheet: Row, tacton: str) -> dict[str, Any]:
+    """Row of a sheet under a Tacton: which of the claims that it decides hold, or an error."""
+    started = time.perf_counter()
+    found: dict[str, Any] = {"sheet": sheet["key"], "tacton": tacton, "status": "done"}
+    try:
+        found |= _compared(sheet, tacton)
+    except (ValueError, ArithmeticError, MemoryError) as error:
+        found |= {"status": "failed", "error": " ".join(str(error).split())}
+    return found | {"seconds": time.perf_counter() - started}
+
+
+def _compared(sheet: Row, tacton: str) -> dict[str, Any]:
+    candidate = candidate_of(sheet)
+    scene = scene_of(candidate, dict(tactons())[tacton])
+    f, u = unstretched_lines(scene)
+    response = compute(scene, MODEL, dt=STEP)
+    columns: dict[str, Any] = {
+        "linear_over_thickness": _mean(u[f < 1e-9].real.sum(axis=0)) / thickness(candidate),
+        "large_over_thickness": _mean(response.values.mean(axis=0)) / thickness(candidate),
+    }
+    heard = f < 0.5 / STEP
+    runs = {"linear": as_run(candidate, tacton, f[heard], u[heard]),
+            "large": _read(candidate, tacton, response)}  # fmt: skip
+    for words, run in runs.items():
+        columns.update(_levels(sheet, tacton, words, run))
+    return columns
+
+
+def _mean(values: Floats) -> float:
+    return float(np.abs(values).max())
+
+
+def _levels(sheet: Row, tacton: str, words: str, run: Run) -> Iterator[tuple[str, float | None]]:
+    for claim in claims_of(sheet, tacton):
+        holds, value = claim_of(claim, [run])
+        yield f"{claim}_{words}_holds", holds
+        yield f"{claim}_{words}", value
+
+
+def _read(candidate: Candidate, tacton: str, response: Response) -> Run:
+    """A displacement in the quantity that a candidate reads."""
+    values = response.values if candidate["quantity"] == "displacement" else response.velocity
+    return run_of(candidate, tacton, response.times, values)
