@@ -105,7 +105,8 @@ def macroelements(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
     split along a diagonal, the box. An element left between joins a neighbour's or, without one,
     stays alone.
     """
-    middles, ends = mesh.tets[:, 4:], mesh.points[mesh.tets[:, EDGES]]
+    points = mesh.points if mesh.unmoved is None else mesh.unmoved
+    middles, ends = mesh.tets[:, 4:], points[mesh.tets[:, EDGES]]
     lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
     around = np.bincount(middles.ravel(), minlength=len(mesh.points))
     beyond = neighbours(mesh.tets)

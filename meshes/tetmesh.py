@@ -51,6 +51,8 @@ class TetMesh:
     region : (m,) int, number of the material of each tetrahedron; all 0 if not given.
     region_names : region number -> name, of those that have one.
     facets : name -> (k, 3) or (k, 6) int, boundary facets seen from outside.
+    unmoved : (n, 3) float, metre, of a mesh whose nodes were moved: the points before, by whose
+        edges elements are grouped; the points themselves if not given.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class TetMesh:
     region: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     facets: Mapping[str, Ints] = field(default_factory=dict)
     region_names: Mapping[int, str] = field(default_factory=dict)
+    unmoved: Floats | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -79,6 +82,11 @@ class TetMesh:
             raise MeshError(
                 f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per "
                 "element, 0 or above"
+            )
+        if self.unmoved is not None and self.unmoved.shape != points.shape:
+            raise MeshError(
+                f"unmoved has shape {self.unmoved.shape} for {len(points)} points; give each of "
+                "them as it was, or none"
             )
         facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
@@ -237,8 +245,9 @@ def part(mesh: TetMesh, inside: NDArray[np.bool_]) -> tuple[TetMesh, Ints]:
 
     facets = {name: of_it(each) for name, each in mesh.facets.items()}
     found = replace(
-        mesh, points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets
-    )
+        mesh, points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets,
+        unmoved=None if mesh.unmoved is None else mesh.unmoved[nodes],
+    )  # fmt: skip
     return found, nodes
 
 

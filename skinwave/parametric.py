@@ -309,7 +309,7 @@ def _symmetry(scene: Scene) -> str:
 
 
 def _probes(scene: Scene, body: Body, build: Build) -> sparse.csr_array:
-    """What the probes read of a mesh, (p c, 3 n)."""
+    """Probe operator (p c, 3 n) of a mesh."""
     places = images(scene.probe_points, build.symmetry)
     return probe_rows(body, build, places, scene.reading)[0]
 

@@ -52,8 +52,9 @@ def test_a_planned_mesh_is_accurate_and_smaller_than_a_uniform_one(body, toleran
     assert found.prepared.effort.dofs < 0.75 * uniform.dofs
 
 
-def test_error_of_a_planned_mesh_is_that_from_the_analytic_solution():
+def test_error_of_a_planned_mesh_is_that_from_the_analytic_solution(monkeypatch):
     """Of a slab whose sides absorb, whose absorbing layer keeps its own lines."""
+    monkeypatch.setattr("skinwave.planning.goal_oriented.SMALL", 0)
     scene = scene_of(Body(width=0.06, height=0.06), ((0.0, 0.0), (0.005, 0.0)),
                      Tacton(am_frequency=140, duration=0.05))  # fmt: skip
     found = plan(scene, 0.05, model="fem")
@@ -133,10 +134,19 @@ def test_bodies_with_grid_lines_have_goal_oriented_meshes(body, expected):
                                                 back="clamped")),
     ],
 )  # fmt: skip
-def test_bodies_that_are_no_mirror_image_are_planned(body):
+def test_bodies_that_are_no_mirror_image_are_planned(monkeypatch, body):
+    monkeypatch.setattr("skinwave.planning.goal_oriented.SMALL", 0)
     found = plan(scene_of(body), 0.3)
     assert found.error < 0.3
     assert "goal-oriented" in size_row(found).reason
+
+
+@pytest.mark.parametrize(("tolerance", "expected"), [(0.2, False), (0.03, True)])
+def test_a_small_uniform_mesh_is_taken_where_it_is_accurate_enough(tolerance, expected):
+    body = replace(LAYERED, layers=())
+    row = size_row(plan(scene_of(body, ((0.0, 0.0),)), tolerance))
+    assert ("goal-oriented" in row.reason) == expected
+    assert ("refined until less than 20 % is left" in row.reason) != expected
 
 
 def test_a_load_of_nothing_has_a_uniform_mesh():

@@ -243,19 +243,46 @@ LAYERED = Body(
 THICK = {"body.layers.0.thickness_mm": (2.0, 4.0), "body.thickness_mm": (8.0, 12.0)}
 
 
-def test_matrices_of_a_stretched_slab_are_sums_over_known_geometries():
-    keys = free_keys(LAYERED, THICK)
-    bodies = parametric._range(LAYERED, keys, 8e-3)
+@pytest.mark.parametrize(
+    "layered", [LAYERED, replace(LAYERED, kind="disc", sides="absorbing")], ids=["slab", "disc"]
+)
+def test_matrices_of_a_stretched_body_are_sums_over_known_geometries(layered):
+    keys = free_keys(layered, THICK)
+    bodies = parametric._range(layered, keys, 5e-3)
     assert len(bodies.geometries) == 5  # 1, two thicknesses and their inverses
     at = [key.share(value) for key, value in zip(keys, (2.7, 11.0), strict=True)]
     shares = geometry_shares(bodies, at)
     assert shares.sum() == pytest.approx(1)
     wanted = operators(build_at(bodies, at))
     known = [operators(build_at(bodies, each)) for each in bodies.geometries]
-    for one in "KM":
+    for one in "KCM":
         A = getattr(wanted, one)
         found = sum(s * getattr(each, one) for s, each in zip(shares, known, strict=True))
         assert abs(found - A).max() < 1e-9 * abs(A).max()
+
+
+def test_elements_of_a_disc_do_not_cross_its_layers():
+    made = build(replace(LAYERED, kind="disc"), 5e-3).mesh
+    depths = -made.points[made.tets[:, :4], 2]
+    upper = made.region == 0
+    assert depths[upper].max() == pytest.approx(3e-3)
+    assert depths[~upper].min() == pytest.approx(3e-3)
+
+
+def test_the_thickness_of_a_disc_is_free():
+    disc = replace(BODIES["silicone-disc"], width=0.03, height=0.03, depth=0.01)
+    tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.01, speed=3.0))
+    pressure = MovingPressure(tacton=tacton)
+    scene = Scene(pressure=pressure, body=disc, probes=((0.0, 0.0), (4e-3, 3e-3)))
+    key = "body.thickness_mm"
+    prepared = skinwave.prepare(scene, {key: (8.0, 11.0)}, 0.02, h=5e-3)
+    for thickness in (8.0, 9.7):
+        frequencies, found = parametric.lines(prepared, {key: thickness})
+        made = build_at(prepared.bodies, [prepared.keys[0].share(thickness)])
+        assert made.mesh.points[:, 2].min() == pytest.approx(-1e-3 * thickness)
+        strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
+        expected = full_lines(scene, disc, frequencies[strong], made=made)
+        assert line_errors(found[strong], expected).max() < 0.01
 
 
 def test_thicknesses_are_free():

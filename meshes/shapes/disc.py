@@ -1,15 +1,17 @@
 """Cylinder on its base, of triangles in rings that are extruded."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from meshes.facets import tag_boundary
-from meshes.shapes.structured import check_size, extruded, round_up
+from meshes.shapes.structured import check_size, extruded, round_up, with_planes
 from meshes.tetmesh import Floats, Ints, MeshError, TetMesh
 
 SECTORS = 8  # so that no element crosses x = 0 or y = 0
 
 
-def disc(diameter: float, thickness: float, h: float) -> TetMesh:
+def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = ()) -> TetMesh:
     """Ten-node tetrahedra of a cylinder below the plane z = 0, about the z axis: a prism on a
     polygon of 8 sides for each ring of elements.
 
@@ -17,6 +19,7 @@ def disc(diameter: float, thickness: float, h: float) -> TetMesh:
     ----------
     diameter, thickness : float, metre
     h : float, metre, largest edge along a radius and downwards
+    planes : depths in metre that elements do not cross
 
     Returns
     -------
@@ -31,9 +34,10 @@ def disc(diameter: float, thickness: float, h: float) -> TetMesh:
         if not 0 < length < np.inf:
             raise MeshError(f"{name} = {length} m of a disc must be finite and above 0")
     rings, layers = (max(2, round_up(length / h)) for length in (diameter / 2, thickness))
-    check_size((2 * rings, 2 * rings, layers), order=2)
+    down = with_planes(np.linspace(0.0, thickness, layers + 1), planes)
+    check_size((2 * rings, 2 * rings, len(down) - 1), order=2)
     plane, triangles = _rings(rings)
-    mesh = extruded(plane * diameter / 2, triangles, np.linspace(-thickness, 0.0, layers + 1))
+    mesh = extruded(plane * diameter / 2, triangles, -down[::-1])
     return tag_boundary(
         mesh,
         bottom=lambda centroids, normals: normals[:, 2] < -0.9,

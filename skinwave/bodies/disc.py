@@ -1,5 +1,10 @@
 """Disc: a cylinder on its base, such as a silicone that stands for skin."""
 
+from dataclasses import replace
+
+import numpy as np
+
+from meshes import TetMesh
 from meshes.shapes.disc import disc
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
@@ -21,8 +26,35 @@ def check(body: Body) -> None:
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra of at most h in metre, in even rings and layers."""
-    mesh = disc(body.width, body.depth, h)
+    """Ten-node tetrahedra of at most h in metre, in even rings and the body's layers."""
+    return _in_strata(body, disc(body.width, body.depth, h, _interfaces(body)[1:-1]))
+
+
+def morph(body: Body, h: float, *, reference: Body) -> Discretised:
+    """Mesh of a reference whose layers are stretched to those of the body.
+
+    Parameters
+    ----------
+    body : Body
+    h : metre, element size of the reference
+    reference : Body, of the same diameter and materials
+
+    Returns
+    -------
+    Discretised
+    """
+    mesh = discretise(reference, h).mesh
+    points = mesh.points.copy()
+    points[:, 2] = -np.interp(-points[:, 2], _interfaces(reference), _interfaces(body))
+    return _in_strata(body, replace(mesh, points=points, unmoved=mesh.points))
+
+
+def _interfaces(body: Body) -> list[float]:
+    """Depths in metre where its layers begin, and where the last one ends."""
+    return [*(start for start, _ in body.strata), body.depth]
+
+
+def _in_strata(body: Body, mesh: TetMesh) -> Discretised:
     depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh, materials = in_layers(mesh, body.strata, depths)
     return Discretised(mesh=mesh, materials=materials)
@@ -40,6 +72,7 @@ DISC = register(
         check=check,
         words=lambda body: f"disc of {1e3 * body.width:g} x {1e3 * body.depth:g} mm",
         discretise=discretise,
+        morph=morph,
         default_size=lambda body: min(body.width / 20, body.depth / 4),
         is_symmetric=True,
     )

@@ -91,8 +91,18 @@ def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
 
 
 def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
-    """The mesh that all have, moved to the thicknesses at shares (k,) of the range; of the
-    materials that it was meshed with. The `symmetry` is as of `bodies.build.build`.
+    """Mesh that all have, moved to the thicknesses of a body; of the materials that it was
+    meshed with.
+
+    Parameters
+    ----------
+    bodies : Range
+    at : (k,) shares of the range
+    symmetry : as of `bodies.build.build`
+
+    Returns
+    -------
+    Build
     """
     reference = bodies.body(bodies.meshed)
     if len(bodies.geometries) == 1:

@@ -29,6 +29,8 @@ from skinwave.planning.refinement import (
     FIRST,
     Convergence,
     Refined,
+    element_sizes,
+    finer_sizes,
     quantity_of_interest,
     refined,
     relative_change,
@@ -44,6 +46,7 @@ AIM = 0.8  # of the tolerance, so that one goal-oriented mesh is enough
 # Ratio of the errors of two meshes: more alike they change too little to tell, and estimates of a
 # coarse mesh are not followed further.
 MOST_ALIKE, LEAST_ALIKE = 0.5, 0.05
+SMALL = 4000  # degrees of freedom of a uniform mesh that is tried before
 MESHES, MOST_DOFS = 3, 250_000  # goal-oriented meshes that are tried, and the largest, about
 GROWTH, FINER = 1.05, 0.95  # between two choices, of degrees of freedom and of element sizes
 PER_WAVELENGTH = 2  # cells at least
@@ -88,7 +91,8 @@ def goal_refined(
     solver: str = "auto",
 ) -> Refined:
     """Goal-oriented mesh that is accurate to a tolerance, with its expected error; that of
-    `refined` where no structured mesh follows the body, or nothing moves.
+    `refined` where no structured mesh follows the body or nothing moves, and where a coarse one is
+    accurate enough.
 
     Parameters
     ----------
@@ -99,11 +103,32 @@ def goal_refined(
     Refined; the last mesh that is tried, with its error, if that is not accurate either
     """
     check_mesh(body, default_size(body))
+    if size := _small_size(scene, body, symmetry):
+        found = refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver, h=size)
+        if found.convergence is Convergence.REACHED:
+            return found
     try:
-        found = _goal_refined(scene, body, tolerance, progress or silent, symmetry, solver)
+        goal = _goal_refined(scene, body, tolerance, progress or silent, symmetry, solver)
     except MeshError:
-        found = None
-    return found or refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver)
+        goal = None
+    return goal or refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver)
+
+
+def _small_size(scene: Scene, body: Body, symmetry: str) -> float | None:
+    """Element size in metre of a uniform mesh of one material that costs less than an estimate and
+    its mesh; None if it does not.
+    """
+    grid, sizes = body.of_kind.grid, element_sizes(body)
+    assert grid  # else not asked for
+    size = float(finer_sizes(sizes, sizes[0])[0])
+    axes = modelled_axes(body, scene.probe_points, symmetry, scene.reading, scene.load)
+    small = _dofs(halves(grid.lines(body, size), axes)) < SMALL
+    return size if small and len(body.strata) == 1 else None
+
+
+def _dofs(lines: Lines) -> float:
+    """Degrees of freedom of a large grid between lines, without any absorbing layer."""
+    return PER_CELL * float(np.prod([len(line) - 1 for line in lines]))
 
 
 def _goal_refined(
@@ -259,8 +284,7 @@ def _fewest(
     three (m_a,) in metre through the part that is modelled, and the ratio that is predicted
     """
     multiples = [1 if a in axes else n for a, n in zip("xyz", EVEN, strict=True)]
-    # An absorbing layer has its own.
-    dofs = PER_CELL * float(np.prod([len(line) - 1 for line in halves(before, axes)]))
+    dofs = _dofs(halves(before, axes))
     while True:
         dofs *= GROWTH
         lines = equidistributed(

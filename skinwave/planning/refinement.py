@@ -156,7 +156,7 @@ def refined(
     check_mesh(body, h or default_size(body))
     sizes = element_sizes(body)
     before = compared_with(body, h) if h else sizes[0]
-    size = h or _finer(sizes, before)[0]
+    size = h or finer_sizes(sizes, before)[0]
     coarse, other = answered(before)
     while True:
         prepared, found = answered(size)
@@ -168,7 +168,7 @@ def refined(
                 h=size, convergence=outcome, error=error, compared=before, prepared=prepared
             )
         before, coarse, other = size, prepared, found
-        size = CONTROLLER.nearest(_finer(sizes, size), size, error, tolerance)
+        size = CONTROLLER.nearest(finer_sizes(sizes, size), size, error, tolerance)
 
 
 def element_sizes(body: Body) -> Floats:
@@ -193,8 +193,10 @@ def element_sizes(body: Body) -> Floats:
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
 
-def _finer(sizes: Floats, size: float) -> Floats:
-    """Sizes that are finer by `RATIO` or more; the last if none is."""
+def finer_sizes(sizes: Floats, size: float) -> Floats:
+    """Sizes of a sequence that are finer than one, in metre, by `RATIO` or more; the last if none
+    is.
+    """
     coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
