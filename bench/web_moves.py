@@ -11,7 +11,10 @@ from playwright.sync_api import TimeoutError as NotThere
 
 from skinwave.web.controls import CHOICES, NUMBERS, presets
 
-SAVED = ("scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "report-html")
+SAVED = (
+    "scene-toml", "waveform-csv", "waveform-wav", "figure-svg", "figure-png", "column-pdf",
+    "report-html",
+)  # fmt: skip
 PULSES = ("", "100/50", "40/20, 10/30", "5/5")
 Page = Any
 
@@ -130,7 +133,7 @@ def select(page: Page, rng: random.Random) -> None:
 def button(page: Page, rng: random.Random) -> None:
     page.evaluate(
         "id => document.getElementById(id)?.click()",
-        rng.choice(["undo", "redo", "pin", "swap", "solid", "theme", "cancel", "body-play"]),
+        rng.choice(["undo", "redo", "pin", "swap", "solid", "theme", "cancel", "play"]),
     )
 
 

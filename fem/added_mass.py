@@ -21,6 +21,8 @@ of a mode u with a net volume displacement: 0.006 to 0.007 for such
 modes of a clamped sheet of office paper, 100 mm wide, below 300 Hz, where paper's own is 0.03.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -108,7 +108,8 @@ def assemble_affine(
     found = [assembled(each, absorbing=absorbing, support=dashpots_only) for each in alone]
     layer = [] if drag is None else [assembled(each, drag=drag).R for each in alone]
     free = found[0].free
-    held = () if support is None else (springs(mesh, support)[free][:, free],)
+    is_sprung = support and support.stiffness.any()
+    held = (springs(mesh, support)[free][:, free],) if support and is_sprung else ()
     return AffineOperators(
         stiffness=tuple(o.K for o in found), mass=tuple(o.M for o in found),
         dashpots=_present([o.R for o in found]), layer=_present(layer), springs=_present(held),

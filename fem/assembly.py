@@ -18,6 +18,8 @@ without that volumetric locking makes displacements some wavelengths away severa
 small.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -30,9 +32,10 @@ from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.coat import Coat, coat_operators
 from fem.combination import Laws, proportional, with_added
 from fem.elements import shape_functions, tetrahedron_rule
-from fem.geometry import gradient_products, jacobians, shape_nodes
+from fem.geometry import gradient_integrals, jacobians, shape_nodes
 from fem.materials import Material
 from fem.maxwell import Branch, MaxwellBranch, on_free
+from fem.memory import check_memory
 from fem.plane_stiffness import (
     SIDES,
     Tension,
@@ -44,11 +47,10 @@ from fem.pressure_projection import projected_divergence
 from fem.sparsity import (
     UPPER,
     SparsityPattern,
-    from_blocks,
-    from_components,
-    from_nodal,
+    in_each_direction,
+    restricted,
+    selected,
     slabs,
-    starts_of_kept,
 )
 from fem.viscoelastic import Matrices, property_of, rayleigh_rates, together, viscoelastic
 from meshes import TetMesh, facet_set
@@ -60,7 +62,9 @@ UNPROJECTED = (
 )
 
 
-# K of shares (r,) of each material's moduli, and M of their densities (r,), on all dofs.
+Materials = Material | Mapping[int, Material]
+Fixed = str | Mapping[str, str] | ArrayLike
+# K of shares (r,) of each material's moduli, and M of their densities (r,), on the free dofs.
 Volume = tuple[Callable[[Floats], sparse.csr_array], Callable[[Floats], sparse.csr_array]]
 
 
@@ -91,17 +95,48 @@ class Operators:
         return full
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MovingNodes:
+    """Nodes (n,) that have a free component, their sparsity pattern, and the free ones (f,) among
+    their components.
+    """
+
+    nodes: Ints
+    pattern: SparsityPattern
+    free: Ints
+
+    @staticmethod
+    def of(mesh: TetMesh, free: Ints) -> MovingNodes:
+        """Those of a mesh with free degrees of freedom (f,)."""
+        nodes = np.unique(free // 3)
+        number = np.full(len(mesh.points), len(nodes))
+        number[nodes] = np.arange(len(nodes))
+        return MovingNodes(
+            nodes=nodes,
+            pattern=SparsityPattern.of(number[mesh.tets], len(nodes)),
+            free=3 * number[free // 3] + free % 3,
+        )
+
+    def on_free(self, A: Any) -> sparse.csr_array:
+        """A matrix on these nodes on the free degrees of freedom."""
+        return restricted(A, self.free)
+
+    def of_elements(self, own: NDArray[np.bool_] | Ints) -> SparsityPattern:
+        """The pattern with the slots of some of the elements."""
+        return replace(self.pattern, slot=self.pattern.slot[own])
+
+
 def assemble(
     mesh: TetMesh,
-    material: Material | Mapping[int, Material],
+    material: Materials,
     *,
-    fixed: str | Mapping[str, str] | ArrayLike = "clamped",
+    fixed: Fixed = "clamped",
     absorbing: str | Ints | None = None,
     drag: Floats | None = None,
     support: Support | None = None,
     coat: Coat | None = None,
     tension: Tension | None = None,
-    axes: Floats = SIDES,
+    axes: Floats | None = None,
     stiffener: sparse.csr_array | None = None,
 ) -> Operators:
     """Assemble the operators of a body.
@@ -117,7 +152,8 @@ def assemble(
     support : springs and dashpots of a surface as functions of position, or None
     coat : thin layers at a surface, in place of the material that is meshed there, or None
     tension : in-plane tension of a sheet along its sides, or None
-    axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched
+    axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched,
+        those of the coordinates if not given
     stiffener : (3 n, 3 n) N/m, elastic stiffness beside that of the elements, such as that of a
         `shallow_shell`, which scales with the modulus of the first material; or None
 
@@ -132,38 +168,41 @@ def assemble(
         If a region has no material, or no degree of freedom is left.
     MeshError
         If a facet set is unknown or an element is inverted.
+    MemoryError
+        If there is no memory for the matrices.
     """
     materials, region = by_region(mesh, material)
-    pattern = SparsityPattern.of(mesh.tets, len(mesh.points))
     free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
+    check_memory(len(free))
+    nodes = MovingNodes.of(mesh, free)
 
     share = tension.share if tension else None
-    volume = _volume(mesh, pattern, materials, region, axes, stiffener)
-    beside = sparse.csr_array((mesh.n_dofs, mesh.n_dofs))  # of K
+    axes = SIDES if axes is None else axes
+    volume = _volume(mesh, nodes, materials, region, axes, stiffener)
+    beside = R = sparse.csr_array((len(free), len(free)))  # of K, and of C
     if support is not None and support.stiffness.any():
-        beside = beside + springs(mesh, support)
+        beside = beside + restricted(springs(mesh, support), free)
     if tension is not None:
-        beside = beside + tension_stiffness(mesh, pattern, tension, axes)
-    R = sparse.csr_array(beside.shape)
+        beside = beside + nodes.on_free(tension_stiffness(mesh, nodes.pattern, tension, axes))
     if absorbing is not None:
-        R = R + dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+        leaky = dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+        R = R + restricted(leaky, free)
     if support is not None and support.absorbed.any():
-        R = R + dashpots(mesh, support.facets, materials, region, support.absorbed)
+        leaky = dashpots(mesh, support.facets, materials, region, support.absorbed)
+        R = R + restricted(leaky, free)
     if drag is not None:
-        R = R + _drag(mesh, pattern, property_of(materials, "density")[region] * drag)
-    beside, R = restricted(beside, free), restricted(R, free)
+        R = R + _drag(mesh, nodes, property_of(materials, "density")[region] * drag)
     if len(materials) == 1 and materials[0].law is None:
-        found = _of_one_material(materials[0], volume, share, (beside, R), free, mesh.n_dofs)
+        K, M = volume[0](np.ones(1)), volume[1](np.array([materials[0].density]))
+        del volume  # whose parts free their memory
+        rates = rayleigh_rates(materials[0], share)
+        found = _of_one_material(materials[0], (K, M), rates, (beside, R), free, mesh.n_dofs)
     else:
         K, C, M, branches = viscoelastic(materials, *volume, share)
-        del volume  # whose parts, and then each whole matrix, free their memory
-        K = restricted(K, free)
-        C = restricted(C, free)
-        M = restricted(M, free)
+        del volume
         K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
-        branches = on_free(branches, free)
         found = Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
     if coat is None:
         return found
@@ -172,8 +211,8 @@ def assemble(
 
 def _of_one_material(
     m: Material,
-    volume: Volume,
-    share: Callable[[Floats], Floats] | None,
+    volume: tuple[sparse.csr_array, sparse.csr_array],
+    rates: tuple[float, float],
     surfaces: tuple[sparse.csr_array, sparse.csr_array],
     free: Ints,
     n_dofs: int,
@@ -181,13 +220,9 @@ def _of_one_material(
     """Operators of one material, whose C and branches are combinations of K and M: with what K has
     beside its stiffness, and R, on the free degrees of freedom.
     """
-    beside, R = surfaces
-    K, M = (
-        restricted(volume[0](np.ones(1)), free),
-        restricted(volume[1](np.ones(1) * m.density), free),
-    )
+    (K, M), (beside, R) = volume, surfaces
     K = K + beside if beside.nnz else K
-    laws, times = proportional(m, rayleigh_rates(m, share), surfaces)
+    laws, times = proportional(m, rates, surfaces)
     each = zip(laws.branches, times, strict=True)
     return Operators(
         K=K, C=laws.damping.of(K, M), M=M, R=R, free=free, n_dofs=n_dofs, laws=laws,
@@ -212,54 +247,37 @@ def _coated(body: Operators, coat: Matrices) -> Operators:
 
 def _volume(
     mesh: TetMesh,
-    pattern: SparsityPattern,
+    nodes: MovingNodes,
     materials: list[Material],
     region: Ints,
     axes: Floats,
-    stiffener: sparse.csr_array | None,
+    stiffener: sparse.sparray | None,
 ) -> Volume:
-    """K of a share (r,) of each material's moduli, and M of densities (r,), on all dofs."""
+    """K of a share (r,) of each material's moduli, and M of densities (r,), on the free dofs."""
     mu, lam = (property_of(materials, name) for name in ("shear_modulus", "first_lame"))
     direct = direct_part(lam, mu) if mesh.order == 2 else lam
-    D = {
-        m: (lam - direct)[m] ** 0.5 * projected_divergence(elements_of(mesh, region == m))
-        for m in np.flatnonzero(lam > direct).tolist()
-    }
-    beside: dict[int, Any] = {m: D[m].T @ D[m] for m in D}
-    for dilatation in beside.values():
-        dilatation.sort_indices()  # its blocks, so that no later sum has to sort their entries
+    beside: dict[int, Any] = {}
+    for m in np.flatnonzero(lam > direct).tolist():
+        D = (lam - direct)[m] ** 0.5 * projected_divergence(elements_of(mesh, region == m))
+        D = selected(D, np.arange(D.shape[0] // 4), nodes.nodes)
+        beside[m] = (D.T @ D).T  # symmetric, but now it is sorted, which sums need
     for m, added in directional_parts(materials).items():
         own = region == m
-        part = replace(pattern, slot=pattern.slot[own])
-        extra = orthotropic_stiffness(elements_of(mesh, own), part, added, axes)
-        beside[m] = beside.get(m, 0) + extra
+        part = orthotropic_stiffness(elements_of(mesh, own), nodes.of_elements(own), added, axes)
+        beside[m] = beside.get(m, 0) + part
     if stiffener is not None:
-        beside[0] = beside.get(0, 0) + stiffener
-
-    blocked = [part.format == "bsr" for part in beside.values()]
+        blocks = sparse.bsr_array(stiffener, blocksize=(3, 3))
+        beside[0] = beside.get(0, 0) + selected(blocks, nodes.nodes, nodes.nodes)
 
     def stiffness(share: Floats) -> sparse.csr_array:
         blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])
-        whole = from_blocks if beside and all(blocked) else from_components
-        summed = whole(pattern, pattern.sum(blocks, 6))
         parts = (part if share[m] == 1 else share[m] * part for m, part in beside.items())
-        return sum(parts, start=summed).tocsr()
+        return nodes.on_free(sum(parts, start=nodes.pattern.blocks(blocks)))
 
-    return stiffness, lambda rho: _mass(mesh, pattern, rho[region])
+    def mass(rho: Floats) -> sparse.csr_array:
+        return nodes.on_free(_mass(mesh, nodes.pattern, rho[region]))
 
-
-def restricted(A: sparse.csr_array, free: Ints) -> sparse.csr_array:
-    """Rows and columns of a matrix that are free, in rising order."""
-    n, A = A.shape[0], A.tocsr()
-    if len(free) == n:
-        return A
-    number = np.full(n, -1, A.indices.dtype)
-    number[free] = np.arange(len(free))
-    columns = number[A.indices]
-    kept = (columns >= 0) & np.repeat(number >= 0, np.diff(A.indptr))
-    starts = starts_of_kept(kept, A.indptr)
-    indptr = np.append(starts[free], starts[-1])
-    return sparse.csr_array((A.data[kept], columns[kept], indptr), shape=(len(free), len(free)))
+    return stiffness, mass
 
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:
@@ -286,39 +304,36 @@ def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[
     blocks : (6, e, a, b) float, N/m, for the components (i, j) in UPPER; those below the diagonal
         are these, transposed
     """
-    for slab, H in gradient_products(mesh):
-        l2, m2 = lam[slab, None, None], mu[slab, None, None]
-        shear = m2 * np.einsum("eiaib->eab", H)
-        blocks = np.empty((6, *shear.shape))
-        for block, (i, j) in zip(blocks, UPPER, strict=True):
-            np.multiply(l2, H[:, i, :, j], out=block)
-            block += m2 * H[:, j, :, i]
-            if i == j:
-                block += shear
-        yield slab, blocks
+
+    def elastic(slab: slice, G: Floats) -> Floats:
+        l2, m2 = lam[slab, None], mu[slab, None]
+        shear = m2 * (G[0, 0] + G[1, 1] + G[2, 2])
+        return np.array([l2 * G[i, j] + m2 * G[j, i] + (i == j) * shear for i, j in UPPER])
+
+    return gradient_integrals(mesh, elastic)
 
 
 def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Element mass matrices (1, e, a, b) in kg, each with the slice of its elements."""
+    """Element mass matrices (e, a, b) in kg, some elements at a time, with their slice."""
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     N = shape_functions(tetrahedron_rule(5)[0], n_nodes)
     NN = np.einsum("qa,qb->qab", N, N).reshape(len(N), -1)
     for slab in slabs(len(mesh.tets)):
         weights = rho[slab, None] * jacobians(shapes[slab], 5, slab.start)[2]
-        yield slab, (weights @ NN).reshape(1, -1, n_nodes, n_nodes)
+        yield slab, (weights @ NN).reshape(-1, n_nodes, n_nodes)
 
 
 def _mass(mesh: TetMesh, pattern: SparsityPattern, rho: Floats) -> sparse.csr_array:
-    """Consistent mass matrix int rho N_a N_b dV (3 n, 3 n)."""
-    return from_nodal(pattern, pattern.sum(element_masses(mesh, rho), 1)[0])
+    """Consistent mass matrix int rho N_a N_b dV on the nodes of a pattern."""
+    return in_each_direction(pattern.nodal(element_masses(mesh, rho)))
 
 
-def _drag(mesh: TetMesh, pattern: SparsityPattern, rate: Floats) -> sparse.csr_array:
+def _drag(mesh: TetMesh, nodes: MovingNodes, rate: Floats) -> sparse.csr_array:
     """Mass-proportional damping matrix of a rate (m,) in kg/m3/s that is 0 in most elements."""
     layer = np.flatnonzero(rate)
-    R = _mass(elements_of(mesh, layer), replace(pattern, slot=pattern.slot[layer]), rate[layer])
+    R = _mass(elements_of(mesh, layer), nodes.of_elements(layer), rate[layer])
     R.eliminate_zeros()
-    return R
+    return nodes.on_free(R)
 
 
 def by_region(

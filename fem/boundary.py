@@ -1,5 +1,7 @@
 """Boundary conditions: fixed degrees of freedom, elastic supports and absorbing dashpots."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 

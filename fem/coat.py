@@ -31,6 +31,8 @@ nodes, which are as accurate, couple two to three rings of facets, and the facto
 44 to 50 % more entries than without a coat instead of 20 %. Rotary inertia is left out.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +110,7 @@ class Surface:
     points: Floats
     normals: Floats
     turn: Floats
-    edges: "Edges"
+    edges: Edges
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -28,9 +28,10 @@ class Combination:
 
     def of(self, K: Any, M: Any) -> Any:
         """The matrix itself, of the kind of K and M; K if it is nothing else."""
-        terms = [_multiple(self.mass, M)] if self.mass else []
+        nothing = not self.stiffness and self.rest is None
+        terms = [_multiple(self.mass, M)] if self.mass or nothing else []
         terms += [] if self.rest is None else [self.rest]
-        if self.stiffness or not terms:  # the largest last: each sum copies what it adds to
+        if self.stiffness:  # the largest last: each sum copies what it adds to
             terms.append(_multiple(self.stiffness, K))
         return sum(terms[1:], start=terms[0])
 

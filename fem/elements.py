@@ -4,6 +4,7 @@ Both are written in barycentric coordinates, so that one formula serves both sha
 quadratic functions are L_a (2 L_a - 1) at the corners and 4 L_a L_b at the mid-sides.
 """
 
+from functools import cache
 from itertools import permutations
 
 import numpy as np
@@ -38,6 +39,7 @@ def shape_derivatives(barycentric: Floats, n_nodes: int) -> Floats:
     return by_coordinate[:, :, 1:] - by_coordinate[:, :, :1]
 
 
+@cache
 def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
     """Barycentric points (q, 4) and weights (q,) summing to 1, exact to `degree` (2 or 5).
 
@@ -53,6 +55,7 @@ def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
     )
 
 
+@cache
 def triangle_rule(degree: int = 4) -> tuple[Floats, Floats]:
     """Barycentric points (q, 3) and weights (q,) summing to 1, exact to `degree` (2 or 4).
 
@@ -78,7 +81,10 @@ def _orbits(*orbits: tuple[float, list[float]]) -> tuple[Floats, Floats]:
         orbit = _distinct(orbit)
         points += orbit
         weights += [weight] * len(orbit)
-    return np.array(points), np.array(weights) / sum(weights)
+    rule = np.array(points), np.array(weights) / sum(weights)
+    for shared in rule:
+        shared.setflags(write=False)
+    return rule
 
 
 def _distinct(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:

@@ -10,6 +10,8 @@ Method, 1987, chapter 9), whatever the time step, so that an imbalance is an err
 and not of the step.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -36,7 +38,7 @@ class EnergyBalance:
     radiated: float = 0.0
     exchanged: float = 0.0
 
-    def __add__(self, other: "EnergyBalance") -> "EnergyBalance":
+    def __add__(self, other: EnergyBalance) -> EnergyBalance:
         return EnergyBalance(
             work=self.work + other.work,
             dissipated=self.dissipated + other.dissipated,

@@ -11,6 +11,8 @@ in the linear `assembly`, whose K is the tangent at rest. Orthotropic sheets add
 in-plane stress, and tension its forces on the normal displacement, as in `plane_stiffness`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -23,7 +25,7 @@ from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
 from fem.materials import Material, rayleigh_damping
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
-from fem.sparsity import UPPER, SparsityPattern, from_components, slabs
+from fem.sparsity import UPPER, SparsityPattern, restricted, slabs
 from fem.viscoelastic import LOSS_BAND
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
@@ -80,7 +82,7 @@ class Part:
     along: Floats | None = None
 
     @staticmethod
-    def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> "Part":
+    def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> Part:
         """The part of a mesh of n nodes."""
         rows = np.arange(G[..., 0].size).repeat(nodes.shape[1])
         columns = np.broadcast_to(nodes[:, None, None, :], G.shape).ravel()
@@ -136,23 +138,23 @@ def finite_strain(
 
     T = sparse.csr_array((len(free), len(free)))
     if tension is not None:
-        T = tension_stiffness(mesh, solid.pattern, tension, SIDES)[free][:, free]
+        T = restricted(tension_stiffness(mesh, solid.pattern, tension, SIDES), free)
     body = Elastic(
         operators=operators,
         internal=lambda u: internal_force(solid, spread(u)).ravel()[free] + T @ u,
-        tangent=lambda u: tangent(solid, spread(u))[free][:, free] + T,
+        tangent=lambda u: restricted(tangent(solid, spread(u)), free) + T,
         viscous=lambda u, v: operators.C @ v,
         energy=lambda u: stored_energy(solid, spread(u)) + float(u @ (T @ u)) / 2,
     )
     if membrane is None:
         return body
     part, lag = membrane_part(mesh, membrane), stress_lag(membrane.material)
-    K = tangent(part, np.zeros((n, 3)))[free][:, free]
+    K = restricted(tangent(part, np.zeros((n, 3))), free)
     at_rest = replace(operators, K=operators.K + K, C=operators.C + lag * K, laws=None)
     return Elastic(
         operators=at_rest,
         internal=lambda u: body.internal(u) + internal_force(part, spread(u)).ravel()[free],
-        tangent=lambda u: body.tangent(u) + tangent(part, spread(u))[free][:, free],
+        tangent=lambda u: body.tangent(u) + restricted(tangent(part, spread(u)), free),
         viscous=lambda u, v: (
             body.viscous(u, v) + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
         ),
@@ -284,7 +286,7 @@ def spread_stress(part: Part, P: Floats) -> Floats:
     return part.D_transposed @ (part.volume[..., None, None] * P).reshape(-1, P.shape[3])
 
 
-def tangent(part: Part, u: Floats) -> sparse.csr_array:
+def tangent(part: Part, u: Floats) -> sparse.bsr_array:
     """Consistent tangent d internal_force / d u (3 n, 3 n) in N/m, symmetric.
 
     K_ab,ij = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_li F_lj) + delta_ij G_ka S_kl G_lb,
@@ -295,7 +297,7 @@ def tangent(part: Part, u: Floats) -> sparse.csr_array:
     blocks = (
         (slab, tangent_blocks(part, slab, F[slab], S[slab])) for slab in slabs(len(part.nodes))
     )
-    return from_components(part.pattern, part.pattern.sum(blocks, 6))
+    return part.pattern.blocks(blocks)
 
 
 def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """The map from the reference element to the elements of a mesh."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -14,10 +14,11 @@ def is_straight(mesh: TetMesh) -> bool:
     """Whether every mid-side node lies in the middle of its edge."""
     if mesh.order == 1:
         return True
-    ends = mesh.points[mesh.tets[:, EDGES]]
-    middles = mesh.points[mesh.tets[:, 4:]]
-    bow = np.abs(2 * middles - ends[:, :, 0] - ends[:, :, 1]).max()
-    return bool(bow < 1e-10 * np.abs(ends[:, :, 0] - ends[:, :, 1]).max())
+    ends = np.repeat(np.arange(len(mesh.points))[:, None], 2, axis=1)  # of a corner: itself
+    ends[mesh.tets[:, 4:]] = mesh.tets[:, EDGES]
+    first, last = mesh.points[ends.T]
+    bow = np.abs(2 * mesh.points - first - last).max()
+    return bool(bow < 1e-10 * np.abs(first - last).max())
 
 
 def shape_nodes(mesh: TetMesh) -> Floats:
@@ -51,20 +52,41 @@ def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Flo
     return np.matmul(inverse.swapaxes(2, 3), derivatives.transpose(0, 2, 1)), volumes
 
 
-def gradient_products(mesh: TetMesh) -> Iterator[tuple[slice, Floats]]:
-    """Integrals of products of shape gradients, some elements at a time.
+def gradient_integrals(
+    mesh: TetMesh, coefficients: Callable[[slice, Floats], Floats]
+) -> Iterator[tuple[slice, Floats]]:
+    """Element matrices int c_kl N_a,k N_b,l dV, some elements at a time.
+
+    Products of derivatives along the edges of the reference element are integrated once, so that
+    what is left for each element is a product with the map to it.
+
+    Parameters
+    ----------
+    mesh : TetMesh, of e elements
+    coefficients : slice of the elements, and G (k, l, e, x) -> c_kl G_kl (m, e, x) for each of m
+        matrices. x numbers what is the same in all elements: two edges, at each quadrature point
+        of curved elements.
 
     Yields
     ------
     slice of the elements
-    H : (e, i, a, j, b) float, metre, int N_a,i N_b,j dV
+    matrices : (m, e, a, b)
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
+    barycentric, weights = tetrahedron_rule(2)
+    slopes = shape_derivatives(barycentric, n_nodes).transpose(0, 2, 1)
+    edges = slopes[:, :, None, :, None] * slopes[:, None, :, None, :]
+    if shapes.shape[1] == 4:  # the map is the same at all points
+        edges = np.tensordot(weights, edges, 1)
+    edges = edges.reshape(-1, n_nodes**2)
     for slab in slabs(len(mesh.tets)):
-        slopes, volumes = gradients(shapes[slab], n_nodes, 2, slab.start)
-        e, q = volumes.shape
-        G = (np.sqrt(volumes)[:, :, None, None] * slopes).reshape(e, q, 3 * n_nodes)
-        yield slab, np.matmul(G.transpose(0, 2, 1), G).reshape(e, 3, n_nodes, 3, n_nodes)
+        cofactors, determinants, volumes = jacobians(shapes[slab], 2, slab.start)
+        inverse = (cofactors / determinants[..., None, None]).transpose(3, 0, 1, 2)  # (i, e, q, d)
+        if shapes.shape[1] == 4:
+            volumes = volumes.sum(axis=1, keepdims=True)
+        G = (volumes[..., None] * inverse)[:, None, ..., None] * inverse[None, ..., None, :]
+        found = coefficients(slab, G.reshape(3, 3, len(volumes), -1)) @ edges
+        yield slab, found.reshape(*found.shape[:2], n_nodes, n_nodes)
 
 
 def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
@@ -91,17 +113,15 @@ def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, F
     """
     barycentric, weights = tetrahedron_rule(degree)
     at = barycentric[:1] if nodes.shape[1] == 4 else barycentric
-    jacobian = np.einsum(
-        "qad,eai->eqdi", shape_derivatives(at, nodes.shape[1]), nodes, optimize=True
-    )
-    x, y, z = (jacobian[..., i] for i in range(3))
-    cofactors = np.empty_like(jacobian)
+    derivatives = shape_derivatives(at, nodes.shape[1])
+    x, y, z = (np.tensordot(nodes[..., i], derivatives, (1, 1)) for i in range(3))  # (e, q, d)
+    cofactors = np.empty((*x.shape, 3))
     for d in range(3):
         m, n = (d + 1) % 3, (d + 2) % 3
         cofactors[..., d, 0] = y[..., m] * z[..., n] - z[..., m] * y[..., n]
         cofactors[..., d, 1] = z[..., m] * x[..., n] - x[..., m] * z[..., n]
         cofactors[..., d, 2] = x[..., m] * y[..., n] - y[..., m] * x[..., n]
-    determinants = (jacobian[..., 0, :] * cofactors[..., 0, :]).sum(axis=-1)
+    determinants = (x * cofactors[..., 0]).sum(axis=-1)
     inverted = np.flatnonzero((determinants <= 0).any(axis=1))
     if len(inverted):
         raise MeshError(

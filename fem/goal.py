@@ -17,6 +17,8 @@ polynomials: along an axis, in which an element is h long, the strain leaves h^2
 element's share is divided among the axes as the products of those of both solutions.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -2,6 +2,8 @@
 complex stiffness of the generalised Maxwell branches.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

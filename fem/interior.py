@@ -1,5 +1,7 @@
 """Points inside a body: the element that each lies in, and the displacement there."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse

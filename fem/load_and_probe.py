@@ -3,6 +3,8 @@
 nodal forces = P q at the facets' quadrature points,  displacement into the body = S u
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -8,6 +8,8 @@ and Hughes, Computational Inelasticity (1998), chapter 10. A material with a mod
 adds a part of the stiffness that depends on frequency and has no internal variable.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -8,6 +8,8 @@ the start leaves,
     z(t) = inputs F [exp(i w t) - exp(pole t)] / (i w - pole)
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,6 +4,8 @@ A node of an edge has the mean of the polynomials of the edge's two ends. Strain
 material does: each material has its own nodes, of which those between two of them are doubled.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 

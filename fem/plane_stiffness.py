@@ -11,15 +11,17 @@ stiffness is so much softer in its plane that the tension would bend it otherwis
 of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from fem.geometry import gradient_products
+from fem.geometry import gradient_integrals
 from fem.materials import Material
-from fem.sparsity import UPPER, SparsityPattern, from_components
+from fem.sparsity import UPPER, SparsityPattern
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 
@@ -52,7 +54,7 @@ def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
 
 def orthotropic_stiffness(
     mesh: TetMesh, pattern: SparsityPattern, added: Floats, axes: Floats
-) -> sparse.csr_array:
+) -> sparse.bsr_array:
     """Stiffness matrix of in-plane strains.
 
     Parameters
@@ -72,17 +74,15 @@ def orthotropic_stiffness(
     by_strain = strains.reshape(3, 9)
     tensor = (by_strain.T @ added @ by_strain).reshape(3, 3, 3, 3)  # (i, k, j, l)
 
-    def blocks() -> Iterator[tuple[slice, Floats]]:
-        for slab, H in gradient_products(mesh):
-            found = [np.einsum("kl,ekalb->eab", tensor[i, :, j], H) for i, j in UPPER]
-            yield slab, np.array(found)
+    def contracted(_: slice, G: Floats) -> Floats:
+        return np.array([np.tensordot(tensor[i, :, j], G, 2) for i, j in UPPER])
 
-    return from_components(pattern, pattern.sum(blocks(), 6))
+    return pattern.blocks(gradient_integrals(mesh, contracted))
 
 
 def tension_stiffness(
     mesh: TetMesh, pattern: SparsityPattern, tension: Tension, axes: Floats
-) -> sparse.csr_array:
+) -> sparse.bsr_array:
     """Geometric stiffness of a uniform in-plane tension on the normal displacement of a sheet.
 
     Parameters
@@ -100,9 +100,8 @@ def tension_stiffness(
     stress = axes.T @ np.diag([tension.x, tension.y]) @ axes / np.ptp(mesh.points @ normal)
     outer = np.outer(normal, normal)
 
-    def blocks() -> Iterator[tuple[slice, Floats]]:
-        for slab, H in gradient_products(mesh):
-            scalar = np.einsum("kl,ekalb->eab", stress, H)
-            yield slab, np.array([outer[i, j] * scalar for i, j in UPPER])
+    def contracted(_: slice, G: Floats) -> Floats:
+        scalar = np.tensordot(stress, G, 2)
+        return np.array([outer[i, j] * scalar for i, j in UPPER])
 
-    return from_components(pattern, pattern.sum(blocks(), 6))
+    return pattern.blocks(gradient_integrals(mesh, contracted))

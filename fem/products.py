@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from fem.linear_solver import mkl
+from fem.pardiso import mkl
 from meshes.tetmesh import Floats
 
 NOT_TRANSPOSED, GENERAL, UPPER, NON_UNIT, ROW_MAJOR = 10, 20, 41, 50, 101  # of mkl_spblas.h

@@ -27,6 +27,8 @@ the larger space. Those further moments are then dropped: the error of the large
 unknown, because convergence may become steep or stall at any moment.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

@@ -208,9 +208,9 @@ def _suspects(
     frequencies: Floats,
     smaller: int,
 ) -> Iterator[tuple[int, int, Complex, float]]:
-    """Variants that the last vectors changed most, and all between the geometries, each with the
-    line where they changed it most, the response (p,) there, and what its error is relative to at
-    least.
+    """Variants that the last vectors changed most, all between the geometries, and of each other
+    geometry one, each with the line where they changed it most, the response (p,) there, and what
+    its error is relative to at least.
     """
     if not others:
         return
@@ -226,9 +226,13 @@ def _suspects(
         least = FAINT * float(np.linalg.norm(now, axis=1).max())
         found.append((float(change[k]), (t, int(watched[k]), now[k], least)))
     found.sort(key=lambda each: -each[0])
-    between = [each for each in found[CHECKED:] if training[each[1][0]].is_between]
-    for _, suspect in found[:CHECKED] + between:
-        yield suspect
+    seen = set[tuple[float, ...]]()
+    for rank, (_, suspect) in enumerate(found):
+        at = training[suspect[0]]
+        geometry = tuple(at.shares.round(6).tolist())
+        if rank < CHECKED or at.is_between or geometry not in seen:
+            yield suspect
+        seen.add(geometry)
 
 
 def _outputs(variant: Variant, frequency: float, line: int, solver: str) -> Complex:

@@ -12,6 +12,8 @@ condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); the equations ar
 Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -35,6 +37,7 @@ from fem.finite_strain import (
 )
 from fem.linear_solver import factorise
 from fem.sheet_reading import SheetReading, modal_slopes
+from fem.sparsity import restricted
 from fem.static import modes
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
@@ -253,12 +256,12 @@ class _Plane:
     solve: Callable[[Floats], Floats]
 
     @staticmethod
-    def of(part: Part, fixed: NDArray[np.bool_], solver: str) -> "_Plane":
+    def of(part: Part, fixed: NDArray[np.bool_], solver: str) -> _Plane:
         n = part.D.shape[1]
         horizontal = np.zeros((n, 3), bool)
         horizontal[np.unique(part.nodes), :2] = True
         moving = np.flatnonzero(horizontal.ravel() & ~fixed)
-        K = tangent(part, np.zeros((n, 3)))[moving][:, moving]
+        K = restricted(tangent(part, np.zeros((n, 3))), moving)
         return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
 
     def incompatible(self, e: Floats) -> Floats:

@@ -11,6 +11,8 @@ gradient at rest has the slopes of z0. The membrane stiffness of the elements th
 away: it is that of a flat sheet, which a curled one escapes from.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np
@@ -18,7 +20,7 @@ from scipy import sparse
 
 from fem.elements import triangle_rule
 from fem.finite_strain import Membrane, membrane_part, tangent_blocks
-from fem.sparsity import from_components, slabs
+from fem.sparsity import slabs
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 
@@ -29,7 +31,7 @@ def shell_stiffness(
     slopes: Callable[[Floats], Floats],
     *,
     meshed: float = 0.0,
-) -> sparse.csr_array:
+) -> sparse.bsr_array:
     """Membrane stiffness of a shallow shell.
 
     Parameters
@@ -54,5 +56,4 @@ def shell_stiffness(
         found = (tangent_blocks(part, slab, F[slab], unstressed[slab]) for F in (curved, flat))
         return next(found) - meshed * next(found)
 
-    summed = part.pattern.sum(((slab, blocks(slab)) for slab in slabs(len(part.nodes))), 6)
-    return from_components(part.pattern, summed)
+    return part.pattern.blocks((slab, blocks(slab)) for slab in slabs(len(part.nodes)))

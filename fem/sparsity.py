@@ -1,7 +1,8 @@
 """Sparsity pattern of a mesh, and the assembly of element matrices into sparse ones."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,105 +11,116 @@ from scipy import sparse
 from meshes import MeshError
 from meshes.tetmesh import Floats, Ints
 
-SLAB = 1024  # elements at a time: their temporaries stay near the processor
+Index = NDArray[np.int32]
+SLAB = 256  # elements at a time: their temporaries stay near the processor
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SparsityPattern:
-    """CSR sparsity pattern on nodes, with the slot that each pair of element nodes is summed in."""
+    """CSR sparsity pattern on n nodes, with the slot that each pair of element nodes is summed in:
+    one beyond the last for pairs that take no part.
+    """
 
-    indptr: Ints
-    indices: Ints
-    slot: Ints  # (e, a, b)
+    indptr: Index
+    indices: Index
+    slot: Index  # (e, a, b)
 
     @staticmethod
-    def of(tets: Ints, n_nodes: int) -> "SparsityPattern":
-        """The pattern of a mesh; one sort of pair number and origin packed into one integer."""
-        key = (tets[:, :, None] * n_nodes + tets[:, None, :]).ravel()
-        bits = int(key.size).bit_length()
-        if int(n_nodes**2).bit_length() + bits > 63:
-            raise MeshError(f"{len(tets)} tetrahedra are too many for one assembly; coarsen")
-        # In place: memory that is touched for the first time costs more than the sums.
-        key <<= bits
-        key |= np.arange(key.size)
-        key.sort()
-        index = _index(key.size)
-        origin = (key & ((1 << bits) - 1)).astype(index)
-        key >>= bits
-        first = np.append(True, key[1:] != key[:-1])
-        rows, indices = np.divmod(key[first], n_nodes)
-        slot = np.empty(key.size, index)
-        slot[origin] = np.cumsum(first, dtype=index) - index(1)
-        indptr = np.searchsorted(rows, np.arange(n_nodes + 1))
-        return SparsityPattern(indptr=indptr, indices=indices, slot=slot.reshape(*tets.shape, -1))
+    def of(nodes: Ints, n: int) -> "SparsityPattern":
+        """The pattern of elements of some nodes (e, a) below n, or n for nodes that take no part.
 
-    def sum(self, slabs: Iterable[tuple[slice, Floats]], parts: int) -> Floats:
-        """Assemble element matrices (parts, e, a, b), some at a time, into slots (parts, slots)."""
-        summed = np.zeros((parts, len(self.indices)))
-        for slab, values in slabs:
-            slots = self.slot[slab].ravel()
-            for total, part in zip(summed, values, strict=True):
-                np.add.at(total, slots, part.ravel())
-        return summed
-
-    def mirrored(self) -> Ints:
-        """The slot (slots,) of each transposed pair."""
-        n = len(self.indptr) - 1
-        slots = sparse.csr_array(
-            (np.arange(len(self.indices)), self.indices, self.indptr), shape=(n, n)
-        )
-        return slots.tocsc().data
-
-    def rows(self) -> tuple[Callable[[int], Ints], Ints]:
-        """Row layout with three components per node: positions (slots,) in the row of a component,
-        and the rows' indptr (3 n + 1,).
+        Pairs of nodes are sorted by their first node and then their second one without comparing
+        any: twice, SciPy's transposition of a matrix counts how many there are of each.
         """
-        lengths = np.diff(self.indptr)
-        first = np.arange(len(self.indices)) + 2 * np.repeat(self.indptr[:-1], lengths)
-        further = np.repeat(lengths, lengths)
-        starts = 3 * self.indptr[:-1, None] + lengths[:, None] * np.arange(3)
-        return lambda i: first + i * further, np.append(starts.ravel(), 3 * self.indptr[-1])
+        a = nodes.shape[1]
+        if nodes.size * a > np.iinfo(np.int32).max:
+            raise MeshError(f"{len(nodes)} elements are too many for one assembly; coarsen")
+        each, local = nodes.astype(np.int32), np.arange(a, dtype=np.int32)
+        places = np.arange(nodes.size + 1, dtype=np.int32)
+        indptr, places, _ = _by_column(places[:-1], each, places[::a], n)
+        element, second = np.divmod(places, np.int32(a))
+        pairs = (a * a * element + second)[:, None] + a * local
+        indptr, pairs, columns = _by_column(pairs, each[element], a * indptr, n)
+        first = np.append(True, columns[1:] != columns[:-1])
+        first[indptr[:-1][np.diff(indptr) > 0]] = True
+        indices = columns[first]
+        slot = np.full(nodes.size * a, len(indices), np.int32)
+        slot[pairs] = np.cumsum(first, dtype=np.int32) - np.int32(1)
+        return SparsityPattern(
+            indptr=starts_of_kept(first, indptr), indices=indices, slot=slot.reshape(-1, a, a)
+        )
+
+    def blocks(self, slabs: Iterable[tuple[slice, Floats]]) -> sparse.bsr_array:
+        """Symmetric matrix (3 n, 3 n) of element matrices (6, e, a, b) for the components UPPER,
+        some elements at a time.
+        """
+        n, summed = 3 * (len(self.indptr) - 1), np.zeros((len(self.indices) + 1, 3, 3))
+        flat = summed.ravel()
+        for slab, values in slabs:
+            place = 9 * self.slot[slab].astype(np.intp)
+            mirrored = place.swapaxes(1, 2).ravel()
+            place = place.ravel()
+            for part, (i, j) in zip(values, UPPER, strict=True):
+                np.add.at(flat, place + (3 * i + j), part.ravel())
+                if i != j:
+                    np.add.at(flat, mirrored + (3 * j + i), part.ravel())
+        return sparse.bsr_array((summed[:-1], self.indices, self.indptr), shape=(n, n))
+
+    def nodal(self, slabs: Iterable[tuple[slice, Floats]]) -> sparse.csr_array:
+        """Matrix (n, n) of element matrices (e, a, b), some elements at a time."""
+        n, summed = len(self.indptr) - 1, np.zeros(len(self.indices) + 1)
+        for slab, values in slabs:
+            np.add.at(summed, self.slot[slab].ravel(), values.ravel())
+        return sparse.csr_array((summed[:-1], self.indices, self.indptr), shape=(n, n))
 
 
-def from_components(pattern: SparsityPattern, summed: Floats) -> sparse.csr_array:
-    """Symmetric matrix (3 n, 3 n) of slots (6, slots) for the components UPPER."""
-    mirrored, (places, indptr) = pattern.mirrored(), pattern.rows()
-    n, slots, index = len(indptr) - 1, len(mirrored), _index(9 * len(mirrored))
-    data, columns = np.empty((3 * slots, 3)), np.empty((3 * slots, 3), index)
-    for component, (i, j) in zip(summed, UPPER, strict=True):
-        data[places(i), j] = component
-        if i != j:
-            data[places(j), i] = component[mirrored]
-    for i in range(3):
-        columns[places(i)] = 3 * pattern.indices[:, None].astype(index) + np.arange(3, dtype=index)
-    indptr = (3 * indptr).astype(index)
-    return sparse.csr_array((data.ravel(), columns.ravel(), indptr), shape=(n, n))
+def _by_column(entries: Index, columns: Index, indptr: Index, n: int) -> tuple[Index, Index, Index]:
+    """Entries of rows that start at `indptr`, by column below n, and by row within one: where each
+    column starts, the entries, and their rows.
+    """
+    rows = sparse.csr_array(
+        (entries.ravel(), columns.ravel(), indptr), shape=(len(indptr) - 1, n + 1)
+    ).tocsc()
+    kept = rows.indptr[n]
+    return rows.indptr[:-1], rows.data[:kept], rows.indices[:kept]
 
 
-def from_blocks(pattern: SparsityPattern, summed: Floats) -> sparse.bsr_array:
-    """The matrix of `from_components` in blocks of 3 by 3, of which others are a cheaper sum."""
-    blocks = np.empty((len(pattern.indices), 3, 3))
-    for component, (i, j) in zip(summed, UPPER, strict=True):
-        blocks[:, i, j] = component
-        if i != j:
-            blocks[:, j, i] = component[pattern.mirrored()]
-    index, n = _index(9 * len(blocks)), 3 * (len(pattern.indptr) - 1)
-    places = pattern.indices.astype(index), pattern.indptr.astype(index)
-    return sparse.bsr_array((blocks, *places), shape=(n, n))
+def in_each_direction(A: sparse.csr_array) -> sparse.csr_array:
+    """The matrix (3 n, 3 n) of one on nodes (n, n), the same for each of three components."""
+    lengths, component = np.diff(A.indptr), np.arange(3, dtype=np.int32)
+    rows = np.repeat(lengths, 3)
+    indptr = np.append(np.int32(0), np.cumsum(rows, dtype=np.int32))
+    shift = (A.indptr[:-1, None] - indptr[:-1].reshape(-1, 3)).ravel()
+    entry = np.arange(indptr[-1], dtype=np.int32) + np.repeat(shift, rows)
+    columns = (3 * A.indices)[entry] + np.repeat(np.tile(component, len(lengths)), rows)
+    shape = (3 * A.shape[0], 3 * A.shape[1])
+    return sparse.csr_array((A.data[entry], columns, indptr), shape=shape)
 
 
-def from_nodal(pattern: SparsityPattern, summed: Floats) -> sparse.csr_array:
-    """The matrix (3 n, 3 n) of slots (slots,), the same for each of the three components."""
-    places, indptr = pattern.rows()
-    n, slots, index = len(indptr) - 1, len(summed), _index(3 * len(summed))
-    data, columns = np.empty(3 * slots), np.empty(3 * slots, index)
-    for i in range(3):
-        data[places(i)], columns[places(i)] = summed, 3 * pattern.indices + i
-    return sparse.csr_array((data, columns, indptr.astype(index)), shape=(n, n))
+def restricted(A: Any, free: Ints) -> sparse.csr_array:
+    """Rows and columns of a matrix that are free, in rising order."""
+    return selected(A.tocsr(), free, free)
 
 
-def starts_of_kept(kept: NDArray[np.bool_], indptr: Ints) -> NDArray[np.int32]:
+def selected(A: Any, rows: Ints, columns: Ints) -> Any:
+    """Some rows and columns, in rising order, of a CSR matrix, or of blocks of a BSR matrix."""
+    shape = np.array(A.shape) // getattr(A, "blocksize", 1)
+    if (len(rows), len(columns)) == tuple(shape):
+        return A
+    number = np.full(shape[1], -1, A.indices.dtype)
+    number[columns] = np.arange(len(columns))
+    taken = np.zeros(shape[0], bool)
+    taken[rows] = True
+    places = number[A.indices]
+    kept = (places >= 0) & np.repeat(taken, np.diff(A.indptr))
+    starts = starts_of_kept(kept, A.indptr)
+    indptr = np.append(starts[rows], starts[-1])
+    size = np.array([len(rows), len(columns)]) * A.shape // shape
+    return type(A)((A.data[kept], places[kept], indptr), shape=tuple(size))
+
+
+def starts_of_kept(kept: NDArray[np.bool_], indptr: NDArray[np.integer[Any]]) -> Index:
     """Starts (n + 1,) of the rows of a matrix of which some entries (nnz,) are kept."""
     before = np.zeros(len(kept) + 1, np.int32)
     np.cumsum(kept, out=before[1:])
@@ -118,8 +130,3 @@ def starts_of_kept(kept: NDArray[np.bool_], indptr: Ints) -> NDArray[np.int32]:
 def slabs(count: int) -> list[slice]:
     """Slices of elements, `SLAB` at a time."""
     return [slice(start, start + SLAB) for start in range(0, count, SLAB)]
-
-
-def _index(entries: int) -> type[np.signedinteger]:
-    """The smallest type that numbers so many entries, which every later product reads."""
-    return np.int32 if entries <= np.iinfo(np.int32).max else np.int64

@@ -1,5 +1,7 @@
 """Statics and natural modes: K u = f, and K u = w^2 M u."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
 import numpy as np

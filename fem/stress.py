@@ -12,6 +12,8 @@ left beside it (`pressure_projection`), in the proportions that they have in K. 
 law, lam tr(e) I + 2 mu e, then has the pressure of the discrete equations.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from itertools import combinations_with_replacement
 from typing import Any

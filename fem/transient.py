@@ -8,6 +8,8 @@ of generalised Maxwell branches are integrated by the trapezoidal rule: with ave
 their dissipation is exact to round-off.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

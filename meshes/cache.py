@@ -59,7 +59,10 @@ def key(*parts: object) -> str:
 
 
 def digest(*parts: object) -> str:
-    """SHA-256 in hexadecimal of arrays, by type, shape and bytes, and of the repr of all else."""
+    """SHA-256 in hexadecimal of arrays, by type, shape and bytes, and of the repr of all else.
+
+    That has to be of all that it is, which those of scenes, responses, plans and meshes are not.
+    """
     found = hashlib.sha256()
     for part in parts:
         if isinstance(part, np.ndarray):

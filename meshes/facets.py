@@ -1,5 +1,7 @@
 """Facet sets of a boundary, by the place and direction of their facets."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,9 @@
 """Safe reading of users' files: regular files of a limited size, whatever their contents claim."""
 
+import codecs
 import json
 import os
+import re
 import stat
 import zipfile
 from collections.abc import Iterator
@@ -15,6 +17,8 @@ LARGEST_TEXT = 16_000_000  # bytes of JSON, and of other text
 UNPACKED = 500_000_000  # bytes that any archive of arrays may unpack to,
 GROWTH = 8  # or so many times what it takes on the disk
 MOST_ARRAYS = 1000  # of an archive; reading each takes its time, however small it is
+
+CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # bytes that no text has
 
 PathLike = str | os.PathLike[str]
 
@@ -60,6 +64,21 @@ def text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
         return content(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: no UTF-8 text ({error.reason}); save it as such") from None
+
+
+def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
+    """The text of a regular file as other programs export it: UTF-8, UTF-16 that begins with a byte
+    order mark, or else Windows' Latin-1; raises what `text` does.
+    """
+    found = content(path, limit)
+    utf_16 = found.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    plain = not (utf_16 or CONTROL.search(found))
+    for encoding in ("utf-16",) if utf_16 else ("utf-8-sig", *["cp1252"] * plain):
+        try:
+            return found.decode(encoding)
+        except UnicodeDecodeError as error:
+            reason = error.reason
+    raise ValueError(f"{path}: no UTF-8 text ({reason}); save it as such")
 
 
 def on_disk(path: PathLike) -> int:

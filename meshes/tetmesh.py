@@ -5,6 +5,8 @@ Local numbering is VTK's: corners 0 1 2 3, then the mid-side nodes of the edges
 are seen anticlockwise from outside the body.
 """
 
+from __future__ import annotations
+
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -87,6 +89,13 @@ class TetMesh:
         object.__setattr__(self, "facets", MappingProxyType(facets))
         object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
 
+    def __repr__(self) -> str:
+        elements = f"{len(self.tets):,} tetrahedra of {self.tets.shape[1]} nodes"
+        regions = len(np.unique(self.region))
+        said = [f"{len(self.points):,} nodes", elements, f"{regions} region{'s' * (regions != 1)}"]
+        sets = f"; facets {', '.join(sorted(self.facets))}" if self.facets else ""
+        return f"<TetMesh: {', '.join(said)}{sets}>"
+
     @property
     def order(self) -> int:
         """Polynomial order of the elements: 1 or 2."""
@@ -97,14 +106,14 @@ class TetMesh:
         """Three displacement components per node."""
         return 3 * len(self.points)
 
-    def to_pyvista(self) -> "pv.UnstructuredGrid":
+    def to_pyvista(self) -> pv.UnstructuredGrid:
         """The mesh as a grid of pyvista, in metre: linear or quadratic tetrahedra, `region` as cell
         data, and each facet set as field data, such as "facets:top".
         """
         return vtk_grid.to_grid(self.points, self.tets, self.region, self.facets)
 
     @classmethod
-    def from_pyvista(cls, grid: "pv.UnstructuredGrid") -> "TetMesh":
+    def from_pyvista(cls, grid: pv.UnstructuredGrid) -> TetMesh:
         """The mesh of a grid of tetrahedra of 4 nodes, or of 10, in metre.
 
         Raises

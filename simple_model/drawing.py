@@ -21,6 +21,7 @@ NAMED = 8  # curves that a legend names, the outermost among them
 PROBES = "probes at (x, y) in mm"  # title of their legend
 ENTRY = 0.105  # inch for each point of the letters: width of an entry
 DPI = 100  # of a small figure on a page
+SMALLER, SMALLEST = 5 / 6, 8.0  # of letters beside those of axes; points, of any letter
 CELL = "padding:0.1em 0.8em 0.1em 0;text-align:left;vertical-align:top"
 
 
@@ -31,6 +32,13 @@ def new_axes(ax: "Axes | None") -> "Axes":
     import matplotlib.pyplot as plt
 
     return plt.subplots(layout="constrained")[1]
+
+
+def small() -> float:
+    """Size in points of letters that are smaller than those of axes, as far as these are large."""
+    import matplotlib as mpl
+
+    return max(SMALLER * float(mpl.rcParams["font.size"]), SMALLEST)
 
 
 def place_name(place: Floats) -> str:
@@ -60,7 +68,7 @@ def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) 
         ax.plot(x, values[:, k], color=colours[k], label=label, **{"lw": 1.2, **style})
     ax.legend(
         loc="lower left", bbox_to_anchor=(0, 1), ncols=columns_of(ax, len(named)), frameon=False,
-        title=PROBES, alignment="left", fontsize="small", borderaxespad=0.2, columnspacing=1.0,
+        title=PROBES, alignment="left", fontsize=small(), borderaxespad=0.2, columnspacing=1.0,
         handlelength=1.2,
     )  # fmt: skip
     ax.grid(alpha=0.25)

@@ -4,6 +4,8 @@ A is the amplitude (0..1), which may vary in time, M the modulation (-1..1), m t
 modulation (0..1). Without modulation M = 1, and every law gives its full value, 1 at A = 1.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -151,6 +153,6 @@ DRIVES = {
 }  # fmt: skip
 
 
-def beyond_published(drive: "str | DriveLaw", usual: "str | DriveLaw") -> "str | DriveLaw":
+def beyond_published(drive: str | DriveLaw, usual: str | DriveLaw) -> str | DriveLaw:
     """The drive law, or the usual one in place of the published."""
     return usual if drive == PUBLISHED else drive

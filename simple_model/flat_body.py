@@ -19,6 +19,8 @@ Displacement normal to the surface is one component, g(r) itself. A `Field` has 
 integrals times weights that depend on x_p - x.
 """
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 from functools import cache, partial
@@ -341,7 +343,7 @@ def distance_table(furthest: float, width: float) -> Floats:
     return np.linspace(0, furthest, steps)
 
 
-def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> "CubicSpline":
+def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
     """Cubic spline through values at distances, flat at distance 0.
 
     Parameters

@@ -1,5 +1,7 @@
 """Motion of a stack of layers along x, y and z at any depth, under a moving focus."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -7,6 +7,8 @@ A 16 x 16 array of circular pistons (pitch 10.3 mm, 40 kHz, as Ultraleap's STRAT
 Its intensity |p|^2 near the focus is close to sinc^2(D/D0) with D0 growing with height.
 """
 
+from __future__ import annotations
+
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -93,7 +95,7 @@ class PressureMap:
         return np.asarray(self._interpolated(offsets))
 
     @cached_property
-    def _interpolated(self) -> "RegularGridInterpolator":
+    def _interpolated(self) -> RegularGridInterpolator:
         from scipy.interpolate import RegularGridInterpolator
 
         relative = self.pressure / self.pressure.max()
@@ -302,7 +304,7 @@ def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
 
 
 @cache
-def _array_spot(height: float) -> "RegularGridInterpolator":
+def _array_spot(height: float) -> RegularGridInterpolator:
     """Intensity |p|^2 relative to the focus in one quadrant, as both axes are of symmetry."""
     from scipy.interpolate import RegularGridInterpolator
 

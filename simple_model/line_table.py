@@ -1,12 +1,14 @@
 """Line table of a response: the lines of its load by name, and all other peaks of its spectrum."""
 
-from collections.abc import Iterable
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simple_model.line_names import MOST, WEAKEST, LineNames, line_names
+from simple_model.line_names import MOST, SAME, WEAKEST, LineNames, line_names
 from simple_model.pressure import MovingPressure
 from simple_model.response import (
     ALIKE,
@@ -74,6 +76,7 @@ def line_table(
     response: Response,
     *,
     candidates: Iterable[str] = (),
+    beside: Mapping[str, float] | None = None,
     most: int = MOST,
     highest: float = np.inf,
     settle: float = SETTLE,
@@ -88,6 +91,8 @@ def line_table(
     pressure : MovingPressure, the load
     response : Response
     candidates : names of lines that are listed whether or not the load has them
+    beside : names and frequencies in Hz of what moves the body beside the pressure; those that
+        coincide with a line of the pressure are listed as this
     most : how many lines of the load are looked for, the strongest
     highest : Hz, up to which lines are looked for
     settle : fraction of the response that is left out at its start
@@ -97,7 +102,9 @@ def line_table(
     LineTable, Hz and the unit of the response
     """
     highest = min(highest, 0.5 / step(response.times))
-    found = _below(line_names(pressure, FITTED, most=most, candidates=candidates), highest)
+    found = line_names(pressure, FITTED, most=most, candidates=candidates)
+    same = SAME / pressure.tacton.duration
+    found = _below(_merged(found, _apart(beside or {}, found, same)), highest)
     fit = _fit(found, response, settle)
     peaks = _peaks(response, fit, highest, settle)
     steady = [peak.frequency for peak in peaks if peak.kind != FREE]
@@ -231,12 +238,33 @@ def _with_weak(found: LineNames, weak: LineNames, steady: Floats, least: float) 
         near = np.flatnonzero(np.abs(weak.frequencies - f) < least)
         more += [near[np.argmax(weak.strengths[near])]] if len(near) else []
     more = [k for k in dict.fromkeys(more) if weak.names[k] not in found.names]
-    f = np.concatenate([found.frequencies, weak.frequencies[more]])
-    strengths = np.concatenate([found.strengths, weak.strengths[more]])
-    names = [*found.names, *(weak.names[k] for k in more)]
-    order = np.argsort(f, kind="stable")
+    return _merged(found, _some(weak, more))
+
+
+def _apart(beside: Mapping[str, float], found: LineNames, same: float) -> LineNames:
+    """Lines by name that coincide with none of a load's, as strong as the strongest of these."""
+    f = np.array(list(beside.values()), np.float64)
+    strongest = found.strengths.max(initial=0.0) or 1.0
+    lines = LineNames(
+        names=tuple(beside), frequencies=f, strengths=np.full(len(f), strongest)
+    )  # fmt: skip
+    return _some(lines, np.flatnonzero(~_near(f, found.frequencies, same)).tolist())
+
+
+def _merged(found: LineNames, more: LineNames) -> LineNames:
+    """Lines of both, in ascending order."""
+    f = np.concatenate([found.frequencies, more.frequencies])
+    names = (*found.names, *more.names)
+    both = LineNames(
+        names=names, frequencies=f, strengths=np.concatenate([found.strengths, more.strengths])
+    )
+    return _some(both, np.argsort(f, kind="stable").tolist())
+
+
+def _some(found: LineNames, chosen: list[int]) -> LineNames:
     return LineNames(
-        names=tuple(names[k] for k in order), frequencies=f[order], strengths=strengths[order]
+        names=tuple(found.names[k] for k in chosen), frequencies=found.frequencies[chosen],
+        strengths=found.strengths[chosen],
     )  # fmt: skip
 
 
@@ -279,11 +307,7 @@ def _mixed(response: Response, frequencies: Floats) -> list[Unnamed]:
 
 
 def _below(found: LineNames, highest: float) -> LineNames:
-    kept = found.frequencies < highest
-    return LineNames(
-        names=tuple(name for name, keep in zip(found.names, kept, strict=True) if keep),
-        frequencies=found.frequencies[kept], strengths=found.strengths[kept],
-    )  # fmt: skip
+    return _some(found, np.flatnonzero(found.frequencies < highest).tolist())
 
 
 def _near(f: Floats, others: Floats, least: float) -> Mask:

@@ -12,6 +12,8 @@ series. Poisson's ratio is constant, so that the whole stiffness scales with mu;
 orthotropic sheet is of its isotropic mean.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, sqrt
@@ -171,7 +173,7 @@ class Material:
             return self.law.series
         return fit_prony(self.law, rest=self.shear_modulus, tolerance=tolerance)
 
-    def relaxing(self, tolerance: float = FIT_TOLERANCE) -> "Material":
+    def relaxing(self, tolerance: float = FIT_TOLERANCE) -> Material:
         """The material with internal variables: its law's Prony series in place of the law."""
         if self.law is None:
             return self
@@ -184,7 +186,7 @@ class Material:
             law=None,
         )
 
-    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "Material":
+    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> Material:
         """The same law with all its moduli, or all its losses, multiplied by a factor."""
         both = modulus * loss
         law = self.law and _scaled_law(self.law, modulus, loss)

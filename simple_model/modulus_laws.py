@@ -6,6 +6,8 @@ needed. Powers are principal values: at w with imaginary part <= 0, i w has a re
 crosses no branch cut.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -65,7 +67,7 @@ class FractionalKelvinVoigt:
         """The law in a few words."""
         return f"fractional Kelvin-Voigt of exponent {self.exponent:g}, time {1e3 * self.time:g} ms"
 
-    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "FractionalKelvinVoigt":
+    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalKelvinVoigt:
         """The law with its modulus multiplied by a factor, and its springpot by another too."""
         time = self.time * loss ** (1 / self.exponent)
         return replace(self, shear_modulus=modulus * self.shear_modulus, time=time)
@@ -117,7 +119,7 @@ class FractionalZener:
             f"{self.fast_modulus / 1e3:.4g} kPa in fast motion"
         )
 
-    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "FractionalZener":
+    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalZener:
         """The law with all its moduli, or what relaxes of them, multiplied by a factor."""
         rest = modulus * self.shear_modulus
         return replace(
@@ -219,7 +221,7 @@ class ModulusTable:
         measured = (np.imag(w) == 0) & (hertz >= first) & (hertz <= last)
         return np.where(measured, self.between(w), self.series(w))
 
-    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> "ModulusTable":
+    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> ModulusTable:
         """The table with all its moduli, or its loss moduli, multiplied by a factor."""
         moduli = tuple(modulus * complex(mu.real, loss * mu.imag) for mu in self.moduli)
         return replace(self, moduli=moduli)

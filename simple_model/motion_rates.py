@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simple_model.quantities import Quantity
+from simple_model.quantities import NotOfThis, Quantity
 from simple_model.trajectory import Floats
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ def derivative(response: "Response", wanted: Quantity) -> Floats:
     own = response.record
     order = wanted.rate - own.rate
     if not own.is_normal or order < 0:
-        raise ValueError(
+        raise NotOfThis(
             f"this response is of {own.words}, from which no {wanted.words} follows; simulate the "
             f'scene with quantity = "{wanted.name}"'
         )
     if not order:
         return response.values
     if len(response.times) <= DEGREE:
-        raise ValueError(
+        raise NotOfThis(
             f"{len(response.times)} times are too few to differentiate, which takes {DEGREE + 1}; "
             "sample it longer"
         )

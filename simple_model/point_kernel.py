@@ -6,6 +6,8 @@ published, the load is the commanded signal itself (drive law "linear") in a foc
 lobes ("main_lobe"); under any other load it is the same model.
 """
 
+from __future__ import annotations
+
 import time
 from dataclasses import replace
 from functools import partial

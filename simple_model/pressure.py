@@ -6,6 +6,8 @@ of n foci, which run the same path at phases of their own. A recorded path bring
 it, which multiplies the amplitude.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from math import isfinite
 

@@ -10,6 +10,8 @@ log-spaced times: non-negative least squares of the relative deviation (Lawson a
 Least Squares Problems (1974), chapter 23).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

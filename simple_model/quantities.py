@@ -32,6 +32,10 @@ NORMAL, VECTOR, STRAIN = "normal displacement", "displacement", "strain"  # fiel
 Rows = Callable[[Material], Floats]
 
 
+class NotOfThis(ValueError, AttributeError):
+    """Refusal of a quantity that a response has not; `hasattr` takes it for a missing attribute."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Quantity:
     """Quantity of a response.

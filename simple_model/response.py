@@ -1,5 +1,7 @@
 """Response of the probes, as every model returns it, and its spectral lines."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -16,6 +18,7 @@ from simple_model.quantities import (
     PRESSURE,
     STRAIN,
     VELOCITY,
+    NotOfThis,
     Quantity,
     quantity,
 )
@@ -132,11 +135,11 @@ class Response:
 
         Raises
         ------
-        ValueError
+        ValueError, which is an AttributeError, too
             If they are of another quantity.
         """
         if self.record not in (DISPLACEMENT, PRESSURE):
-            raise ValueError(f"this response is of {self.quantity}; take its `values`")
+            raise NotOfThis(f"this response is of {self.quantity}; take its `values`")
         return self.values
 
     @property
@@ -159,7 +162,7 @@ class Response:
         strain is known.
         """
         if self.record.field != STRAIN or self.unit != "1":
-            raise ValueError(
+            raise NotOfThis(
                 f"this response is of {self.record.words}, from which no strain follows; simulate "
                 'the scene with quantity = "strain_xx" or another strain'
             )
@@ -171,11 +174,11 @@ class Response:
 
         Raises
         ------
-        ValueError
+        ValueError, which is an AttributeError, too
             If its load is unknown.
         """
         if self.load is None:
-            raise ValueError(
+            raise NotOfThis(
                 "the load of this response is unknown, and so are its lines; take "
                 "simple_model.phasors(response, frequencies)"
             )
@@ -197,7 +200,7 @@ class Response:
             quantity=self.quantity,
         )  # fmt: skip
 
-    def plot(self, probes: Sequence[int] | None = None, *, ax: "Axes | None" = None) -> "Axes":
+    def plot(self, probes: Sequence[int] | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the waveforms of all probes, or of those of some numbers, and return the axes."""
         chosen = slice(None) if probes is None else list(probes)
         ax = drawing.new_axes(ax)
@@ -208,27 +211,30 @@ class Response:
         ax.set_ylabel(f"{self.record.words}, {self.record.shown}")
         return ax
 
-    def to_xarray(self) -> "xr.DataArray":
+    def to_xarray(self) -> xr.DataArray:
         """The values as an array with dimensions time and probe, times in s and x, y in metre of
         the probes as coordinates, units as attributes.
         """
         return conversion.to_xarray(self)
 
-    def to_pandas(self) -> "pd.DataFrame":
+    def to_pandas(self) -> pd.DataFrame:
         """The values as a table, rows by time_s and columns by x_m and y_m of the probes, the unit
         in its `attrs`.
         """
         return conversion.to_pandas(self)
 
     @classmethod
-    def from_xarray(cls, array: "xr.DataArray") -> "Response":
+    def from_xarray(cls, array: xr.DataArray) -> Response:
         """The response of such an array; its effort and load are not in it."""
         return _converted(**conversion.of_xarray(array))
 
     @classmethod
-    def from_pandas(cls, table: "pd.DataFrame") -> "Response":
+    def from_pandas(cls, table: pd.DataFrame) -> Response:
         """The response of such a table; its effort and load are not in it."""
         return _converted(**conversion.of_pandas(table))
+
+    def __repr__(self) -> str:
+        return response_page.line(self)
 
     def _repr_html_(self) -> str:
         return response_page.html(self)

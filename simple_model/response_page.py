@@ -1,10 +1,11 @@
-"""Small page of a response for notebooks: its last waveforms, its spectrum, and its size."""
+"""A response in a line, and as a small page: its last waveforms, its spectrum, and its size."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simple_model import drawing
+from simple_model.numbers import counted, significant, stated_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,6 +15,20 @@ if TYPE_CHECKING:
 SHOWN = 0.030  # s of waveforms, at their end
 SETTLE = 0.25  # of a response, before which its RMS is not taken
 MOST_ROWS = 12  # probes in the table
+
+
+def line(response: "Response") -> str:
+    """Model, quantity, size, expected error and number of warnings."""
+    record, times = response.record, response.times
+    largest = record.per_unit * float(np.abs(response.values).max(initial=0.0))
+    said = [
+        f"{record.words} ({counted(len(times), 'time')}, "
+        f"{counted(len(response.probes), 'probe')}) from {1e3 * times[0]:g} to "
+        f"{1e3 * times[-1]:.5g} ms, at most {significant(largest)} {record.shown}",
+        f"expected error {stated_error(response.expected_error)}",
+        counted(len(response.effort.warnings), "warning"),
+    ]
+    return f"<Response of {response.model}: {'; '.join(said)}>"
 
 
 def html(response: "Response") -> str:
@@ -35,10 +50,9 @@ def html(response: "Response") -> str:
 def _tables(response: "Response") -> list[str]:
     """Facts of a response, and its size at every probe, as tables of HTML."""
     effort, times, unit = response.effort, response.times, response.record.shown
-    error = response.expected_error
     facts = [
         ["times", f"{len(times):,} from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms"],
-        ["expected error", f"{100 * error:.2g} %" if np.isfinite(error) else "unknown"],
+        ["expected error", stated_error(response.expected_error)],
         ["degrees of freedom", f"{effort.dofs:,}" if effort.dofs else "none"],
         ["cost", f"{sum(effort.seconds.values()):.2g} s"],
     ]

@@ -1,5 +1,7 @@
 """Rhythms (pulses) and sampled signals, which modulate a Tacton's amplitude in time."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite

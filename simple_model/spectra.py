@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model.choices import choose
-from simple_model.drawing import curves, new_axes
+from simple_model.drawing import curves, new_axes, small
+from simple_model.numbers import counted
 from simple_model.quantities import Quantity, quantity
 from simple_model.trajectory import Floats
 
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DEEPEST = 1e-4  # of the largest amplitude, -80 dB: shown
-ROOM = 0.03  # of the highest frequency, between names
+LISTED = 5  # names of lines where they are printed
+BROAD, LONG = 1.3, 0.6  # a name, and of it a letter, over the size of letters
+LEFT = 0.8  # of axes as they are before their labels are drawn
+NONE_RESOLVED = "no line of the load is resolved;\nin a longer Tacton more are"
 LOUD = 1e-3  # of it, from which on frequencies are shown
 
 
@@ -34,6 +38,10 @@ class Spectrum:
     def record(self) -> Quantity:
         """The record of its quantity."""
         return quantity(self.quantity)
+
+    def __repr__(self) -> str:
+        said = f"{len(self.frequencies):,} frequencies to {self.frequencies[-1]:.5g} Hz"
+        return f"<Spectrum of {self.record.words}: {said}, {counted(len(self.probes), 'probe')}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
         """Draw the spectrum at every probe, amplitudes to -80 dB of the largest on a logarithmic
@@ -83,31 +91,46 @@ class Lines:
     def __len__(self) -> int:
         return len(self.names)
 
+    def __repr__(self) -> str:
+        strongest = np.argsort(-np.abs(self.amplitudes).max(axis=1, initial=0.0), kind="stable")
+        named = ", ".join(self.names[k] for k in strongest[:LISTED])
+        said = f"{counted(len(self), 'line')}, {counted(len(self.probes), 'probe')}"
+        said += f"; the strongest: {named}" if named else ""
+        return f"<Lines of {self.record.words}: {said}>"
+
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw the moduli at every probe, each line with its name."""
+        """Draw the moduli at every probe, each line with its name, or say that none is resolved."""
         ax = new_axes(ax)
         size = self.record.per_unit * np.abs(self.amplitudes)
         largest = float(size.max(initial=0.0)) or 1.0
         curves(ax, self.frequencies, size, self.probes, ls="none", marker="o", ms=4)
         heights = size.max(axis=1, initial=0.0)
         loud = np.flatnonzero(heights > LOUD * largest)
-        for k in loud[_with_room(self.frequencies[loud], heights[loud])]:
+        end = 1.1 * max(float(self.frequencies[loud].max(initial=0.0)), 100.0)
+        width, height = LEFT * 72 / ax.figure.dpi * np.array(ax.get_window_extent().size)  # points
+        apart = BROAD * small() / width * end
+        low, high = np.log10([LOUD / 3 * largest, 10 * largest])
+        for k in loud[_with_room(self.frequencies[loud], heights[loud], apart)]:
             ax.annotate(
                 self.names[k], (self.frequencies[k], heights[k]), xytext=(0, 5),
-                textcoords="offset points", rotation=90, ha="center", fontsize="x-small",
+                textcoords="offset points", rotation=90, ha="center", fontsize=small(),
                 parse_math=False,
             )  # fmt: skip
+            share = min((5 + LONG * small() * len(self.names[k])) / height, 0.6)
+            high = max(high, (np.log10(heights[k]) - share * low) / (1 - share))
+        if not len(self):
+            ax.text(0.5, 0.5, NONE_RESOLVED, transform=ax.transAxes, ha="center", va="center")
         ax.set_yscale("log")
-        ax.set_ylim(LOUD / 3 * largest, 10 * largest)
-        ax.set_xlim(0, 1.1 * max(float(self.frequencies[loud].max(initial=0.0)), 100.0))
+        ax.set_ylim(10**low, 10**high)
+        ax.set_xlim(0, end)
         ax.set_xlabel("frequency, Hz")
         ax.set_ylabel(f"amplitude, {self.record.shown}")
         return ax
 
 
-def _with_room(frequencies: Floats, heights: Floats) -> list[int]:
-    """Numbers of lines whose names have room: none is near a stronger one."""
-    apart, chosen = ROOM * float(frequencies.max(initial=0.0)), list[int]()
+def _with_room(frequencies: Floats, heights: Floats, apart: float) -> list[int]:
+    """Numbers of lines whose names have room: none is nearer to a stronger one than some Hz."""
+    chosen = list[int]()
     for k in np.argsort(-heights, kind="stable").tolist():
         if all(abs(frequencies[k] - frequencies[other]) > apart for other in chosen):
             chosen.append(k)

@@ -7,6 +7,8 @@ E = sin(2 pi f_e t). A frequency of 0 means a factor of exactly 1. A rhythm, and
 an envelope, are further factors of A; a signal that is a modulation is one of {...}.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from math import isfinite
 

@@ -15,6 +15,8 @@ Pacinian channel (spatial summation), by 3 dB for each halving of its area: 7 dB
 0.58 cm2 of a focal spot.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -4,6 +4,8 @@ Named shapes: Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are comput
 of the drawing period, never by adding steps, and so are as exact at 10 s as at 0.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

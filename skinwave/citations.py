@@ -6,6 +6,7 @@ from simple_model import Response
 from skinwave.effort import versions
 from skinwave.models import named
 
+VERSION, RELEASED = "0.4.0", 2026  # as CITATION.cff has them
 TACTONS = (
     "C. Lim, H. Seifi, G. Park: An Interactive Tool for Simulating Mid-Air Ultrasound Tactons on "
     "the Skin. Extended Abstracts of the CHI Conference on Human Factors in Computing Systems "
@@ -60,9 +61,10 @@ def cite(*responses: Response) -> Citations:
     methods = ", ".join(f"{name} ({named(name).method})" for name in models)
     made = {**versions(), **responses[0].effort.versions}
     release = made.get("skinwave", "of unknown version")
+    year = f", {RELEASED}" if release == VERSION else ""
     program = (
-        f"The skinwave authors: skinwave {release}: waves in skin and paper under mid-air "
-        "ultrasound haptics. Software"
+        "The skinwave authors: skinwave: waves in skin and paper under mid-air ultrasound haptics. "
+        f"Version {release}{year}. Software"
     )
     sources = [source for name in models for source in named(name).sources]
     solvers = [text for name, text in SOLVERS.items()

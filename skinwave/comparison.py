@@ -1,5 +1,7 @@
 """Comparison of two responses: waveforms, lines, phase delay and spread."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +48,9 @@ class Agreement:
     spread_candidate: dict[int, float]
     frequencies: Floats
     probes: Floats
+
+    def __repr__(self) -> str:
+        return notebook.agreement_line(self)
 
     def _repr_html_(self) -> str:
         return notebook.agreement_page(self)

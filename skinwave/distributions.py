@@ -40,7 +40,7 @@ class Measure:
 MEASURES = {
     "spread": Measure(keys=("spread",), shapes=("lognormal", "normal")),
     "factor": Measure(keys=("factor",), shapes=("lognormal",)),
-    "standard_error": Measure(keys=("standard_error",), shapes=("normal",)),
+    "standard_error": Measure(keys=("standard_error",), shapes=("normal", "lognormal")),
     "bounds": Measure(keys=("low", "high"), shapes=("uniform", "triangular")),
 }
 RELATIVE = ("spread", "factor")  # measures over the value
@@ -135,7 +135,8 @@ class Distribution:
 def _lognormal(value: float, given: Distribution, shares: Floats) -> Floats:
     """Median `value`; s^2 = ln(1 + c^2) for a coefficient of variation c."""
     (width,) = given.width
-    s = log(width) / TAIL if given.measure == "factor" else sqrt(log1p(width**2))
+    c = width / value if given.measure == "standard_error" else width
+    s = log(width) / TAIL if given.measure == "factor" else sqrt(log1p(c**2))
     return value * np.exp(s * ndtri(shares))
 
 

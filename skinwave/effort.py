@@ -5,9 +5,10 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
+from threading import Lock
 
 SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -42,13 +43,41 @@ def peak_memory() -> int:
     return int(peak if sys.platform == "darwin" else 1024 * peak)
 
 
+class _SharedLimit:
+    """Limit of the whole process: who enters first sets it, and who leaves last lifts it. Each with
+    one of its own would set again what another had found limited.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._within, self._limit = Lock(), 0, ExitStack()
+
+    def enter(self) -> None:
+        from threadpoolctl import ThreadpoolController
+
+        with self._lock:
+            self._within += 1
+            if self._within == 1:
+                limit = ThreadpoolController().limit(limits=1, user_api="blas")
+                self._limit.enter_context(limit)
+
+    def leave(self) -> None:
+        with self._lock:
+            self._within -= 1
+            if not self._within:
+                self._limit.close()
+
+
+_ONE_THREAD = _SharedLimit()
+
+
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Linear algebra on one thread: in small products several wait for each other."""
-    from threadpoolctl import ThreadpoolController
-
-    with ThreadpoolController().limit(limits=1, user_api="blas"):
+    _ONE_THREAD.enter()
+    try:
         yield
+    finally:
+        _ONE_THREAD.leave()
 
 
 def versions() -> dict[str, str]:

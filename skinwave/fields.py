@@ -1,5 +1,7 @@
 """Motion of a whole body, with its expected error and all warnings."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +12,7 @@ import numpy as np
 from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
+from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.effort import Progress, SkinwaveWarning
 from skinwave.models.reduction import from_rest, oscillating
@@ -37,6 +40,17 @@ class Field:
     effort: Effort
     expected_error: float = np.nan
 
+    def __repr__(self) -> str:
+        size = 1e6 * float(np.sqrt((self.displacement**2).sum(axis=2).max(initial=0.0)))
+        said = [
+            f"{counted(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
+            f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm",
+            f"{self.mesh!r}"[1:-1],
+            f"expected error {stated_error(self.expected_error)}",
+            counted(len(self.effort.warnings), "warning"),
+        ]
+        return f"<Field: {'; '.join(said)}>"
+
     @property
     def strongest(self) -> float:
         """The one of its times, s, when a node is displaced most."""
@@ -52,7 +66,7 @@ class Field:
         """
         return field_plot.frame(self.times, self.strongest if time is None else time)
 
-    def to_pyvista(self, time: float | None = None) -> "pv.UnstructuredGrid":
+    def to_pyvista(self, time: float | None = None) -> pv.UnstructuredGrid:
         """The mesh at rest as a grid of pyvista, in metre, with its `displacement` (n, 3) in metre
         at the time nearest to one in s, or when it is largest; `time_s` in its field data.
         """
@@ -61,13 +75,13 @@ class Field:
         grid.field_data["time_s"] = self.times[k : k + 1]
         return grid
 
-    def plot(self, time: float | None = None, *, ax: "Axes | None" = None) -> "Axes":
+    def plot(self, time: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the displacement into the body of the upper surface, seen from above, at the time
         nearest to one in s, or when it is largest; colours are those of all times.
         """
         return field_plot.draw(self, self.frame(time), ax)
 
-    def animate(self, frames: int = 40, *, ax: "Axes | None" = None) -> "FuncAnimation":
+    def animate(self, frames: int = 40, *, ax: Axes | None = None) -> FuncAnimation:
         """The same as a film of so many of its times, evenly spaced; `.save("film.gif")` writes it,
         `.to_jshtml()` shows it in a notebook.
         """

@@ -5,6 +5,8 @@ direction it acts on a surface of normal n. Beside it there may be gravity, whic
 support that moves.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import hypot, isfinite, pi
@@ -64,7 +66,7 @@ class Load:
         kind.check(self)
 
     @property
-    def of_kind(self) -> "LoadKind":
+    def of_kind(self) -> LoadKind:
         """The registered record of its kind."""
         if self.kind not in LOADS:
             extensions.load()
@@ -81,7 +83,7 @@ class Load:
         return not self.moving.tractions(np.array([[0.0, 0.0, 1.0]]))[..., :2].any()
 
     @property
-    def moving(self) -> "Load":
+    def moving(self) -> Load:
         """The same without gravity."""
         return replace(self, gravity=0.0)
 

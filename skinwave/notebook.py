@@ -1,20 +1,52 @@
-"""Small pages of plans and comparisons for notebooks."""
+"""Plans and comparisons in a line, and as small pages for notebooks."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simple_model import drawing
+from simple_model.numbers import counted, percent, stated_error
 from skinwave.pictures.scene_plot import draw_body
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from meshes.tetmesh import Floats
     from skinwave.comparison import Agreement
     from skinwave.planning.plan import Plan
 
 MOST_ROWS = 12  # probes in a table
+
+
+def plan_line(plan: "Plan") -> str:
+    """Model, body, expected error, cost and number of warnings."""
+    size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
+    body = plan.body.of_kind.words(plan.body)
+    body += f" halved across {' and '.join(plan.symmetry)}" if plan.symmetry else ""
+    said = [
+        f"{size}, {body}",
+        f"expected error {stated_error(plan.error)}",
+        f"{plan.seconds:.2g} s, {plan.memory / 2**30:.2g} GiB",
+        counted(len(plan.warnings), "warning"),
+    ]
+    return f"<Plan of {plan.model}: {'; '.join(said)}>"
+
+
+def agreement_line(found: "Agreement") -> str:
+    """Misfits, delays and number of lines."""
+    said = [
+        f"relative L2 misfit {_range(found.relative_l2)}",
+        f"of the shape {_range(found.shape_misfit)}",
+        f"scale {found.scale:.4g}",
+        f"{counted(len(found.probes), 'probe')}, {counted(len(found.frequencies), 'line')}",
+    ]
+    return f"<Agreement: {'; '.join(said)}>"
+
+
+def _range(misfit: "Floats") -> str:
+    low, high = (percent(float(end)) for end in (misfit.min(), misfit.max()))
+    return low if low == high else f"{low.removesuffix(' %')} to {high}"
 
 
 def plan_page(plan: "Plan") -> str:
@@ -26,13 +58,12 @@ def plan_page(plan: "Plan") -> str:
         ax.set_aspect("equal")
         ax.set_xlabel("x, mm")
         ax.set_ylabel("y, mm")
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize="small")
+        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=drawing.small())
 
     kind = plan.body.of_kind
     image = drawing.picture(draw, 3.2, 3.0) if kind.discretise and kind.is_bounded else b""
-    error = f"{100 * plan.error:.2g} %" if np.isfinite(plan.error) else "unknown"
     cost = f"{plan.seconds:.2g} s, {plan.memory / 2**30:.2g} GiB"
-    facts = [["expected error", error], ["cost", cost]]
+    facts = [["expected error", stated_error(plan.error)], ["cost", cost]]
     rows = [[row.what, row.value, row.reason] for row in plan.rows]
     tables = [drawing.table(facts), drawing.table(rows, ["", "", "reason"])]
     return drawing.page(f"Plan: {plan.model}", image, tables, plan.warnings)
@@ -68,7 +99,7 @@ def _draw_misfits(ax: "Axes", found: "Agreement") -> None:
     ax.bar(probes + 0.2, 100 * found.shape_misfit, 0.4, label="shape", color="#E69F00")
     ax.set_xlabel("probe")
     ax.set_ylabel("misfit, %")
-    ax.legend(frameon=False, fontsize="small")
+    ax.legend(frameon=False, fontsize=drawing.small())
 
 
 def _draw_lines(ax: "Axes", found: "Agreement") -> None:
@@ -83,6 +114,6 @@ def _draw_lines(ax: "Axes", found: "Agreement") -> None:
     ax.set_xticks(range(len(found.probes)))
     ax.set_ylabel("line, dB re reference")
     if len(found.frequencies):
-        ax.legend(frameon=False, fontsize="small")
+        ax.legend(frameon=False, fontsize=drawing.small())
     else:
         ax.text(0.5, 0.6, "no line was asked for", transform=ax.transAxes, ha="center")

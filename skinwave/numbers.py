@@ -2,21 +2,14 @@
 whether what a file holds is one.
 """
 
-from math import floor, isfinite, log10
+from math import isfinite
 from typing import Any
 
+from simple_model.numbers import significant
+
+__all__ = ["FAINTEST", "decibel", "is_finite_number", "significant"]
+
 FAINTEST = -120.0  # dB: a level below it is round-off
-LARGEST, SMALLEST = 1e6, 1e-4  # written without an exponent between these
-
-
-def significant(value: float, digits: int = 3) -> str:
-    """A number to so many significant digits; "-" if it is none."""
-    if not isfinite(value):
-        return "-"
-    if not SMALLEST <= abs(value) < LARGEST:
-        return f"{value:.{digits}g}"
-    value = float(f"{value:.{digits - 1}e}")
-    return f"{value:,.{max(digits - 1 - floor(log10(abs(value))), 0)}f}"
 
 
 def decibel(value: float, *, signed: bool = False) -> str:

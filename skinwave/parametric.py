@@ -7,6 +7,8 @@ ratios and the elements are fixed: with a thickness the nodes of one mesh move. 
 of a slab with absorbing sides is as wide as the fastest shear waves need.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache as cached
@@ -30,32 +32,28 @@ from fem.reduced_affine import AffineModel, Geometry, Variant, reduce_affine, st
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.load_spectrum import load_lines, pressure_lines
 from simple_model.prony import FIT_TOLERANCE
-from simple_model.quantities import STRAIN
 from skinwave.bodies.build import Build
-from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent
-from skinwave.models.free_materials import (
+from skinwave.models.affine_scenes import check_scene
+from skinwave.models.free_keys import (
     FreeKey,
-    Reference,
     free_keys,
-    meshed_materials,
     meshing_shares,
-    reference_of,
-    solids_of,
     training_shares,
     values_at,
     with_values,
 )
+from skinwave.models.free_materials import Reference, meshed_materials, reference_of, solids_of
 from skinwave.models.full import spent
-from skinwave.models.laws import check_laws, relaxing
-from skinwave.models.loads import line_factor, probe_rows, surface_load
+from skinwave.models.laws import relaxing
+from skinwave.models.loads import line_factor, load_lines_at, probe_rows, spread, surface_load
 from skinwave.models.parametric_cache import packed, unpacked
 from skinwave.models.prepared import Prepared, entry_name, typical_spots
 from skinwave.models.prepared import answer as answer_of
 from skinwave.models.reduction import BAND, reduced_variant
+from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.models.thicknesses import (
     Range,
     build_at,
@@ -63,12 +61,12 @@ from skinwave.models.thicknesses import (
     nearest_geometry,
     range_of,
 )
-from skinwave.scene import Body, Scene, check_load
+from skinwave.scene import Body, Scene
 
 TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
 FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
-MOST_LINES = 400
+FAINTEST_LOAD = 1e-6  # of the strongest line of the load
 FORMAT = "parametric 2"  # of what is cached
 ARRAYS = ("outputs", "load", "points", "frequencies")
 BETWEEN = 0.3  # of each range: a body of no known geometry
@@ -99,6 +97,11 @@ class ParametricBody:
     frequencies: Floats
     bases: tuple[LineBasis, ...]
     effort: Effort
+
+    def __repr__(self) -> str:
+        free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
+        order = f"{len(self.parts)} geometries of order {self.outputs.shape[-1]}"
+        return f"<ParametricBody of {self.scene!r}: {free}; {order}>"
 
 
 def prepare(
@@ -133,17 +136,19 @@ def prepare(
         tolerance is out of reach.
     """
     keys = free_keys(scene.body, free)
-    _check(scene, keys, tolerance)
+    check_scene(scene, keys, tolerance)
     clock, report = Clock(), progress or silent
     bodies = _range(scene.body, keys, h)
     body = bodies.body(bodies.meshed)
     with clock("mesh"):
         report("mesh", 0.0)
-        mesh = cached(partial(build_at, bodies))
+        mesh = cached(partial(build_at, bodies, symmetry=_symmetry(scene)))
         build = mesh(bodies.meshed)
     reference = reference_of(body, build, keys)
-    probes, _ = probe_rows(body, build, scene.probe_points, scene.reading)
-    of_body = entry_name(body, build, scene.probe_points, solver, tolerance, outputs=probes)
+    of_body = entry_name(
+        body, build, scene.probe_points, solver, tolerance, outputs=_probes(scene, body, build),
+        load=scene.load,
+    )  # fmt: skip
     name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
     with clock("read from cache"):
         entry = cache.load(name)
@@ -189,12 +194,11 @@ class _Stage:
             build.mesh, meshed_materials(build), fixed=build.fixed, absorbing=build.absorbing,
             drag=build.drag, support=build.support, coat=build.coat,
         )  # fmt: skip
-        P, points = surface_load(build)
-        probes, _ = probe_rows(body, build, self.scene.probe_points, self.scene.reading)
+        P, points = _surface(self.scene, build)
         return Geometry(
-            affine=affine, probes=probes,
+            affine=affine, probes=_probes(self.scene, body, build),
             forces=_moving(self.scene, P, points)[1][:, affine.free],
-            loads=P @ typical_spots(body, points),
+            loads=spread(P, typical_spots(body, points)),
         )  # fmt: skip
 
     def solids(self, at: Sequence[float]) -> Solids:
@@ -210,7 +214,7 @@ def _reduced(
     geometries = {at: cached(partial(stage.geometry, at)) for at in bodies.geometries}
     with clock("assemble"):
         report("assemble", 0.0)
-        frequencies, _ = _moving(scene, *surface_load(build))
+        frequencies, _ = _moving(scene, *_surface(scene, build))
         for geometry in geometries.values():
             geometry()
     few = [_variant(stage, at, geometries) for at in _training(stage)]
@@ -219,7 +223,7 @@ def _reduced(
             list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
             solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
-    surface = [_surface(stage.mesh(at), model) for at in geometries]
+    surface = [_reduced_surface(scene, stage.mesh(at), model) for at in geometries]
     with clock("lines"), one_thread():
         kept, bases, error = _bases(stage, model, frequencies, few, report)
     effort = Effort(
@@ -253,9 +257,9 @@ def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]
     )  # fmt: skip
 
 
-def _surface(build: Build, model: AffineModel) -> tuple[Floats, Floats]:
-    """Reduced forces (k, r) of unit pressure, and the points (k, 3) where it is."""
-    P, points = surface_load(build)
+def _reduced_surface(scene: Scene, build: Build, model: AffineModel) -> tuple[Floats, Floats]:
+    """Reduced forces (c k, r) of a unit load, and the points (k, 3) where it is."""
+    P, points = _surface(scene, build)
     return P[model.affine.free].T @ model.basis, points
 
 
@@ -294,57 +298,32 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
     small = operators_of(affine, solids_of(prepared.reference, body))
     return Prepared(
         probes=prepared.scene.probe_points, read=outputs, reading=prepared.scene.reading,
+        load=prepared.scene.load,
         body=reduced_variant(small, load, points, prepared.effort),
     )  # fmt: skip
 
 
-def has_affine_operators(body: Body) -> bool:
-    """Whether the operators of a body are sums over its materials: those of a sheet that is
-    stretched, not held by all of its edges, or orthotropic have other terms.
-    """
-    return body.mounting == FRAME and body.solid.orthotropy is None
+def _symmetry(scene: Scene) -> str:
+    """Axes, of "xy", across which the part of the body on one side gives what the probes read."""
+    return modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
 
 
-def _check(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None:
-    """Refuse what no affine sum gives."""
-    if not 0 < tolerance < 1:
-        raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    check_load(scene, "a body with free materials")
-    check_laws(scene.body, scene.pressure)
-    if not has_affine_operators(scene.body):
-        raise ValueError(
-            "a body with free materials is an isotropic sheet in a frame, or none: tension and "
-            "other mountings do not scale with its modulus; reduce the body of each material"
-        )
-    if scene.body.air:
-        raise ValueError(
-            "a body with free materials has no air: its added mass is a dense operator; leave air "
-            "out, or reduce the body of each material"
-        )
-    asked, solid = scene.reading.asked, scene.body.solid
-    if asked.field == STRAIN and any(key.is_thickness for key in keys):
-        raise ValueError(
-            f"{scene.reading.words} of elements that move with a thickness is not smooth in it; "
-            "take a displacement, velocity or acceleration"
-        )
-    rows, doubled = (asked.rows(each) for each in (solid, solid.scaled(modulus=2.0)))
-    if asked.relaxes or not np.array_equal(rows, doubled):
-        raise ValueError(
-            f"{scene.reading.words} depends on the material beyond the motion, which is all that a "
-            "body with free materials gives; take a displacement, velocity or strain"
-        )
-    if (count := len(np.unique(load_lines(scene.pressure).frequencies))) > MOST_LINES:
-        raise ValueError(
-            f"the load has {count:,} lines, the limit with free materials is {MOST_LINES}; leave "
-            "out the rhythm or signal"
-        )
+def _probes(scene: Scene, body: Body, build: Build) -> sparse.csr_array:
+    """What the probes read of a mesh, (p c, 3 n)."""
+    places = images(scene.probe_points, build.symmetry)
+    return probe_rows(body, build, places, scene.reading)[0]
+
+
+def _surface(scene: Scene, build: Build) -> tuple[sparse.csr_array, Floats]:
+    """Load operator (3 n, c k) of a mesh, and the points (k, 3) where it takes the load."""
+    return even_part(*surface_load(build, scene.load), build.symmetry)
 
 
 def _moving(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
     """Frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines, without the mean
     if the body is unconstrained, which drifts under it.
     """
-    frequencies, pressures = pressure_lines(scene.pressure, points)
+    frequencies, pressures = load_lines_at(scene.loads, points, FAINTEST_LOAD)
     kept = (frequencies > 0) | scene.body.is_held
     return frequencies[kept], (P @ pressures[kept].T).T
 

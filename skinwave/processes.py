@@ -185,12 +185,12 @@ def pool(count: int, begin: Callable[[], None]) -> "Iterator[Executor]":
                 manager.join(PATIENCE)
 
 
-def as_worker() -> None:
-    """Begin a process as a part of its parent, on one thread."""
+def as_worker(threads: int = 1) -> None:
+    """Begin a process as a part of its parent, on so many threads if the user has not said."""
     from skinwave.effort import THREADS
 
     for name in THREADS:
-        os.environ.setdefault(name, "1")
+        os.environ.setdefault(name, str(threads))
     as_part()
 
 

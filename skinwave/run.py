@@ -15,6 +15,8 @@ ASSESSED = (
     "f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM",
 )  # fmt: skip
 
+SUPPORT = "f_support"  # the line of a support that moves
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
@@ -41,7 +43,8 @@ class Run:
     def table(self) -> LineTable:
         """All lines of the response, each once."""
         candidates = ASSESSED if len(self.scene.tacton.foci) == 1 else ()
-        return line_table(self.scene.pressure, self.response, candidates=candidates)
+        beside = lines_beside(self.scene, self.response)
+        return line_table(self.scene.pressure, self.response, candidates=candidates, beside=beside)
 
     @property
     def listed(self) -> dict[str, float]:
@@ -104,6 +107,12 @@ class Run:
     def is_stm(self) -> bool:
         """Whether the focus moves."""
         return self.scene.tacton.trajectory.drawing_frequency > 0
+
+
+def lines_beside(scene: Scene, response: Response) -> dict[str, float]:
+    """Names and frequencies in Hz of what moves a response's body beside the pressure."""
+    motion = scene.load.support_motion
+    return {SUPPORT: motion.frequency} if motion and response.record.of_body else {}
 
 
 def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:

@@ -1,5 +1,7 @@
 """A scene: what is commanded, what it acts on, where it is probed. Physics only, one TOML file."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -212,9 +214,12 @@ class Scene:
         """Quantity of the probes, and their depths."""
         return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
 
-    def plot(self, *, ax: "Axes | None" = None) -> "Axes":
+    def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw body, path, foci at the start and probes from above, and return the axes."""
         return scene_plot.draw(self, ax)
+
+    def __repr__(self) -> str:
+        return scene_plot.line(self)
 
     def _repr_html_(self) -> str:
         return scene_plot.page(self)

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -111,7 +112,7 @@ def from_table(table: dict[str, Any]) -> Scene:
     scene = Scene(
         name=top.get("name", "scene"), pressure=pressure, body=body, load=load, **parts["probes"]
     )
-    return _with_spreads(scene, spreads) if spreads else scene
+    return with_distributions(scene, spreads) if spreads else scene
 
 
 def _load(values: dict[str, Any], focus: dict[str, Any]) -> Load:
@@ -123,13 +124,20 @@ def _load(values: dict[str, Any], focus: dict[str, Any]) -> Load:
     return load
 
 
-def _with_spreads(scene: Scene, spreads: dict[str, Distribution]) -> Scene:
+def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Scene:
+    """The scene with these distributions of its numbers, by dotted key, and no others.
+
+    Raises
+    ------
+    ValueError
+        If it has no such number.
+    """
     complete = to_table(scene)
-    spreads = dict(_of_shear(complete, *each) for each in spreads.items())
-    for key in spreads:
+    found = dict(_of_shear(complete, *each) for each in spreads.items())
+    for key in found:
         if parent_of(complete, key)[0] is None:
             raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
-    return replace(scene, spreads=tuple(sorted(spreads.items())))
+    return replace(scene, spreads=tuple(sorted(found.items())))
 
 
 def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[str, Distribution]:

@@ -1,5 +1,7 @@
 """Simulation of a scene by any model, chosen by name."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import replace
 

@@ -34,6 +34,7 @@ give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; Ac
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from skinwave.bodies.parts import solid_of
 from skinwave.distributions import Distribution, known_to, parent_of
@@ -148,6 +149,25 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     for key, x in scaled.items():
         found = _scaled(found, key, x)
     return found
+
+
+def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
+    """The scene with factors on all moduli or all losses of materials, by keys such as
+    "body.material.modulus_scale".
+
+    Raises
+    ------
+    ValueError
+        If the scene has no such material, or the factor is no number above 0.
+    """
+    for key, factor in scales.items():
+        parent, last = parent_of(to_table(scene), key.rpartition(".")[0])
+        if parent is None or not isinstance(parent[last], str | dict):
+            raise ValueError(f"there is no material for {key} in this scene; leave it out")
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
+            raise ValueError(f"{key} = {factor!r} must be a number above 0")
+        scene = _scaled(scene, key, float(factor))
+    return scene
 
 
 def _scaled(scene: Scene, key: str, factor: float) -> Scene:

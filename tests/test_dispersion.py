@@ -4,6 +4,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
+from legible import illegible, sizes, texts
 
 from simple_model.compliance import half_space, slab, thin_sheet
 from simple_model.dispersion import dispersion_curves
@@ -11,6 +12,9 @@ from simple_model.layers import Stack
 from simple_model.material import PRESETS, Material
 from simple_model.sheet_modes import sheet_curves
 from simple_model.wavenumber_integral import point_response
+from skinwave.pictures.dispersion import dispersion_figure
+from skinwave.pictures.styles import STYLES, style
+from skinwave.studies.driven_modes import driven_modes
 
 WIDTH = 4.35e-3  # m, of the focal spot
 SOFT = Material(density=1000, shear_modulus=8e3, poisson=0.45, viscosity=1.0)
@@ -269,9 +273,25 @@ speed_m_per_s = 12
 
 @pytest.fixture(scope="module")
 def driven():
-    from skinwave.studies.driven_modes import driven_modes
-
     return driven_modes(scene_of(CIRCLE + 'kind = "slab"'), spacing=24)
+
+
+@pytest.mark.parametrize("width", [None, 2.5, 3.5, 5.0, 7.0])
+@pytest.mark.parametrize("kind", ["slab", "sheet"])
+def test_no_text_of_the_curves_is_cut_or_over_another(driven, kind, width):
+    found = driven
+    if kind == "sheet":
+        found = driven_modes(scene_of(CIRCLE + 'kind = "sheet"\nmaterial = "paper"'))
+    lines = {line.name: line.frequency for line in found.lines}
+    chosen = style("print", width) if width else STYLES["report"]
+    figure = dispersion_figure(found.curves, lines, 12.0, found.lines[0].frequency, chosen)
+    assert illegible(figure) == []
+    if width:
+        assert figure.get_figwidth() == width
+        assert sizes(figure) == {8.0}
+    named = [text.get_text() for text, _ in texts(figure) if "$" in text.get_text()]
+    assert "$f_{d}$" in named  # the strongest
+    assert len(named) == len(set(named)) >= 3
 
 
 def test_lines_of_a_load_are_at_their_own_frequencies_on_the_curves(driven):
@@ -322,7 +342,6 @@ def test_sentences_say_speed_decay_focus_and_cut_off(driven):
 )  # fmt: skip
 def test_every_kind_of_body_with_a_depth_has_curves(body, said):
     from skinwave.studies.dispersion_page import sentences, taken_as
-    from skinwave.studies.driven_modes import driven_modes
 
     found = driven_modes(scene_of(CIRCLE + body), spacing=12)
     text = " ".join([*sentences(found), *taken_as(found.scene), found.curves.modes[0].name])

@@ -1,17 +1,22 @@
 """Docstrings of public functions: numpydoc sections, one meaning for each index letter."""
 
 import ast
+import inspect
 import re
 from pathlib import Path
 
 import pytest
 
+import fem
+import meshes
+import simple_model
 import skinwave
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("fem", "simple_model", "meshes")
 ROOMS = ("bodies", "models", "planning")  # of skinwave, whose functions others call
 MODULES = ("simulation", "comparison", "fields")
+LONGEST, EACH = 300, 33  # characters of a signature, or of each argument where there are ten
 FEWEST = 3  # arguments from which a docstring has sections
 
 
@@ -71,3 +76,27 @@ def test_index_letters_of_every_einsum_in_fem_are_listed_once():
         for subscripts in re.findall(r'einsum\(\s*"([^"]+)"', path.read_text(encoding="utf-8")):
             used |= set(re.findall(r"[a-z]", subscripts))
     assert used <= set(letters)
+
+
+def public():
+    """What the packages export, by name, and the methods of its classes."""
+    for package in (simple_model, meshes, fem, skinwave):
+        for name in getattr(package, "__all__", dir(package)):
+            found = getattr(package, name, None)
+            if name.startswith("_") or not callable(found):
+                continue
+            yield pytest.param(found, id=f"{package.__name__}.{name}")
+            for method, _ in inspect.getmembers(found) if inspect.isclass(found) else ():
+                if not method.startswith("_") and callable(getattr(found, method)):
+                    yield pytest.param(getattr(found, method), id=f"{name}.{method}")
+
+
+@pytest.mark.parametrize("found", public())
+def test_signatures_are_short_and_name_types_as_the_source_does(found):
+    try:
+        signature = inspect.signature(found)
+    except ValueError:  # of a class in C
+        return
+    assert "typing." not in str(signature)
+    if not inspect.isclass(found):  # a record has as many fields as it has
+        assert len(str(signature)) < max(LONGEST, EACH * len(signature.parameters))

@@ -35,6 +35,17 @@ def test_what_a_page_links_to_is_there(page):
     assert [link for link in local if not (page.parent / link).exists()] == []
 
 
+def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
+    """The site's build draws them: the repository holds none."""
+    named = {
+        (page.stem, script)
+        for page in PAGES
+        for script in re.findall(r"sphx_glr_(\w+)_\d{3}\.png", page.read_text("utf-8"))
+    }
+    assert {"propagation", "elements", "silicone-disc"} <= {page for page, _ in named}
+    assert [x for x in named if not (ROOT / f"examples/gallery/{x[1]}.py").exists()] == []
+
+
 @pytest.mark.parametrize("text", shown("toml"))
 def test_every_scene_that_the_documentation_shows_is_one(text):
     scene = loads(text)

@@ -1,5 +1,6 @@
 """Properties that a finite element must have exactly."""
 
+from dataclasses import replace
 from itertools import product
 from math import factorial
 
@@ -10,8 +11,9 @@ import fem
 import meshes
 from fem.assembly import element_stiffness
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
+from fem.geometry import gradients, jacobians, shape_nodes
 from fem.pressure_projection import macroelements, projected_divergence
-from fem.sparsity import SparsityPattern, from_components
+from fem.sparsity import SparsityPattern
 from meshes import TetMesh
 
 
@@ -64,7 +66,7 @@ def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
     rough = np.random.default_rng(0).standard_normal(mesh.n_dofs)
     lam = np.ones(len(mesh.tets))
     pattern = SparsityPattern.of(mesh.tets, len(x))
-    direct = from_components(pattern, pattern.sum(element_stiffness(mesh, 0 * lam, lam), 6))
+    direct = pattern.blocks(element_stiffness(mesh, 0 * lam, lam))
     found = projected_divergence(mesh) @ rough
     assert found @ found < 0.6 * (rough @ direct @ rough)
 
@@ -108,6 +110,29 @@ def test_operators_are_symmetric_and_positive(distorted_cube):
     for operator in (ops.K, ops.C, ops.M):
         assert abs(operator - operator.T).max() < 1e-12 * abs(operator).max()
         assert np.linalg.eigvalsh(operator.toarray()).min() > 0
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.05])
+@pytest.mark.parametrize("fixed", [{"bottom": "xyz", "sides": "x"}, {"bottom": "z"}])
+def test_operators_are_the_integrals_of_their_definition(distorted_cube, bend, fixed):
+    x = distorted_cube.points
+    mesh = replace(distorted_cube, points=x + bend * np.sin(5 * x[:, [1, 2, 0]]))
+    mu, lam, rho = 2.0, 3.0, 700.0
+    material = fem.Material(density=rho, shear_modulus=mu, poisson=lam / 2 / (lam + mu))
+    found = fem.assemble(mesh, material, fixed=fixed)
+    K, M = np.zeros((2, len(x), 3, len(x), 3))
+    slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
+    H = np.einsum("eq,eqia,eqjb->eaibj", volumes, slopes, slopes, optimize=True)
+    shear = np.einsum("eakbk,ij->eaibj", H, np.eye(3))
+    blocks = lam * H + mu * (H.transpose(0, 1, 4, 3, 2) + shear)
+    N, volumes = shape_functions(tetrahedron_rule(5)[0], 10), jacobians(shape_nodes(mesh), 5, 0)[2]
+    masses = np.einsum("eq,qa,qb,ij->eaibj", rho * volumes, N, N, np.eye(3), optimize=True)
+    for nodes, block, mass in zip(mesh.tets, blocks, masses, strict=True):
+        K[nodes[:, None], :, nodes] += block.transpose(0, 2, 1, 3)
+        M[nodes[:, None], :, nodes] += mass.transpose(0, 2, 1, 3)
+    for A, by_definition in ((found.K, K), (found.M, M)):
+        dense = by_definition.reshape(mesh.n_dofs, -1)[np.ix_(found.free, found.free)]
+        assert abs(A - dense).max() < 1e-14 * abs(dense).max()
 
 
 def test_regions_have_their_own_material():

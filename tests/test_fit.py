@@ -11,9 +11,10 @@ from simple_model.load_spectrum import synthesise
 from skinwave import cli
 from skinwave.bodies.analytic import compliance
 from skinwave.fits.findings import cautions, shown
-from skinwave.fits.fit import fit
+from skinwave.fits.fit import fit, sampled
 from skinwave.fits.identify import correlations, estimates, whiteness, width
 from skinwave.fits.observed import Data, is_steady
+from skinwave.fits.page import fitted_scene, summary
 from skinwave.fits.parameters import Parameter, check, parse
 from skinwave.fits.predicted import predicted_lines, target
 from skinwave.fits.problem import Problem
@@ -23,6 +24,7 @@ from skinwave.measurements import Measurement
 from skinwave.measurements.writing import write
 from skinwave.scene_file import loads
 from skinwave.simulation import compute
+from skinwave.spreads import OF_PRESETS, spreads_of
 from skinwave.sweeps.variation import varied
 
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"
@@ -189,6 +191,63 @@ def test_gain_and_pressure_have_no_interval_but_their_product(scene, lines):
     assert found.values["gain"] * found.values[PRESSURE] == pytest.approx(0.8 * 50, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("limits", "times", "said"),
+    [
+        (["gain=0.0001:0.001"], 0, f"neither {MODULUS} nor gain"),
+        (["gain=0.0001:0.1", f"{PRESSURE}=0.001:1"], 0, f"neither gain nor {PRESSURE}"),
+        (["gain=0.2:5"], 1e3, f"neither {MODULUS} nor gain"),
+    ],
+)
+def test_noise_determines_no_combination(scene, lines, limits, times, said):
+    """As many directions that are not resolved as keys: no interval, of width zero or any other."""
+    measured = spectra(scene, lines, 0.05)
+    noise = np.random.default_rng(5).standard_normal((2, *measured.values.shape)) * 1e-3
+    values = times * measured.values if times else noise[0] + 1j * noise[1]
+    found = fit(scene, replace(measured, values=values), [f"{MODULUS}=8000:80000", *limits],
+                starts=1)  # fmt: skip
+    told = cautions(found)
+    assert not any("is determined" in text for text in told)
+    assert sum(f"the data determine {said}" in text for text in told) == 1, told
+
+
+def test_the_fitted_scene_has_the_spreads_of_the_estimates(scene, lines):
+    """Quantiles 2.5 and 97.5 % are the interval, and the loss keeps the spread of the preset."""
+    measured = spectra(scene, lines, 0.03)
+    found = fit(scene, measured, [*vary("gain", MODULUS, "delay_ms"), "body.thickness_mm=10:20"],
+                starts=1)  # fmt: skip
+    text = fitted_scene(found)
+    assert "correlations of the estimates are dropped, as 0." in text
+    given = {each.key: each for each in spreads_of(loads(text))}
+    assert given.keys() == {MODULUS, VISCOSITY, "body.thickness_mm", PRESSURE}
+    for each in (one for one in found.estimates if "." in one.key):
+        ends = given[each.key].distribution.quantile(each.value, [0.025, 0.975])
+        assert ends == pytest.approx([each.low, each.high], rel=0.01)
+    losses = OF_PRESETS["palm"].losses
+    assert given[VISCOSITY].value == 5
+    assert given[VISCOSITY].distribution == losses
+
+
+def test_what_is_not_resolved_is_anywhere_between_its_limits_in_the_fitted_scene(scene, lines):
+    measured = spectra(scene, lines, 0.01, delay=0)
+    tie = [f"{VISCOSITY}={MODULUS} / 5000"]
+    found = fit(scene, measured, vary("gain", MODULUS, PRESSURE), tie=tie, starts=1)
+    text = fitted_scene(found)
+    given = {each.key: each for each in spreads_of(loads(text))}
+    assert given.keys() == {MODULUS, PRESSURE}
+    assert given[PRESSURE].distribution.width == (10, 200)
+    assert f"{PRESSURE} is not resolved by the measurement" in text
+    assert f"{VISCOSITY} was tied" in text
+
+
+def test_short_chains_of_the_posterior_are_told(scene, lines):
+    found = sampled(fit(scene, spectra(scene, lines, 0.01), vary("gain"), starts=1), 12)
+    assert any("autocorrelation times long, and below 50" in said for said in cautions(found))
+    assert 0 < summary(found)["posterior_autocorrelation_times"] < 50
+    long = replace(found, posterior=replace(found.posterior, lengths=60.0))
+    assert not any("autocorrelation" in said for said in cautions(long))
+
+
 def test_a_parameter_without_effect_is_named(scene, lines):
     keys = [*vary("gain"), "body.size_x_mm=60:100"]
     found = fit(scene, spectra(scene, lines, 0.01), keys, starts=1)
@@ -248,6 +307,18 @@ def test_steady_waveforms_are_fitted_as_lines(scene, lines):
     assert found.values[MODULUS] == pytest.approx(30e3, rel=0.01)
     assert found.values["delay_ms"] == pytest.approx(-0.3, abs=0.02)
     assert found.whiteness.is_white
+
+
+def test_clipping_is_told(scene, lines):
+    f, a = lines
+    x = synthesise(f, a / (2j * np.pi * f)[:, None], np.arange(800) / 4000)
+    cut = np.clip(x, None, 0.6 * x.max(axis=0))
+    given = {"quantity": "displacement", "places": scene.probe_points}
+    for values, is_told in ((x, False), (cut, True)):
+        measured = Measurement(times=np.arange(800) / 4000, values=values[None], **given)
+        found = fit(scene, measured, vary("gain"), starts=1)
+        told = [said for said in cautions(found) if "the record is clipped" in said]
+        assert bool(told) == is_told
 
 
 def test_waveforms_from_rest_are_fitted_with_their_transient(scene, lines):

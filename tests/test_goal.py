@@ -5,6 +5,7 @@ import pytest
 
 import fem
 from meshes import equidistributed, extrude
+from meshes.shapes.equidistributed import error_ratio
 
 SIDE, DEPTH = 0.03, 0.01
 
@@ -89,3 +90,31 @@ def test_lines_have_the_density_that_errors_ask_for():
     error[:, 2] *= 16  # which four times as many cells along z make up for
     x, _, z = equidistributed(3 * [line], cells, error, dofs=24 * 40**3, order=2.0)
     assert (len(x) - 1, len(z) - 1) == (26, 101)
+
+
+def test_lines_have_no_cells_above_a_limit():
+    line = np.linspace(-1.0, 1.0, 201)
+    cells = np.column_stack(3 * [np.arange(200)])
+    error = np.exp(-20 * np.abs(line[1:] + line[:-1]) / 2)[:, None] * np.ones(3)
+    free = equidistributed(3 * [line], cells, error, dofs=24 * 20**3)
+    limit = np.where(line[1:] > 0.5, 0.05, 1.0)
+    found = equidistributed(3 * [line], cells, error, 24 * 20**3, coarsest=(limit, 0.1, np.inf))
+    assert np.diff(free[0]).max() > 0.15
+    right = found[0][:-1] > 0.5
+    assert np.diff(found[0])[right].max() < 1.1 * 0.05
+    assert np.diff(found[0])[:3].max() > 0.15
+    assert np.diff(found[1]).max() < 1.1 * 0.1
+    np.testing.assert_array_equal(found[2], free[2])
+
+
+def test_predicted_errors_of_other_lines_have_the_order_that_is_asked_for():
+    line = np.linspace(0.0, 1.0, 11)
+    cells = np.column_stack(3 * [np.arange(10)])
+    error = np.ones((10, 3))
+    halved = np.linspace(0.0, 1.0, 21)
+    for order in (2.0, 3.0):
+        ratio = error_ratio(3 * [line], cells, error, 3 * [halved], order=order)
+        assert ratio == pytest.approx(2.0**-order)
+    error[:, 1] = 0.0
+    only_y = error_ratio(3 * [line], cells, error, (line, halved, line))
+    assert only_y == pytest.approx(1.0, abs=1e-3)

@@ -8,19 +8,23 @@ import pytest
 
 import fem
 import skinwave
+from fem.line_basis import line_errors
 from fem.load_and_probe import facet_normals, load_operator, traction_operator
 from meshes import block
 from simple_model import Material, MovingPressure, Stack, Tacton, Trajectory
 from simple_model.flat_quantities import traction_field
 from simple_model.load_spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT
+from simple_model.response import fit_lines
 from simple_model.wavenumber_integral import point_integrals
-from skinwave import Body, dumps, loads
+from skinwave import Body, dumps, loads, parametric
 from skinwave.bodies.build import build, operators
-from skinwave.fits.predicted import target
+from skinwave.fits.fit import fit
+from skinwave.fits.predicted import predicted_lines, predicted_waveforms, target
 from skinwave.load import LOADS, Load, LoadKind, register
+from skinwave.measurements import Measurement
 from skinwave.models.loads import loads_at, surface_load
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.prepared import answer, components, prepare
 from skinwave.patterns.conversion import write_pattern
 from skinwave.patterns.pattern import Options
 from skinwave.planning.extent import symmetry
@@ -28,6 +32,7 @@ from skinwave.planning.plan import plan
 from skinwave.simulation import compute
 from skinwave.spreads import spreads_of
 from skinwave.studies.study import own_scenes
+from skinwave.sweeps.variation import varied
 from skinwave.web.scenes import values_of
 
 SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
@@ -298,8 +303,10 @@ SHEAR = '[load]\nkind = "shear"\ndirection = [1, 0]\n'
 
 def test_what_is_computed_for_a_pressure_alone_refuses_other_loads():
     scene = loads(SHEAR + SMALL)
-    with pytest.raises(ValueError, match="a fit is about the pressure of a focus"):
-        target(scene, "flat-body", DISPLACEMENT, scene.probe_points)
+    heavy = replace(scene, load=Load(gravity=9.81))
+    with pytest.raises(ValueError, match="flat-body does not take pressure and gravity"):
+        target(heavy, "flat-body", DISPLACEMENT, scene.probe_points)
+    assert target(heavy, "fem", DISPLACEMENT, scene.probe_points).linear == ("gain",)
     with pytest.raises(ValueError, match="a pattern of a device is about"):
         write_pattern(scene, ".csv", Options())
     with pytest.raises(ValueError, match="takes what is normal to it"):
@@ -317,3 +324,62 @@ def test_gravity_does_not_hide_the_error_of_a_mesh():
     without, under = (skinwave.simulate(s, "fem", h=5e-3) for s in (scene, heavy))
     assert np.abs(under.values).max() > 3 * np.abs(without.values).max()
     assert under.expected_error == pytest.approx(without.expected_error, rel=0.2)
+
+
+MODULUS = "body.material.shear_modulus_pa"
+
+
+@pytest.mark.parametrize("load", [FORCE, SHEAR, '[load]\nkind = "shear"\ndirection = "path"\n'])
+def test_materials_are_free_under_any_moving_load(load):
+    start = IMPULSE if load == FORCE else AROUND
+    scene = loads((start.partition("[focus]")[0] if load == FORCE else start) + SMALL + load)
+    free = skinwave.prepare(scene, {MODULUS: (1.5e4, 3e4)}, h=6e-3)
+    values = {MODULUS: 2.6e4}
+    own = varied(scene, values)
+    reduced = prepare(own.body, own.probe_points, h=6e-3, load=own.load)
+    found, expected = parametric.answer(free, values).values, answer(reduced, own).values
+    assert far(found, expected).max() < 0.01
+    frequencies, lines = parametric.lines(free, values)
+    motion = components(reduced, *own.loads)
+    near = [np.argmin(np.abs(motion.frequencies - f)) for f in frequencies]
+    assert line_errors(lines, motion.lines[near]).max() < 0.01
+
+
+def test_what_depends_on_the_material_beside_the_moving_load_is_refused():
+    gravity = loads(SMALL + "[load]\ngravity_m_per_s2 = 9.81\n")
+    with pytest.raises(ValueError, match="the static deflection is that of each modulus"):
+        skinwave.prepare(gravity, {MODULUS: (1.5e4, 3e4)})
+    shaken = "[load.support_motion]\nfrequency_hz = 100\namplitude_um = 1\n"
+    with pytest.raises(ValueError, match="inertial force goes with the density"):
+        skinwave.prepare(loads(SMALL + shaken), {MODULUS: (1.5e4, 3e4)})
+
+
+def test_a_fit_recovers_the_modulus_and_the_force_of_a_contact():
+    scene = loads(IMPULSE.replace("0.03", "0.06") + SMALL.replace("44", "24") + FORCE)
+    hidden = varied(scene, {MODULUS: 2.4e4, "load.force_n": 0.03})
+    found = compute(hidden, "fem")
+    measured = Measurement(
+        quantity="displacement", places=scene.probe_points, times=found.times,
+        values=found.values[None],
+    )  # fmt: skip
+    fitted = fit(
+        scene, measured, [f"{MODULUS}=12000:40000", "load.force_n=0.005:0.1"], model="fem", starts=2
+    )  # fmt: skip
+    assert fitted.target.reduced is not None, "no factorisation for each modulus"
+    assert fitted.values[MODULUS] == pytest.approx(2.4e4, rel=0.01)
+    assert fitted.values["load.force_n"] == pytest.approx(0.03, rel=0.01)
+
+
+def test_predictions_of_layers_under_tractions_are_those_of_the_model():
+    text = AROUND.replace("0.03", "0.2") + SMALL.replace("poisson = 0.0", "poisson = 0.49") + SHEAR
+    scene = loads(text)
+    aim = target(scene, "flat-body", DISPLACEMENT, scene.probe_points)
+    found = compute(scene, "flat-body-harmonic")
+    expected, _ = fit_lines(found, np.array([200.0]))
+    np.testing.assert_allclose(
+        predicted_lines(aim, np.array([200.0]))({}), expected, rtol=0.02,
+        atol=1e-3 * np.abs(expected).max(),
+    )  # fmt: skip
+    rest = compute(scene, "flat-body")
+    waveforms = predicted_waveforms(aim, rest.times)({})
+    assert far(waveforms, rest.values).max() < 1e-3

@@ -99,10 +99,12 @@ def no_arrays():
 
 
 V = np.zeros((10, 2))
+A_MAP = np.arange(18.0).reshape(9, 2) / 100
 OWN = {"format": "skinwave measurement 1", "quantity": "velocity", "unit": "m/s"}
 # Name of the file, its content of a folder to write in, options, and what is said of it.
 BINARIES = {
-    "not utf-8": ("a.csv", lambda d: b"\xff\xfe\x00t", [], "no UTF-8 text"),
+    "not utf-8": ("a.csv", lambda d: b"\xff\x00t", [], "no UTF-8 text"),
+    "half of utf-16": ("a.csv", lambda d: b"\xff\xfe\x00", [], "no UTF-8 text"),
     "no zip": ("a.npz", lambda d: b"text", [], "cannot be read"),
     "half a zip": ("a.npz", lambda d: truncated(files.numpy_npz, d, ".npz"), [], "cannot be read"),
     "no arrays": ("a.npz", lambda d: no_arrays(), [], "cannot be read"),
@@ -148,6 +150,11 @@ BINARIES = {
     "half a set": (
         "a.uff", lambda d: universal(d).replace(b"         4        48", b"         4        99"),
         [], "and its header tells of 99" ,
+    ),
+    "no end": ("a.uff", lambda d: universal(d)[:-300], [], "ends within a set"),
+    "two maps": (
+        "a.mat", lambda d: mat(d, y=np.ones((9, 50, 2)), r=np.ones(50), fs=1e3, one=A_MAP,
+                               two=A_MAP + 1), [], "the places may be one or two; give --places"
     ),
     "no phase": ("a.uff", lambda d: universal(d, func_type=9), [], "type 9, which has no phase"),
     "along x": ("a.uff", lambda d: universal(d, rsp_dir=1), [], "their directions are 1"),

@@ -107,6 +107,27 @@ def test_a_model_three_tenths_too_stiff_is_found_out(models):
     assert {*np.unique(same.findings(main_column(same)))} == {AGREES, SILENT}
 
 
+def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_tacton():
+    """The true delay is 0; 393 ms off, where 108 of 500 ms overlap, the misfit is a tenth less."""
+    slow = replace(CIRCLE, speed=8.0)
+    scene = scene_of(duration=0.5, am_frequency=140.0, trajectory=slow)
+    true, stiff = (runs_of(scene, stiffness)[-1] for stiffness in (0.8, 1.0))
+    noise = 1e-5 * np.random.default_rng(3).normal(size=(4, *true.response.values.shape))
+    measured = Measurement(
+        quantity="velocity",
+        places=scene.probe_points,
+        times=true.response.times,
+        values=true.response.values + noise,
+    )
+    found = compare_measured(Measured(measurement=measured), [stiff])
+    column = main_column(found)
+    assert column.misfit > 0.2
+    assert abs(column.alignment.delay) < 1e-3
+    assert not any("lie within the Tacton" in said for said in measured_page.remarks(found))
+    far = compare_measured(Measured(measurement=measured, delay=-0.3926), [stiff])
+    assert any("only 107 of the 500 ms" in said for said in measured_page.remarks(far))
+
+
 def test_differences_within_the_numerical_error_are_marked(models):
     rng = np.random.default_rng(2)
     rough = [replace(run, response=replace(run.response, expected_error=0.5))
@@ -129,6 +150,19 @@ def test_delay_and_gain_are_those_given(models):
     assert not body.differs.any()
     late = compare_measured(replace(asked, delay=0.0), models[True])
     assert main_column(late).differs.any()
+
+
+def test_one_repetition_has_a_noise_where_some_lines_have_none(models):
+    measured = record(models[True][-1], np.random.default_rng(4), repetitions=1)
+    found = compare_measured(Measured(measurement=measured), models[True])
+    variance = found.lines.variance.copy()
+    variance[1] = np.nan
+    part = replace(found, lines=replace(found.lines, variance=variance, borrowed=2))
+    assert part.noise == pytest.approx(found.noise, rel=0.5)
+    assert (
+        "of 2 lines too close to others that of the next ones, and unknown for 1 line."
+        in (measured_page.remarks(part)[0])
+    )
 
 
 def test_a_measurement_with_its_sign_turned_is_told(models):
@@ -156,6 +190,21 @@ def test_a_record_that_begins_before_the_motion_is_told(models):
             for m in (steady, early)]  # fmt: skip
     assert not any("not steady" in text for text in said[0])
     assert "cut off what lies before and after the Tacton" in said[1][-1]
+
+
+def test_clipping_and_hum_on_a_line_of_the_load_are_told():
+    scene = scene_of(am_frequency=120.0, duration=0.5)
+    runs = runs_of(scene)
+    clean = record(runs[-1], np.random.default_rng(8))
+    top = 0.7 * np.abs(clean.values).max()
+    hum = 0.3 * clean.values.std() * np.sin(2 * np.pi * 60 * clean.times)[:, None]
+    said = [
+        " ".join(measured_page.remarks(compare_measured(Measured(measurement=m), runs)))
+        for m in (clean, replace(clean, values=clean.values.clip(-top, top)),
+                  replace(clean, values=clean.values + hum))
+    ]  # fmt: skip
+    assert ["is clipped" in text for text in said] == [False, True, False]
+    assert ["mains hum of 60 Hz, and f_AM" in text for text in said] == [False, False, True]
 
 
 def test_a_record_is_drawn_on_the_clock_of_the_model(models):
@@ -270,6 +319,10 @@ def test_claims_that_a_record_cannot_decide_say_why():
     )  # fmt: skip
     unknown = claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.1}, np.nan)
     assert "its noise is unknown" in unknown["M1"][1]
+    three = {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.05}
+    part = claims_of(AM, three | {"4f_AM": 0.01}, np.array([1e-3, 1e-3, 1e-3, np.nan])[:, None])
+    assert part["M1"][0] == HOLDS  # which is about the three others alone
+    assert "the noise of 4f_AM is unknown" in part["S1"][1]
     f = np.arange(0, 1000.0)
     peaks = np.exp(-((f - 140.3) ** 2) / 4)[:, None] * np.ones(2)
     assert claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.1}, 1e-3, (f, peaks))["S5"] == (

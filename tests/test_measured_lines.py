@@ -222,6 +222,20 @@ def test_a_hum_beside_a_line_does_not_move_its_noise():
     assert np.median(loud.variance[0] / calm.variance[0]) < 3
 
 
+def test_lines_that_leave_no_bins_between_take_the_noise_of_their_neighbours():
+    """Nine lines 4.8 bins apart, whose middle ones have neighbours wherever noise is looked for."""
+    rng = np.random.default_rng(14)
+    times, f = np.arange(2000) / 4000, 300 + 12.68 * np.arange(9)
+    record = Measurement(quantity="velocity", places=np.zeros((300, 2)), times=times,
+                         values=rng.normal(size=(1, 2000, 300)))  # fmt: skip
+    found = lines_of(record, f)
+    assert found.borrowed == 5
+    true = (np.abs(found.mean) ** 2).mean(axis=1)
+    ratio = found.variance.mean(axis=1) / true
+    assert ratio.min() > 0.8
+    assert ratio.max() < 2.5
+
+
 def test_coherence_of_noise_is_its_bias_and_of_lines_is_one():
     rng = np.random.default_rng(12)
     silent = coherence(measured(rng, 5, 1.0, phasors=0 * MODEL), LINES)

@@ -6,6 +6,7 @@ import measurement_files as files
 import numpy as np
 import pytest
 from measurement_files import DRIVE, MM_S, PLACES_MM, RATE, UM, F, T
+from scipy.io import savemat
 
 from skinwave.measurements import Measurement, skinsource
 from skinwave.measurements.reading import places_of, read
@@ -204,6 +205,32 @@ def test_a_published_scan_is_aligned_by_its_reference(tmp_path):
     assert found.places[:, 0] == pytest.approx(np.arange(4) * 1e-2)
     assert found.rate == pytest.approx(5000)
     assert any("taken as normal" in said for said in found.remarks)
+
+
+@pytest.mark.parametrize("given", [None, PLACES_MM / 1e3])
+def test_places_of_a_scan_are_those_by_name_or_given(tmp_path, given):
+    """Not the triangles between them, which come first and are whole numbers."""
+    arrays = {"y": np.ones((3, 50, 2)), "r": np.arange(50.0), "fs": 5000.0}
+    arrays |= {"tri": np.ones((3, 3), int), "normals": np.ones((3, 3)), "xyz": np.eye(3) / 100}
+    savemat(tmp_path / "v7.mat", arrays)
+    expected = np.eye(3)[:, :2] / 100 if given is None else given
+    assert read(tmp_path / "v7.mat", places=given).places == pytest.approx(expected)
+
+
+def test_places_that_are_given_replace_those_of_the_file(tmp_path):
+    savemat(tmp_path / "a.mat", {"t": T, "v": MM_S[0], "Points": PLACES_MM + 50})
+    with pytest.raises(ValueError, match="or give --places"):
+        read(tmp_path / "a.mat", unit="mm/s")
+    found = read(tmp_path / "a.mat", unit="mm/s", places=PLACES_MM / 1e3)
+    assert_same_motion(found, MM_S[:1])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])
+def test_columns_are_read_in_the_encodings_that_programs_export(tmp_path, encoding):
+    text = "t [s], v(0,0) [µm/s]\n0, 1\n0.001, 2\n"
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    found = read(tmp_path / "a.csv")
+    assert found.values.ravel() == pytest.approx([1e-6, 2e-6])
 
 
 def test_units_of_motion():

@@ -1,8 +1,12 @@
 """Records draw and convert themselves: responses, meshes, fields, scenes, plans, sweeps."""
 
 import ast
+import inspect
+import re
 import sys
+import tomllib
 from dataclasses import replace
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,20 +14,25 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from legible import illegible, sizes, texts
 
 import meshes
 import skinwave
 from simple_model import Effort, Response, phasors
 from simple_model.focus import spot_width
-from skinwave import window
+from simple_model.numbers import stated_error
+from skinwave import citations, window
 from skinwave.cli import main
 from skinwave.fields import Field
 from skinwave.models import BUILT_IN, named
 from skinwave.pictures import scene_plot
 from skinwave.pictures.styles import style
+from skinwave.planning.budget import error_budget
 from skinwave.planning.extent import PlanRow
 from skinwave.reports.album import Album
 from skinwave.reports.chosen import only
+from skinwave.sweeps import sweep_figures
+from skinwave.sweeps.in_python import SweepTable
 
 # What is tested here is not how accurate a model is.
 pytestmark = pytest.mark.filterwarnings("ignore::skinwave.SkinwaveWarning")
@@ -57,6 +66,11 @@ def closed_figures():
 @pytest.fixture(scope="module")
 def scene():
     return skinwave.loads(SCENE)
+
+
+def replace_duration(scene, duration):
+    tacton = replace(scene.tacton, duration=duration)
+    return replace(scene, pressure=replace(scene.pressure, tacton=tacton))
 
 
 def wave(frequency=130.0, quantity="displacement", n=1000, warnings=("too <coarse>",)):
@@ -225,6 +239,23 @@ def test_a_grid_has_the_displacement_of_a_time(field):
             field.to_pyvista(time)
 
 
+def test_grids_of_pyvista_have_an_accessor(field):
+    import pyvista as pv
+
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    import_module(declared["pyvista.accessors"]["skinwave"])  # as pyvista does where it is used
+    grid = field.to_pyvista(0.0032)
+    assert np.array_equal(grid.skinwave.to_mesh().tets, field.mesh.tets)
+    moved = grid.skinwave.displaced(1e3)
+    assert moved.points == pytest.approx(grid.points + 1e3 * grid["displacement"])
+    away = np.linalg.norm(grid.skinwave.displaced().points - grid.points, axis=1)
+    assert away.max() == pytest.approx(0.05 * grid.length)
+    with pytest.raises(ValueError, match="no point data of the name displacement"):
+        field.mesh.to_pyvista().skinwave.displaced()
+    with pytest.raises(ValueError, match="tetrahedra"):
+        pv.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid().skinwave.to_mesh()
+
+
 def test_paraview_reads_what_a_field_saves(field, tmp_path):
     import pyvista as pv
 
@@ -288,6 +319,58 @@ def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
     assert "100 Hz" in scene._repr_html_()
 
 
+def test_records_print_as_a_short_line(scene, field):
+    response = skinwave.simulate(scene, "flat-body")
+    table = SweepTable(rows=({"status": "done", "focus.height_mm": 200},), varied=("height",))
+    agreement = skinwave.compare(response, response, (100.0,))
+    for record in (scene, response, response.spectrum(), response.lines, skinwave.plan(scene),
+                   agreement, field, field.mesh, table):  # fmt: skip
+        assert repr(record) == str(record)
+        assert len(repr(record)) < 260
+        assert "array" not in repr(record)
+    assert repr(scene) == (
+        "<Scene 'disc <b>': AM 100 Hz, circle of 20 mm at 4 m/s, 0.1 s; slab of 100 x 100 x 15 mm, "
+        "palm; 3 probes, displacement into the body>"
+    )
+    assert "(1,000 times, 3 probes) from 0 to 99.9 ms, at most" in repr(response)
+    assert "expected error 3.0 %; 1 warning>" in repr(wave())
+
+
+def test_scenes_that_differ_have_different_keys_in_the_cache(scene):
+    """Keys are of the records that a scene has, whose repr is of all of their numbers."""
+    thicker = replace(scene.body, depth=0.015000001)
+    assert meshes.cache.key(thicker) != meshes.cache.key(scene.body)
+    louder = replace(scene.pressure, peak_pressure=scene.pressure.peak_pressure * (1 + 1e-12))
+    assert meshes.cache.key(louder) != meshes.cache.key(scene.pressure)
+
+
+def test_an_expected_error_is_said_alike_everywhere(scene):
+    said = "below 0.50 %"
+    found = skinwave.simulate(scene, "flat-body")
+    assert stated_error(found.expected_error) == said
+    assert error_budget(scene, found.expected_error).words.count(f"numerical {said}") == 1
+    for record in (found, skinwave.plan(scene, model="flat-body")):
+        assert said in record._repr_html_()
+        assert f"expected error {said}" in repr(record)
+    assert [stated_error(x) for x in (0.0213, 1.5, np.nan)] == ["2.1 %", "150 %", "not known"]
+
+
+@pytest.mark.parametrize("quantity", ["pressure", "strain_xz", "displacement", "acceleration"])
+def test_what_a_response_has_not_is_looked_for_without_an_error(quantity):
+    response = wave(quantity=quantity)
+    found = dict(inspect.getmembers(response))
+    assert found["record"] is response.record
+    has = {name: hasattr(response, name) for name in ("velocity", "acceleration", "strain")}
+    assert has == {
+        "velocity": quantity == "displacement",
+        "acceleration": quantity in ("displacement", "acceleration"),
+        "strain": quantity == "strain_xz",
+    }
+    assert not hasattr(response, "lines")
+    with pytest.raises(ValueError, match="the load of this response is unknown"):
+        _ = response.lines
+
+
 def test_the_page_of_a_scene_has_its_load_and_its_regions():
     regions = '[body]\nkind = "mesh"\nfile = "hand.vtu"\nregions = { ring = "bone" }\n'
     load = '[load]\nkind = "point_force"\nforce_n = 0.1\ngravity_m_per_s2 = 9.8\n'
@@ -329,6 +412,16 @@ def test_references_are_those_of_the_models():
     assert "Kausel" in found.references[2]
     assert "10.1145/3613905.3650981" in str(found)
     assert len(found.references) == 3
+    cited = dict(line.split(": ", 1) for line in (ROOT / "CITATION.cff").read_text().split("\n")
+                 if re.match(r"(version|date-released): ", line))  # fmt: skip
+    assert cited["version"] == citations.VERSION
+    assert str(citations.RELEASED) == cited["date-released"][:4]
+    now = {"skinwave": citations.VERSION}
+    made = replace(wave(), model="flat-body", effort=Effort(versions=now))
+    said = f"Version {citations.VERSION}, {citations.RELEASED}. Software"
+    assert said in str(skinwave.cite(made))
+    made = replace(made, effort=Effort(versions={"skinwave": "0.3.0"}))
+    assert "Version 0.3.0. Software" in str(skinwave.cite(made)), "of another year, perhaps"
     assert {name for name in BUILT_IN if not named(name).sources} == {
         "point-kernel", "point-kernel-published",
     }  # fmt: skip
@@ -380,6 +473,9 @@ def test_progress_is_shown_where_it_is_asked_for(scene, capsys):
     assert "lines" in capsys.readouterr().err.split("\n")
     skinwave.simulate(small, "fem", 0.9, h=10e-3)
     assert not capsys.readouterr().err
+    for model in ("flat-body", "flat-body-harmonic"):
+        skinwave.simulate(scene, model, 0.9, progress=True)
+        assert "wavenumber integral" in capsys.readouterr().err.split("\n")
 
 
 def test_figures_are_put_into_windows(monkeypatch):
@@ -428,6 +524,31 @@ def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
     assert style("talk", 7.0).size(6.0, 3.0) == (7.0, 3.5)
     with pytest.raises(ValueError, match="one column of a journal is 3.5 inch"):
         style("print", 90.0)
+
+
+@pytest.mark.parametrize("width", [3.5, 7.0])
+def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene, width):
+    waves = skinwave.simulate(replace_duration(scene, 0.3), "flat-body-harmonic", 0.999)
+    with skinwave.paper(width):
+        drawn = [scene.plot(), waves.plot(), waves.spectrum().plot(), waves.lines.plot()]
+    rows = [{"tacton.speed_m_per_s": float(v), "tacton.size_mm": float(d), "status": "done",
+             "peak_um": v * d, "level_db": v, "rayleigh_speed_m_per_s": 5.0}
+            for v in (4, 8) for d in (10, 20)]  # fmt: skip
+    by, chosen = "tacton.size_mm", style("print", width)
+    figures = [ax.figure for ax in drawn]
+    figures += [sweep_figures.line_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
+                sweep_figures.heat_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
+                sweep_figures.speed_figure(rows, by, chosen)]  # fmt: skip
+    for figure in figures:
+        assert sizes(figure) == {8.0}
+        assert illegible(figure) == []
+
+
+def test_a_figure_without_lines_says_why(scene):
+    short = skinwave.simulate(replace_duration(scene, 0.02), "flat-body-harmonic", 0.999)
+    assert len(short.lines) == 0
+    assert any("no line of the load is resolved" in text.get_text()
+               for text, _ in texts(short.lines.plot().figure))  # fmt: skip
 
 
 def test_chosen_columns_of_a_folder_alone():

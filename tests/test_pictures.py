@@ -17,6 +17,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from in_browser import needs_browser
+from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
@@ -401,6 +402,7 @@ def test_no_text_of_a_figure_is_cut(folder, dressed):
         canvas = FigureCanvasAgg(figure)
         figure.draw_without_rendering()
         drawn = figure.get_tightbbox(canvas.get_renderer())  # inch
+        assert illegible(figure) == []
         assert min(drawn.x0, drawn.y0) > -0.02
         assert drawn.x1 < figure.get_figwidth() + 0.02
         assert drawn.y1 < figure.get_figheight() + 0.02
@@ -409,6 +411,7 @@ def test_no_text_of_a_figure_is_cut(folder, dressed):
         assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
         if chosen.columns:
             assert figure.get_figwidth() in chosen.columns
+            assert sizes(figure) == {8.0}
 
 
 def test_the_page_says_everything_and_stands_alone(page):

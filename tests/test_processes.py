@@ -7,8 +7,9 @@ import subprocess
 import sys
 import sysconfig
 import time
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -16,10 +17,13 @@ from pathlib import Path
 import corpus
 import pytest
 from test_ended_anywhere import hand
+from threadpoolctl import ThreadpoolController, threadpool_info
 
 import skinwave
 from meshes import subprocess_call
+from skinwave.effort import one_thread
 from skinwave.processes import as_part, ended_by_signals, environment, pool, side_by_side
+from skinwave.sweeps import engine
 
 ROOT = Path(skinwave.__file__).parents[1]
 THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich", "PIL", "dask",
@@ -437,3 +441,35 @@ def test_a_rerun_hands_on_what_ends_it(tmp_path):
             assert again.wait(30) == code
         assert not gone(numbers)
         assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_threads_that_limit_linear_algebra_leave_it_as_it_was():
+    """Two limits that overlap, the first of which ends first."""
+
+    def threads():
+        return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+    with ThreadpoolController().limit(limits=2, user_api="blas"):
+        before = threads()
+        first, second = one_thread(), one_thread()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert set(threads()) == {1}
+        second.__exit__(None, None, None)
+        assert threads() == before
+
+
+def test_workers_share_the_cores(monkeypatch):
+    made = []
+
+    @contextmanager
+    def recorded(count, begin):
+        made.append((count, begin.args))
+        yield ThreadPoolExecutor(count)
+
+    monkeypatch.setattr(engine, "pool", recorded)
+    monkeypatch.setattr(engine, "usable_cores", lambda: 8)
+    for count in (2, 3, 16):
+        engine.run_all(str, [1, 2], "processes", count, lambda k, result: None)
+    assert made == [(2, (4,)), (3, (2,)), (16, (1,))]

@@ -1,7 +1,11 @@
 """Every solver has the same solution, and the reduced-order model that of the full one."""
 
 import gc
+import os
+import shutil
 import sys
+import tempfile
+import time
 from dataclasses import replace
 from itertools import islice
 
@@ -13,7 +17,7 @@ from scipy.signal import lfilter
 import fem
 import meshes
 import skinwave
-from fem import linear_solver, products
+from fem import linear_solver, memory, products, reduced
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load_spectrum import reduced_lines
 from skinwave.bodies.build import build as build_body
@@ -60,6 +64,51 @@ def test_every_solver_solves(stiff, backend):
     np.testing.assert_allclose(factor.solve(b[:, 0]), x[:, 0], rtol=1e-9)
     complex_b = b[:, 0] * (1 + 2j)
     np.testing.assert_allclose(factor.solve(complex_b), (1 + 2j) * x[:, 0], rtol=1e-9)
+
+
+def test_a_factor_larger_than_the_memory_is_kept_in_files(stiff, monkeypatch, tmp_path, caplog):
+    if "pardiso" not in fem.available():
+        pytest.skip("pardiso is not installed")
+    _, A, b = stiff
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("MKL_PARDISO_OOC_PATH", "the user's own")
+    factor = fem.factorise(A, memory=1e5)
+    assert f"{A.shape[0]:,} dofs takes" in caplog.text
+    assert list(tmp_path.glob("skinwave-factor-*/*")), "no file"
+    x = factor.solve(b)
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    np.testing.assert_allclose(x, fem.factorise(A).solve(b), rtol=0, atol=1e-9 * np.abs(x).max())
+    del factor
+    gc.collect()
+    assert not list(tmp_path.iterdir())
+    assert os.environ["MKL_PARDISO_OOC_PATH"] == "the user's own"
+
+
+def test_a_factor_larger_than_memory_and_disk_is_refused(stiff, monkeypatch):
+    if "pardiso" not in fem.available():
+        pytest.skip("pardiso is not installed")
+    usage = shutil._ntuple_diskusage(1, 1, 1000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage)
+    with pytest.raises(MemoryError, match="disk under .*; coarsen the mesh, or set TMPDIR"):
+        fem.factorise(stiff[1], memory=1e5)
+
+
+def test_a_body_larger_than_the_memory_is_refused_before_it_is_assembled(monkeypatch):
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e7)
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    cure = "2,028 degrees of freedom take about .* enough for 1,205; take larger elements"
+    with pytest.raises(MemoryError, match=cure):
+        fem.assemble(mesh, fem.PRESETS["palm"])
+
+
+def test_memory_of_a_container_bounds_that_of_the_machine(monkeypatch, tmp_path):
+    (tmp_path / "memory.max").write_text("3000\n")
+    (tmp_path / "memory.current").write_text("1000\n")
+    assert memory.free_memory() > 2**20
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    assert memory.free_memory() == 2000
+    (tmp_path / "memory.max").write_text("max\n")
+    assert memory.free_memory() > 2**20
 
 
 @pytest.mark.parametrize("backend", ["pardiso", "superlu"])
@@ -129,6 +178,22 @@ def test_a_floating_body_is_refused_with_the_cure(backend):
     singular = sparse.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
     with pytest.raises(ValueError, match="is the body constrained anywhere"):
         fem.factorise(singular, backend=backend)
+
+
+def test_how_long_error_estimates_take_changes_no_model(stiff, monkeypatch):
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    outputs = fem.probe_operator(mesh, np.array([[0.0, 0.0], [0.004, 0.001]]))
+    prompt = fem.reduce(stiff[0], outputs, tolerance=1e-4)
+
+    def late(*arguments, look=reduced._look):
+        time.sleep(0.05)  # in which some more moments are computed
+        return look(*arguments)
+
+    monkeypatch.setattr(reduced, "_look", late)
+    slow = fem.reduce(stiff[0], outputs, tolerance=1e-4)
+    assert (slow.moments, slow.estimate) == (prompt.moments, prompt.estimate)
+    np.testing.assert_array_equal(slow.basis, prompt.basis)
+    np.testing.assert_array_equal(slow.K, prompt.K)
 
 
 def body(kind, h=0.1 / 24):

@@ -8,16 +8,24 @@ import pytest
 
 import fem
 import meshes
+import skinwave
 from fem.geometry import jacobians, shape_nodes
+from fem.line_basis import line_errors
 from fem.load_and_probe import on_surface
 from meshes.tetmesh import FACES, interface_facets
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave import parametric
 from skinwave.bodies import BODIES, Body, Layer, Phalanx
 from skinwave.bodies.build import build, operators
-from skinwave.models.free_materials import free_keys
+from skinwave.models.free_keys import free_keys, values_at
+from skinwave.models.free_keys import with_values as with_free_values
 from skinwave.models.laws import check_laws, has_own_law, relaxing
+from skinwave.models.prepared import components, prepare
+from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads, read
 from skinwave.simulation import compute
 from skinwave.spreads import spreads_of, with_values
+from skinwave.web.free_bodies import can_be_free
 
 FINGER = BODIES["fingertip"]
 SHAPE = meshes.Fingertip(
@@ -163,8 +171,39 @@ def test_a_bone_does_not_pass_for_what_waves_run_in(body):
     assert around.of_kind.wave_speed(around, 140.0) == speed
     resting = [build(replace(b, base="clamped"), 4e-3).support for b in (body, around)]
     np.testing.assert_array_equal(resting[0].stiffness, resting[1].stiffness)
-    with pytest.raises(ValueError, match="a body with regions cannot be free"):
-        free_keys(body, {"body.material.shear_modulus_pa": (1e4, 4e4)})
+
+
+TISSUE, IN_BONE = "body.material.shear_modulus_pa", "body.regions.bone.shear_modulus_pa"
+DENSITY = "body.regions.bone.density_kg_m3"
+
+
+@pytest.mark.parametrize("base", ["free", "clamped"])
+def test_materials_of_tissue_and_bone_are_free(body, base):
+    body = replace(body, base=base)
+    assert can_be_free(body)
+    tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.006, speed=3.0))
+    probes = ((0.0, 0.0), (3e-3, 2e-3))
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=probes)
+    ranges = {TISSUE: (15e3, 40e3), IN_BONE: (1e6, 1e9), DENSITY: (1200.0, 2000.0)}
+    free = skinwave.prepare(scene, ranges, h=4e-3)
+    largest = []
+    for shares in np.random.default_rng(1).random((2, 3)):
+        values = values_at(free.keys, shares)
+        changed = with_free_values(body, free.keys, values)
+        assert dict(changed.regions)["bone"].density == values[DENSITY]
+        frequencies, found = parametric.lines(free, values)
+        own = components(prepare(changed, scene.probe_points, h=4e-3), scene.pressure)
+        expected = own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
+        assert line_errors(found, expected).max() < 0.01
+        largest.append(np.abs(found).max())
+    assert largest[0] != pytest.approx(largest[1], rel=0.05)
+
+
+def test_a_region_that_the_scene_does_not_name_cannot_be_free(body):
+    with pytest.raises(ValueError, match="it gives those of bone"):
+        free_keys(body, {"body.regions.nail.shear_modulus_pa": (1e4, 4e4)})
+    with pytest.raises(ValueError, match="only moduli, losses, times and densities"):
+        free_keys(body, {"body.regions.bone.poisson": (0.3, 0.4)})
 
 
 # The fingertip.

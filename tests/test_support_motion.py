@@ -10,6 +10,7 @@ import skinwave
 from skinwave import Body, Load, SupportMotion, dumps, loads
 from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
+from skinwave.run import SUPPORT, Run
 from skinwave.simulation import compute
 
 RHO, MU, VISCOSITY, DEPTH = 1000.0, 2e4, 20.0, 12e-3
@@ -170,3 +171,38 @@ def test_models_that_have_no_moving_support_say_so(model):
         compute(scene, model)
     with pytest.raises(ValueError, match="leave support_motion out"):
         skinwave.field(scene, [0.0])
+
+
+def test_lines_of_a_shaken_body_are_those_of_pressure_and_support():
+    """By superposition f_AM is what it is at rest, and what moves the support has a line."""
+    scene = loads(REST.replace("peak_pressure_pa = 0", "peak_pressure_pa = 50"))
+    scene = replace(scene, body=COLUMN, pressure=with_tones(scene.pressure, 140.0, 0.05))
+    still = compute(scene, "fem-harmonic", h=3e-3)
+    motion = replace(UP, frequency=67.0)
+    moved = replace(scene, load=Load(support_motion=motion))
+    shaken_too = Run(
+        tacton="", body="slab", scene=moved, response=compute(moved, "fem-harmonic", h=3e-3)
+    )
+    alone = Run(tacton="", body="slab", scene=scene, response=still)
+    np.testing.assert_allclose(shaken_too.lines["f_AM"], alone.lines["f_AM"], rtol=1e-3)
+    top = abs(1 / np.cos(wavenumber(67.0) * DEPTH)) * motion.amplitude
+    assert shaken_too.frequencies[SUPPORT] == 67.0
+    np.testing.assert_allclose(shaken_too.lines[SUPPORT], top, rtol=5e-3)
+    assert not shaken_too.unnamed
+    assert SUPPORT not in alone.lines
+
+
+def test_a_support_that_moves_with_a_tone_of_the_load_is_its_line():
+    scene = shaken(motion=replace(UP, frequency=60.0))
+    scene = replace(scene, pressure=replace(scene.pressure, peak_pressure=0.1))
+    found = Run(
+        tacton="", body="slab", scene=scene, response=compute(scene, "fem-harmonic", h=3e-3)
+    )
+    assert SUPPORT not in found.lines
+    top = abs(1 / np.cos(wavenumber(60.0) * DEPTH)) * UP.amplitude
+    np.testing.assert_allclose(found.lines["f_AM"], top, rtol=2e-2)
+
+
+def with_tones(pressure, am_frequency, duration):
+    tacton = replace(pressure.tacton, am_frequency=am_frequency, duration=duration)
+    return replace(pressure, tacton=tacton)

@@ -22,7 +22,7 @@ from skinwave.bodies import Sides
 from skinwave.bodies.analytic import stack
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.hands import support
-from skinwave.models.free_materials import FreeKey, with_values
+from skinwave.models.free_keys import FreeKey, with_values
 from skinwave.models.loads import surface_load
 from skinwave.planning.estimates import reflection_and_transient
 from skinwave.planning.extent import symmetry
@@ -62,7 +62,7 @@ def test_youngs_modulus_is_varied_and_free_like_the_shear_modulus():
     scene = loads("[body]")
     young = "body.material.young_modulus_pa"
     assert varied(scene, {young: 60e3}).body.solid.young == pytest.approx(60e3)
-    key = FreeKey(key=young, layer=None, path=("young_modulus_pa",), low=1e4, high=1e5)
+    key = FreeKey(key=young, part=None, path=("young_modulus_pa",), low=1e4, high=1e5)
     assert with_values(scene.body, [key], {young: 60e3}).solid.young == pytest.approx(60e3)
 
 

@@ -15,13 +15,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import fem.reduced
+import fem.reduced_affine
 from skinwave import extensions
 from skinwave.cli import main
 from skinwave.pictures.styles import style
 from skinwave.scene import Body
 from skinwave.scene_file import read
 from skinwave.simulation import compute
-from skinwave.sweeps import dataset, engine, sweep_figures
+from skinwave.sweeps import dataset, engine, families, sweep_figures
 from skinwave.sweeps import sweep as sweeping
 from skinwave.sweeps.variation import cases, combinations, parse
 
@@ -88,6 +90,30 @@ def test_any_key_of_a_scene_can_be_varied(scene):
     assert len(cases(scene, combinations(varied("body.thickness_mm=10,10.0,15")))) == 2
 
 
+def test_the_spreads_of_presets_can_be_varied(scene):
+    """All moduli or all losses of a material times a factor, by the keys that samples have."""
+    texts = ("body.material.modulus_scale=factor(1,3)", "body.material.loss_scale=0.5:2")
+    met = combinations(varied(*texts), "sobol", 4)
+    found = cases(scene, met)
+    plain = read(scene).body.solid
+    for case, each in zip(found, met, strict=True):
+        modulus, loss = each.values()
+        assert case.scene.body.solid == plain.scaled(modulus=modulus).scaled(loss=loss)
+        assert case.keys["body.material.modulus_scale"] == modulus
+    with pytest.raises(ValueError, match=r"no material for body.layers.3.material.loss_scale"):
+        cases(scene, combinations(varied("body.layers.3.material.loss_scale=1,2")))
+    with pytest.raises(ValueError, match="must be a number above 0"):
+        cases(scene, combinations(varied("body.material.loss_scale=0,-1")))
+
+
+def test_a_sweep_is_not_had_again_but_by_its_command(scene, capsys):
+    swept("--vary", "tacton.duration_s=0.01", *(f"--vary={each}" for each in SMALL),
+          "--model", "flat-body-harmonic")  # fmt: skip
+    said = refused(capsys, "rerun", "short-sweep")
+    assert "'sweep' is none of run" in said
+    assert "type it again, with another --out: skinwave sweep short.toml" in said
+
+
 def test_rows_say_what_was_commanded_and_what_came_out(scene):
     asked = ("tacton.speed_m_per_s=4,6", "body=skin-slab,none", "tacton.duration_s=0.3")
     rows = swept("--vary", *asked, "--csv")
@@ -150,6 +176,106 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
     assert {row["status"] for row in rows} == {"done"}
     assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
     assert all(row["dofs"] > 500 and row["energy_imbalance"] < 0.01 for row in rows)
+
+
+MODULI = "body.material.shear_modulus_pa=20e3:50e3:8"
+ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--h", 7, "--workers", 1]
+
+
+def counted(monkeypatch, folder):
+    """Factorisations from here on, with a cache of their own."""
+    monkeypatch.setenv("SKINWAVE_CACHE", str(folder))
+    sweeping._prepared.cache_clear()
+    families.reduced.cache_clear()
+    made = []
+    for module in (fem.reduced, fem.reduced_affine):
+        inner = module.factorise
+        counting = lambda *a, inner=inner, **k: made.append(a) or inner(*a, **k)  # noqa: E731
+        monkeypatch.setattr(module, "factorise", counting)
+    return made
+
+
+def assert_lines_agree(rows, others, tolerance):
+    for row, other in zip(rows, others, strict=True):
+        lines = [name for name in row if name.endswith("_um") and row[name]]
+        assert len(lines) > 3
+        largest = max(max(other[name]) for name in lines)
+        for name in lines:
+            least = 0.01 * largest
+            np.testing.assert_allclose(row[name], other[name], tolerance, tolerance * least)
+
+
+def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_path):
+    made = counted(monkeypatch, tmp_path / "cold")
+    asked = ["--vary", MODULI, *ON_SMALL]
+    rows = swept(*asked)
+    assert 0 < len(made) < len(rows) == 8
+    assert {(row["status"], row["reduced_together"]) for row in rows} == {("done", 8)}
+    assert all(0 < row["reduction_error"] < row["expected_error"] for row in rows)
+    made.clear()
+    assert swept(*asked, "--out", "short-sweep") == rows
+    assert not made, "rows that are there are not run again"
+    Path("short-sweep").rename("together")
+    monkeypatch.setattr(families, "LEAST", 9)
+    alone = swept(*asked)
+    assert len(made) == 16
+    assert {row["reduced_together"] for row in alone} == {1}
+    assert_lines_agree(rows, alone, 0.01)
+    for row, other in zip(rows, alone, strict=True):
+        assert row["expected_error"] == pytest.approx(other["expected_error"], rel=0.1)
+
+
+def test_thicknesses_share_a_reduction_where_there_are_many(scene, monkeypatch):
+    monkeypatch.setattr(families, "THICKNESS", 3)
+    asked = ["--vary", "body.thickness_mm=10,11,12", *ON_SMALL]
+    rows = swept(*asked)
+    assert {(row["status"], row["reduced_together"]) for row in rows} == {("done", 3)}
+    monkeypatch.undo()
+    os.chdir(scene.parent)
+    Path("short-sweep").rename("together")
+    assert_lines_agree(rows[2:], swept(*asked)[2:], 0.01)  # of one mesh: that of the thickest
+
+
+def test_what_cannot_be_reduced_together_is_reduced_alone(scene, monkeypatch):
+    monkeypatch.setattr(families, "LEAST", 2)
+
+    def refusing(*given, **options):
+        raise ValueError("the tolerance is out of reach")
+
+    monkeypatch.setattr(families.parametric, "prepare", refusing)
+    rows = swept("--vary", "body.material.shear_modulus_pa=20e3,30e3", *ON_SMALL)
+    assert {(row["status"], row["reduced_together"]) for row in rows} == {("done", 1)}
+
+
+def test_a_body_whose_family_has_a_coarse_mesh_has_its_own(scene, monkeypatch):
+    monkeypatch.setattr(families, "LEAST", 2)
+    inner = families.refined
+    coarse = lambda *given, **options: replace(inner(*given, **options), h=8e-3)  # noqa: E731
+    monkeypatch.setattr(families, "refined", coarse)
+    tolerance = 0.1
+    rows = swept(
+        "--vary", "body.material.shear_modulus_pa=20e3,30e3", *SMALL, "body.thickness_mm=8",
+        "--model", "fem", "--tolerance", tolerance, "--workers", 1,
+    )  # fmt: skip
+    assert {(row["status"], row["reduced_together"]) for row in rows} == {("done", 1)}
+    assert all(row["h_mm"] < 8 and row["expected_error"] < tolerance for row in rows)
+
+
+def test_families_differ_in_what_can_be_free_alone(scene):
+    others = ("body.material.poisson=0.45,0.49", "body.size_x_mm=60,70", "tacton.size_mm=8,9")
+    found = cases(scene, combinations(varied(MODULI, *others)))
+    bodies = {(c.scene.body, c.scene.probes, c.scene.reading, c.scene.load): c for c in found}
+    assert len(bodies) == 32
+    shared = families.families(bodies, 0.05)
+    assert [family.members for family, _ in shared] == 4 * [8]
+    for family, members in shared:
+        (limit,) = family.ranges
+        assert limit == ("body.material.shear_modulus_pa", 20e3, 50e3)
+        assert family.scene.body.solid.shear_modulus == 20e3  # the shortest waves
+        for (body, *_), ((_, value),) in members.items():
+            assert body.solid.shear_modulus == value
+            assert body.solid.poisson == family.scene.body.solid.poisson
+    assert not families.families(bodies, 0.05, workers=8)
 
 
 def test_each_row_says_how_wrong_its_mesh_is(scene):

@@ -8,7 +8,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.supports import Sides
-from skinwave.models import prepared
+from skinwave.models import prepared, symmetry
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
 from skinwave.scene import SURFACE, Scene
 
@@ -27,7 +27,7 @@ def motions(monkeypatch, body, probes, h):
     """Responses by the part that the probes see, and by all of the body."""
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
-        monkeypatch.setattr(prepared, "axes_of_probes", axes)
+        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
         reduced = prepared.prepare(body, scene.probe_points, h=h, tolerance=1e-6)
         found.append(prepared.answer(reduced, scene))
     return found

@@ -66,6 +66,8 @@ def bounds(shape, low, high):
         (Distribution(shape="normal", width=(0.3,)), -4.0, stats.norm(-4, 1.2)),
         (Distribution(shape="normal", measure="standard_error", width=(2.0,)), 0.0,
          stats.norm(0, 2)),
+        (Distribution(measure="standard_error", width=(2.1,)), 7.0,
+         stats.lognorm(sqrt(log(1.09)), scale=7)),
         (bounds("uniform", 1, 5), 2.0, stats.uniform(1, 4)),
         (bounds("triangular", 1, 5), 2.0, stats.triang(0.25, 1, 4)),
     ],

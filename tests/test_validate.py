@@ -173,6 +173,15 @@ def recording(path, places, rms):
     savemat(path, {"y": y, "r": np.repeat(reference, 2, axis=2), "fs": 5000.0, "xy": places})
 
 
+def test_what_a_recording_of_the_zigzag_does_not_say_is_added_by_another_command(tmp_path):
+    y = np.random.default_rng(0).normal(size=(4, 50, 2))
+    hint = "`skinwave measured .*scan.mat --out DIR` takes such options"
+    for lacks, given in (("--rate", {"xy": np.eye(4)[:, :2]}), ("--places", {"fs": 5000.0})):
+        savemat(tmp_path / "scan.mat", {"y": y, "r": np.ones(50), **given})
+        with pytest.raises(ValueError, match=f"{lacks}.*{hint}"):
+            zigzag.measured(tmp_path / "scan.mat", 4.0)
+
+
 def test_a_recording_of_the_zigzag_is_seen_along_the_hand(tmp_path):
     along = np.linspace(-70, 70, 15)
     places = np.stack([0.2 * along, along], axis=1)

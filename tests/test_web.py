@@ -26,7 +26,7 @@ from simple_model import (
     spectrum,
 )
 from simple_model.flat_body import steady_lines
-from simple_model.focus import lobe_width, spot_width
+from simple_model.focus import focal_spot, lobe_width, relative_intensity, spot_width
 from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance
 from skinwave.cli import main
@@ -45,10 +45,12 @@ from skinwave.web import (
     downloads,
     drawings,
     guided,
+    insets,
     model,
     moves,
     moving,
     plots,
+    saved_figure,
     scenes,
     shown,
     slabs,
@@ -56,6 +58,7 @@ from skinwave.web import (
     worker,
 )
 from skinwave.web.controls import STARTS
+from skinwave.web.examples import EXAMPLES
 from skinwave.web.history import History
 from skinwave.web.memory import REST
 from skinwave.web.session import told
@@ -1012,6 +1015,140 @@ def test_answers_carry_the_warnings_of_the_command_line(scene):
     assert "which leaves out reflections from the sides" in said[0]
 
 
+def test_a_warning_names_no_option_of_the_command_line(session):
+    stiff = Body(kind="sheet", depth=1e-4, width=0.1, height=0.1, sides="clamped")
+    paper = replace(session.scene, body=stiff)
+    moved = waves.BodyResponses()(session.scene, nothing)
+    response = replace(moved.response, values=1e3 * moved.response.values, model="fem")
+    said = waves.warned_of(paper, replace(moved, response=response)).response.effort.warnings
+    assert any("fem-nonlinear" in each for each in said)
+    assert not any("--" in each for each in said)
+
+
+def test_an_example_can_be_undone_and_keeps_what_is_pinned(session):
+    with session.state:
+        moves.pin(session)
+    kept = session.pinned
+    for name, one in EXAMPLES.items():
+        with session.state:
+            moves.example(session, name)
+        assert (session.state.solid, session.state.layers_open) == (one.solid, one.layers)
+        assert session.state.query == controls.to_query(controls.from_query(one.query)[0])
+        assert session.pinned is kept
+        assert session.state.pinned
+        assert session.state.undoable
+    for _ in EXAMPLES:
+        with session.state:
+            moves.undo(session)
+    assert session.values == STARTS
+    assert EXAMPLES["wake"].solid
+    assert EXAMPLES["layers"].layers
+
+
+def test_a_page_opens_with_the_moving_body(session):
+    assert session.state.solid
+    asked = []
+    session.worker.ask = lambda *given: asked.append(given)
+    session._loop = Mock()
+    session.ask()
+    assert asked[0][2], "its motion is computed, too"
+
+
+def test_bodies_that_differ_much_are_drawn_each_over_its_largest(session):
+    """A soft and a stiff body: what moves is 200 times as much."""
+    answer = waves.BodyResponses()(session.scene, nothing)
+    with session.state:
+        told(session, "answer", session.number, answer)
+        moves.pin(session)
+    one, record = answer.response, answer.response.record
+    for times, apart in ((200.0, True), (5.0, False)):
+        more = replace(
+            answer, response=replace(one, values=times * one.values),
+            spectrum=times * answer.spectrum,
+            lines=tuple(replace(line, amplitude=times * line.amplitude) for line in answer.lines),
+        )  # fmt: skip
+        with session.state:
+            told(session, "answer", session.number, more)
+        for key, largest in (
+            ("waveform_plot", one.values[:601]),
+            ("spectrum_plot", one_line(answer)),
+        ):
+            plot = session.state[key]
+            shown = {c["role"]: c for c in plot["data"] if c["axis"] == "y2"}
+            most = {role: max(map(abs, shown[role]["y"])) for role in ("waves", "pinned")}
+            own = record.per_unit * float(np.abs(largest).max())
+            if apart:
+                assert most == pytest.approx({"waves": 1.0, "pinned": 1.0}, rel=1e-3)
+                assert plot["y2"]["said"] == "waves, each over its largest"
+                assert (
+                    shown["waves"]["name"] == f"B: skin slab (flat-body), 1 = {times * own:.3g} µm"
+                )
+                assert shown["pinned"]["name"] == f"A: skin slab (flat-body), 1 = {own:.3g} µm"
+                top = plot["y2"]["range"][1]
+                assert 1 < top < 3
+            else:
+                assert most["waves"] == pytest.approx(times * most["pinned"], rel=1e-3)
+                assert shown["pinned"]["name"] == "A: skin slab (flat-body), µm"
+        decibel = plots.in_decibel(session.state.spectrum_plot)["y2"]["said"]
+        assert decibel.endswith("each over its largest, dB" if apart else "dB re 1 µm")
+        names = [x for x in session.state.spectrum_plot["names"] if x["axis"] == "y2"]
+        assert names[0]["y"] <= session.state.spectrum_plot["y2"]["range"][1]
+        said = session.state.summary[-1]
+        line = max(answer.lines, key=lambda each: each.amplitude)
+        size = record.per_unit * line.amplitude
+        assert f"{size:.3g} µm at {line.frequency:.0f} Hz ({line.name}) of A, skin slab" in said
+        assert f"{times * size:.3g} µm" in said
+        row = next(row for row in session.state.rows if row["name"] == drawings.written(line.name))
+        assert row["pinned"] == f"{size:.3g}"
+    assert session.state.pinned_map["title"] == "A: skin slab"
+    assert session.state.wave_map["title"] == "B: skin slab"
+    assert not session.state.solid, "both maps are to be compared"
+
+
+def one_line(answer):
+    return answer.spectrum[answer.frequencies <= 600]
+
+
+def test_lines_that_a_pinned_body_has_at_other_frequencies_have_rows_of_their_own(session):
+    first = waves.BodyResponses()
+    before = first(scenes.scene_of(STARTS | {"am": 80.0}), nothing)
+    after = first(scenes.scene_of(STARTS), nothing)
+    found = drawings.rows(model.kernel(session.scene), after, pinned=before)
+    row = next(row for row in found if row["name"].startswith("A: f<sub>AM</sub>"))
+    assert (row["frequency"], row["displacement"]) == ("80.0", "")
+    assert float(row["pinned"]) > 0
+    shared = next(row for row in found if row["name"] == "f<sub>d</sub>")
+    assert shared["pinned"] != ""
+
+
+def test_small_curves_mark_the_present_height_and_the_distance_of_the_point():
+    there = insets.beside(scenes.scene_of(STARTS | {"height": 310.0, "x": 16.0}))
+    height, spot = there["height"], there["profile"]
+    assert height["at"][0] == pytest.approx((insets.LEFT + insets.RIGHT) / 2)
+    assert height["said"] == f"310 mm: {relative_intensity(0.31):.2f}"
+    value = float(focal_spot([6e-3, 0], 0.31, "gaussian"))
+    assert spot["said"] == f"point at 6.0 mm: {value:.2f}"
+    assert spot["at"][1] == pytest.approx(
+        insets.BOTTOM - value * (insets.BOTTOM - insets.TOP), abs=0.1
+    )
+    assert spot["words"].endswith(", mm")
+    curve = np.array([pair.split(",") for pair in spot["path"][1:].split("L")], float)
+    assert curve[0] == pytest.approx([insets.LEFT, insets.TOP])
+    assert (np.diff(curve[:, 1]) >= 0).all()
+    far = insets.beside(scenes.scene_of(STARTS | {"x": 50.0, "y": 50.0}))["profile"]
+    assert far["at"] == []
+    lobe = insets.beside(scenes.scene_of(STARTS | {"profile": "main_lobe"}))["profile"]
+    assert lobe["path"] != spot["path"]
+
+
+def test_small_curves_follow_the_sliders(session):
+    before = session.state.insets
+    with session.state:
+        session.state.height = 300
+    assert session.state.insets["height"]["at"] != before["height"]["at"]
+    assert session.state.insets["profile"]["path"] != before["profile"]["path"]
+
+
 def test_a_held_frequency_and_a_preset(session):
     with session.state:
         session.state.hold = True
@@ -1073,7 +1210,7 @@ def test_foci_follow_paths_of_their_own(session):
     with session.state:
         moves.own_path(session, 2, 2, "4,5")
     assert session.state.paths.endswith(", square/20/4.5/20")
-    assert session.state.foci_at[2] == [14.5, -30]
+    assert session.state.foci_track[0][2] == [14.5, -30]
     before = session.state.kernel_map
     with session.state:
         moves.own_path(session, 0, 1, "far")
@@ -1113,9 +1250,8 @@ def test_foci_follow_paths_of_their_own(session):
 def test_foci_run_once_along_their_own_path(session):
     with session.state:
         moves.turn(session, {"paths": "line/20/-20/0, line/10/20/0"})
-    with session.state:
-        session.state.phase = 50
-    assert session.state.foci_at == [[-10, 0], [25, 0]]
+    assert session.state.foci_track[50] == [[-10, 0], [25, 0]]
+    assert len(session.state.foci_track) == 100
 
 
 def test_what_is_saved_can_be_opened(session, monkeypatch):
@@ -1154,6 +1290,50 @@ def test_what_is_saved_can_be_opened(session, monkeypatch):
     assert session.state.problem == ""
 
 
+def test_a_figure_is_as_wide_as_asked_and_shows_what_the_plots_show(session, monkeypatch):
+    async def here(make, *given):
+        return make(*given)
+
+    monkeypatch.setattr(downloads, "elsewhere", here)
+    answer = waves.BodyResponses()(session.scene, nothing, moving=True)
+    with session.state:
+        told(session, "answer", session.number, answer)
+        session.state.solid = False
+        session.state.decibel = True
+        moves.pin(session)
+        session.state.against = True
+        moves.look(session)
+    figure = downloads.offered(session)["figure"]
+    said = asyncio.run(figure("svg", 3.5, "spectrum_plot:50:260")).decode()
+    width = float(re.search(r'<svg[^>]*width="([\d.]+)pt"', said)[1])
+    assert width == pytest.approx(72 * 3.5, abs=0.1)
+    for words in (
+        "A: skin slab (flat-body), µm", "threshold (±5 dB)", "less the", "dB re 1 Pa", "+30 dB",
+        "Commanded signal", "250",
+    ):  # fmt: skip
+        assert re.search(f">[^<]*{re.escape(words)}", said), words
+    assert ">300<" not in said, "beyond what is zoomed to"
+    sizes = {float(size) for size in re.findall(r"font(?:-size)?: ?(?:\w+ )?([\d.]+)px", said)}
+    assert 8 in sizes
+    assert max(sizes) == 8
+    pdf = asyncio.run(figure("pdf", 7))
+    assert b"/Type3" not in pdf
+    with session.state:
+        session.state.solid = True
+    seen = saved_figure.seen(session, saved_figure.view_of("body:2.5:-0.5:0.95:0.5:1 foci:25"))
+    assert seen["foci"] == session.state.foci_track[25]
+    again = saved_figure.figure_of(seen, "svg", 7.0).decode()
+    assert "2.5 ms into the" in again
+
+
+def test_a_figure_has_the_colours_of_the_page(session):
+    here = saved_figure._colours("paper-sheet")
+    assert here["waves"] == "#d55e00"
+    assert saved_figure._colours("skin-slab")["waves"] == "#0072b2"
+    roles = {curve["role"] for curve in session.state.spectrum_plot["data"]}
+    assert roles | {f"mode{n}" for n in range(1, 7)} <= set(here)
+
+
 def test_a_report_says_how_often_paths_of_their_own_are_drawn():
     scene = scenes.scene_of(STARTS | OWN | {"duration": 0.1})
     said = downloads.report_of(scene, [model.kernel(scene)]).decode()
@@ -1175,6 +1355,9 @@ def test_zooming_in_shows_the_carrier(session):
             moves.zoom(session, *beyond)
         low, high = session.state.commanded_plot["x"]["range"]
         assert 0 <= low < high <= 1000
+    with session.state:
+        moves.zoom(session, 990.0, 1015.0)  # moved beyond the end
+    assert session.state.commanded_plot["x"]["range"] == pytest.approx([975, 1000])
     with session.state:
         moves.zoom(session)
     assert "envelope" in session.state.commanded_plot["title"]

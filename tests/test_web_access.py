@@ -277,7 +277,8 @@ def session():
     ("key", "value", "taken"),
     [
         ("am", 77, True), ("am", "7", True), ("body", "none", True), ("opened", None, True),
-        ("phase", 50, True), ("span", "whole Tacton", False), ("drawer", None, True),
+        ("phase", 50, False), ("span", "whole Tacton", False), ("drawer", None, True),
+        ("layers_open", True, True),
         ("opened", [{"content": b"name = 'a'", "name": "a"}], True),
         ("opened", {"content": [b"a", b"b"]}, True), ("opened", {"content": "a"}, False),
         ("opened", "a", False), ("opened", [1], False), ("opened", [{}, {}], False),
@@ -318,7 +319,9 @@ def test_what_can_be_chosen_on_the_page_is_taken():
         ("entered", ["am"]), ("entered", ["none-such", 1]), ("entered", [None, 1]),
         ("preset", ["none-such"]), ("cancel", [1]), ("undo", [0]), ("restart", [{"am": 1}]),
         ("figure", ["pgf"]), ("figure", ["ps"]), ("figure", [7]),
-        ("figure", ["svg/../../x"]), ("figure", []), ("report", ["/etc/passwd"]),
+        ("figure", ["svg/../../x"]), ("figure", []),
+        ("figure", ["svg", 99]), ("figure", ["svg", "wide"]), ("figure", ["svg", 7, "body:1"]),
+        ("figure", ["svg", 7, "spectrum_plot:a:b"]), ("report", ["/etc/passwd"]),
         ("scene_toml", ["/etc/passwd"]), ("waveform_csv", [0, 0]),
     ],
 )  # fmt: skip

@@ -134,8 +134,21 @@ def test_a_palm_has_stiffness_loss_and_thickness():
         with_layers(replace(palm, material="bone"), "15/4000/0.1")
 
 
-def test_moved_materials_of_elements_are_those_of_their_own_reduction():
-    soft = replace(BODIES["silicone-disc"], material="palm", width=0.016, height=0.016, depth=0.005)
+SOFT = replace(BODIES["silicone-disc"], material="palm", width=0.016, height=0.016, depth=0.005)
+
+
+def test_the_tissue_around_a_bone_is_moved_alone():
+    finger = BODIES["fingertip"]
+    (row,) = rows(finger, "")
+    assert (row["name"], row["thickness"]) == ("palm", "13")
+    moved = with_layers(finger, "13/40/0.4")
+    assert moved.regions == finger.regions
+    assert covers(finger, moved)
+
+
+@pytest.mark.parametrize("soft", [SOFT, BODIES["fingertip"]], ids=["disc", "fingertip"])
+def test_moved_materials_of_elements_are_those_of_their_own_reduction(soft):
+    mm = f"{1e3 * soft.depth:g}"
     values = STARTS | {"body": OWN_BODY, "duration": 0.05, "size": 4.0, "x": 3.0}
     answered, said = waves.BodyResponses(), []
 
@@ -145,10 +158,10 @@ def test_moved_materials_of_elements_are_those_of_their_own_reduction():
         scene = scene_of(values | {"layers": layers}, soft)
         return scene, answered(scene, lambda *each: said.append(each), False, base)
 
-    moved("5/30")
+    moved(f"{mm}/30")
     assert said
     said.clear()
-    scene, found = moved("5/17/0.2")
+    scene, found = moved(f"{mm}/17/0.2")
     assert not said, "one reduction serves all"
     own = waves.BodyResponses()(scene, lambda *_: None)
     motion = own.response.displacement

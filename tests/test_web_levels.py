@@ -3,10 +3,13 @@ differences, measurements, examples, help.
 """
 
 import base64
+import re
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from PIL import Image
 
 from simple_model import sensation_level
@@ -17,6 +20,7 @@ from skinwave.web import (
     controls,
     downloads,
     drawings,
+    layer_values,
     level_view,
     levels,
     measured,
@@ -27,7 +31,7 @@ from skinwave.web import (
 )  # fmt: skip
 from skinwave.web.controls import STARTS
 from skinwave.web.examples import EXAMPLES
-from skinwave.web.help import HELP
+from skinwave.web.help import BAR, HELP
 from skinwave.web.plots import Curves
 
 AT_20 = STARTS | {"x": 20.0, "duration": 0.5}
@@ -56,11 +60,36 @@ def test_levels_of_steady_lines_are_those_of_the_lines_in_the_response(responses
     assert levels.kernel_level(scene) == pytest.approx(max(in_pressure), abs=0.1)
 
 
-def test_a_level_is_not_known_where_another_table_would_be_needed(responses, shown):
-    assert np.isnan(responses.level(scenes.scene_of(AT_20 | {"height": 30.0})))
-    assert np.isfinite(responses.level(scenes.scene_of(AT_20 | {"height": 230.0})))
+def test_levels_of_waves_are_known_at_all_heights_whose_tables_are_made_where_they_lack(shown):
+    """The present height is of one range of tables, most that are shown of another."""
+    own = waves.BodyResponses()
+    own(shown[0], silent)
+    _, scene_of_each = level_view.variants("level by height", AT_20)
+    some = slice(None, None, 6)
+    known = np.array([own.level(scene) for scene in scene_of_each[some]])
+    assert np.isfinite(known).all()
+    for scene, level in list(zip(scene_of_each[some], known, strict=True))[:2]:
+        lines = own(scene, silent).lines
+        assert level == pytest.approx(max(line.sensation for line in lines), abs=0.1)
+    assert scene_of_each[0].pressure.height < 0.16 < scene_of_each[-1].pressure.height
     at_depth = scenes.scene_of(AT_20 | {"depth": 2.0})
-    assert np.isnan(responses.level(at_depth)), "a threshold is that of the surface"
+    assert np.isnan(own.level(at_depth)), "a threshold is that of the surface"
+
+
+def test_the_highest_level_is_of_waves_only_where_all_of_theirs_are_known(shown):
+    found, _ = level_view.variants("level by size", AT_20)
+    waves_of = found.kernel[::-1].copy()
+    whole = replace(found, waves=waves_of)
+    assert (whole.of, whole.best) == ("waves", found.at[waves_of.argmax()])
+    assert "(highest: waves)" in level_view.level_plot(whole, shown[2])["title"]
+    partly = waves_of.copy()
+    partly[:-1] = np.nan
+    part = replace(found, waves=partly)
+    assert (part.of, part.best) == ("kernel", found.best)
+    plot = level_view.level_plot(part, shown[2])
+    assert "(highest: kernel)" in plot["title"]
+    assert any(f"(at 1 of {len(found.at)})" in curve["name"] for curve in plot["data"])
+    assert plot["names"][0]["y"] == pytest.approx(max(found.kernel), abs=1e-3)
 
 
 def test_the_sentence_on_what_is_above_threshold_says_what_line_and_map_say(shown):
@@ -163,8 +192,29 @@ def test_examples_set_what_the_controls_take(name):
 
 
 def test_there_is_help_at_each_control():
-    shown_as_others = {"shape", "paths", "layers", "body"}  # buttons, a table, sliders and a list
-    assert set(HELP) == set(controls.KEYS) - shown_as_others
+    """On the page itself, at each that can be turned, chosen or opened."""
+    pytest.importorskip("trame_vuetify")
+    from skinwave.web import layout
+
+    beside = {"hold", "published", "opened", "measured_file"}
+    assert set(HELP) == set(controls.KEYS) | set(layer_values.PARTS) | beside
+    page = layout.rendered()
+    for key, said in HELP.items():
+        assert str(escape(said)) in page, key
+    for key in (set(HELP) - {"layers"}) - set(layer_values.PARTS):
+        assert f'id="help-{key}"' in page, key
+    for part in layer_values.PARTS:
+        assert f':id="`help-{part}-${{k}}`"' in page, part
+    bar = page[page.index("<VAppBar ") : page.index("</VAppBar>")]
+    named = set(re.findall(r'(?<![:\w])id="([\w-]+)"', bar))
+    aside = {"help-bar", "highest-level", "redo", "swap", "theme", "about"}  # what others say, too
+    inside = {name for name in named if name.startswith(("preset-", "save-")) or name in HEARD}
+    assert named - aside - inside == set(BAR)
+    for key, (_, said) in BAR.items():
+        assert str(escape(said)) in page, key
+
+
+HEARD = {"hear"}  # in the menu of what is saved
 
 
 @pytest.mark.parametrize("suffix", downloads.PATTERNS)

@@ -29,9 +29,10 @@ class Logs:
         self.asked, self.errors = [], []
 
 
-def opened(browser, address, query="", **viewport):
-    size = {"width": 1280, "height": 720} | viewport
-    page, logs = browser.new_page(viewport=size), Logs()
+def opened(browser, address, query="", motion="reduce"):
+    """A page at rest, unless a reader's system asks for no less "motion"."""
+    size = {"width": 1280, "height": 720}
+    page, logs = browser.new_page(viewport=size, reduced_motion=motion), Logs()
     page.set_default_timeout(PATIENCE)
     page.on("request", lambda request: logs.asked.append(request.url))
     page.on("pageerror", lambda error: logs.errors.append(str(error)))
@@ -47,6 +48,7 @@ def visit(browser, address):
 
 
 def begun(page, query):
+    page.evaluate("() => window.trame.state.set('solid', false)")
     page.evaluate("q => window.trame.trigger('restart', [q])", query)
     state_becomes(page, "query", query)
     return page
@@ -216,10 +218,12 @@ def test_dropdowns_shapes_rhythm_and_hold_do_what_they_say(bare):
     page.locator("#foci-field").fill("3")
     choose(page, "sharing", "in turn")
     query_has(page, "sharing=time_multiplexed")
-    assert len(state(page, "foci_at")) == 3
+    page.wait_for_function("() => window.trame.state.get('foci_track')[0].length === 3")
     page.locator("#phases-field").fill("0, 25, 50")
     query_has(page, "phases=0")
-    page.wait_for_function("() => Math.abs(window.trame.state.get('foci_at')[1][1] + 10) < 0.01")
+    page.wait_for_function(
+        "() => Math.abs(window.trame.state.get('foci_track')[0][1][1] + 10) < 0.01"
+    )
     assert page.locator("#kernel-map circle").count() == 3
     for shape in ("point", "line", "triangle", "square"):
         page.locator(f"#shape-{shape}").click()
@@ -618,9 +622,9 @@ def test_curves_are_drawn_read_and_zoomed_by_keys(page):
 def test_the_body_moves_in_three_dimensions(page):
     page.locator("#solid").click()
     page.wait_for_function("() => window.trame.state.get('body_motion').frames")
-    play, now = page.locator("#body-play"), page.locator("#body-now")
-    if play.get_attribute("aria-label") == "Pause":
-        play.click()
+    play, now = page.locator("#play"), page.locator("#body-now")
+    assert play.inner_text() == "▶ Play", "less motion is asked for"
+    assert page.locator(".sw-play:visible").count() == 1
     assert re.fullmatch(r"\d+\.\d\d of \d+\.\d\d ms", now.inner_text())
     stopped = ink(page, "body-view")
     assert len(stopped) > 50, "next to nothing is drawn"
@@ -638,8 +642,143 @@ def test_the_body_moves_in_three_dimensions(page):
     page.wait_for_function("t => !document.getElementById('body-now').textContent.startsWith(t)",
                            arg=f"{half:.2f}")  # fmt: skip
     photographed(page, "body")
+    page.locator("#body-view").press(" ")
+    assert play.inner_text() == "▶ Play"
     page.locator("#solid").click()
     page.wait_for_selector("#wave-map")
+
+
+def test_a_page_opens_with_moving_waves_and_one_button_that_stops_them(browser, address):
+    page, logs = opened(browser, address, motion="no-preference")
+    now = page.locator("#body-now")
+    page.wait_for_function("() => document.getElementById('body-now')?.textContent.length > 3")
+    first, before = now.inner_text(), ink(page, "body-view")
+    page.wait_for_function("said => document.getElementById('body-now').textContent !== said",
+                           arg=first)  # fmt: skip
+    assert ink(page, "body-view") != before
+    play = page.locator(".sw-play:visible")
+    assert play.count() == 1
+    assert play.inner_text() == "❚❚ Pause"
+    for shown, above in ((play, 0), (page.locator("#body-view"), play.bounding_box()["y"])):
+        frame = shown.bounding_box()
+        assert above <= frame["y"]
+        assert frame["y"] + frame["height"] <= 720, "it is seen without scrolling"
+    photographed(page, "opening")
+    play.click()
+    assert play.inner_text() == "▶ Play"
+    rest = now.inner_text()
+    page.wait_for_timeout(300)
+    assert now.inner_text() == rest
+    assert logs.errors == []
+    page.close()
+
+
+def test_nothing_moves_by_itself_where_less_motion_is_asked_for(browser, address):
+    page, _ = opened(browser, address)
+    page.wait_for_function("() => document.getElementById('body-now')?.textContent.length > 3")
+    rest = page.locator("#body-now").inner_text()
+    page.wait_for_timeout(500)
+    assert page.locator("#body-now").inner_text() == rest
+    assert page.locator("#play").inner_text() == "▶ Play"
+    page.close()
+
+
+def test_peaks_are_read_by_keys_and_what_is_zoomed_to_stays_in_the_data(page):
+    state_becomes(page, "waves_stale", False)
+    plot, said = page.locator("#spectrum_plot"), page.locator("#plot-said")
+    shown = "window.trame.utils.plots.shown.spectrum_plot"
+    found = []
+    plot.focus()
+    for _ in range(4):
+        plot.press("Shift+ArrowRight")
+        found.append(page.evaluate(f"{shown}.value"))
+        assert said.inner_text().startswith(f"frequency, Hz {found[-1]:.5g}")
+        assert "kernel, same load, Pa" in said.inner_text()
+    assert found == sorted(set(found))
+    named = [name["x"] for name in state(page, "spectrum_plot")["names"]]
+    assert min(abs(140 - value) for value in found) < 1.5 or max(found) < 140
+    assert any(abs(value - name) < 1.5 for value in found for name in named)
+    plot.press("Shift+ArrowLeft")
+    assert page.evaluate(f"{shown}.value") == pytest.approx(found[-2])
+    assert page.locator("#plot-said").get_attribute("aria-live") == "polite"
+    plot.press("+")
+    for _ in range(6):
+        plot.press("ArrowLeft")
+    assert page.evaluate(f"{shown}.zoom") == pytest.approx([0, 300])
+    for _ in range(6):
+        plot.press("ArrowRight")
+    assert page.evaluate(f"{shown}.zoom") == pytest.approx([300, 600])
+    plot.press("-")
+    assert page.evaluate(f"{shown}.zoom") == pytest.approx([0, 600])
+    plot.press("Home")
+
+
+def test_small_curves_stand_beside_height_and_profile(page):
+    inset = page.locator("#inset-height")
+    assert "height of the focus, mm; 200 mm: 1.00" in inset.get_attribute("aria-label")
+    at = inset.locator("circle").get_attribute("cx")
+    profile = page.locator("#inset-profile .sw-curve").get_attribute("d")
+    page.locator("#height-field").fill("300")
+    query_has(page, "height=300")
+    page.wait_for_function(
+        "at => document.querySelector('#inset-height circle').getAttribute('cx') !== at", arg=at
+    )
+    assert page.locator("#inset-profile .sw-curve").get_attribute("d") != profile
+    assert "relative force" in inset.text_content()
+    assert "distance D from the focus, mm" in page.locator("#inset-profile").text_content()
+
+
+def test_examples_show_what_they_speak_of_and_can_be_undone(page):
+    page.locator("#pin").click()
+    page.locator("#example-wake").click()
+    page.locator("#body-view").wait_for()
+    page.locator("#undo").click()
+    state_becomes(page, "query", "")
+    page.locator("#example-layers").click()
+    page.wait_for_function("() => document.getElementById('layers').open")
+    page.locator("#modulus-0-field").wait_for()
+    assert page.locator("label[for=loss-0-field]").inner_text().startswith("epidermis")
+    page.locator("#help-modulus-0").click()
+    assert "Shear modulus" in page.locator("#modulus-0-help").inner_text()
+    assert state(page, "pinned")
+    page.locator("#undo").click()
+    state_becomes(page, "query", "")
+    page.locator("#help-bar").click()
+    assert page.locator("#bar-help").is_visible()
+    assert "8 points" in page.locator("#save-help").inner_text()
+    page.locator("#help-bar").click()
+    assert not page.locator("#bar-help").is_visible()
+
+
+def test_maps_of_both_bodies_are_seen_at_once(page):
+    state_becomes(page, "waves_stale", False)
+    page.locator("#pin").click()
+    page.locator("#pinned-map").wait_for()
+    page.wait_for_timeout(300)
+    a, b = (page.locator(f"#{name}-map").bounding_box() for name in ("pinned", "wave"))
+    assert abs(a["y"] - b["y"]) < 2
+    assert a["x"] >= b["x"] + b["width"] - 1
+    assert a["y"] + a["height"] <= 720
+    beyond = page.evaluate("""() => { const at = document.querySelector('.sw-lines');
+        return at.scrollWidth - at.clientWidth }""")
+    assert beyond <= 1
+    photographed(page, "two-bodies")
+
+
+def test_a_figure_is_that_of_the_part_that_is_zoomed_to(page, tmp_path):
+    state_becomes(page, "waves_stale", False)
+    page.locator("#spectrum_plot").press("+")
+    low, high = page.evaluate("window.trame.utils.plots.shown.spectrum_plot.zoom")
+    view = page.evaluate("window.trame.utils.skinwave.view()")
+    assert f"spectrum_plot:{low:g}:{high:g}" in view
+    page.locator("#save").click()
+    with page.expect_download() as saved:
+        page.locator("#save-column-svg").click()
+    saved.value.save_as(tmp_path / "figure.svg")
+    said = (tmp_path / "figure.svg").read_text()
+    assert ">600<" not in said
+    assert re.search(r'width="252(\.0*)?pt"', said)
+    page.locator("#spectrum_plot").press("Home")
 
 
 def test_what_is_saved_opens_again(bare, tmp_path):
@@ -723,10 +862,13 @@ def test_a_spectrum_in_decibel_help_and_the_level_over_a_control(bare):
 
 def test_one_button_plays_foci_and_cursors_and_cursors_are_shared(bare):
     value = "plot => window.trame.utils.plots.shown[plot].value"
+    focus = "Number(document.querySelector('#kernel-map .sw-focus').getAttribute('cx'))"
+    before = bare.evaluate(focus)
     bare.locator("#play").click()
     bare.wait_for_function("() => window.trame.utils.plots.shown.waveform_plot.value > 1")
-    bare.wait_for_function("() => window.trame.state.get('phase') > 0")
+    bare.wait_for_function(f"before => Math.abs({focus} - before) > 1", arg=before)
     bare.locator("#play").click()
+    bare.wait_for_function("() => window.trame.state.get('phase') > 0")
     bare.wait_for_function(f"() => ({value})('waveform_plot') === null")
     bare.locator("#commanded_plot").hover(position={"x": 200, "y": 60})
     assert bare.evaluate(value, "waveform_plot") == bare.evaluate(value, "commanded_plot") > 0

@@ -1,6 +1,7 @@
 """Import of a body from a surface or mesh file, placed under the device."""
 
-import os
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 
 from meshes.facets import geometry, seen_from_above, tag_boundary
 from meshes.files import mesh_files, surface_files
+from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
 from meshes.surface.alignment import aligned, clipped, cut_to, on_planes
 from meshes.surface.repair import check, repaired
@@ -26,17 +28,21 @@ Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
 
 
+def _unsaid(*said: object) -> None:
+    """Progress that nobody follows."""
+
+
 def body_from_file(
-    path: str | os.PathLike[str],
+    path: PathLike,
     h: float,
     *,
     unit: str = "m",
     up: str = "+z",
-    inner: Sequence[str | os.PathLike[str]] = (),
+    inner: Sequence[PathLike] = (),
     clip: Sequence[float] | None = None,
     timeout: float = 120.0,
-    say: Say = lambda sentence: None,
-    progress: Progress = lambda phase, fraction: None,
+    say: Say = _unsaid,
+    progress: Progress = _unsaid,
 ) -> TetMesh:
     """Tetrahedra of the body in a file, placed under the device, with its boundary named.
 
@@ -104,7 +110,7 @@ def body_from_file(
 
 
 def _inner_surfaces(
-    paths: Sequence[str | os.PathLike[str]], outer: Surface, *, unit: str, up: str, say: Say
+    paths: Sequence[PathLike], outer: Surface, *, unit: str, up: str, say: Say
 ) -> dict[str, Surface]:
     """Surfaces inside another by the names of their files, repaired and checked."""
     names = [REST, *(Path(path).stem for path in paths)]
@@ -124,9 +130,7 @@ def _inner_surfaces(
     return found
 
 
-def sound_surface(
-    path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z", say: Say
-) -> Surface:
+def sound_surface(path: PathLike, *, unit: str = "m", up: str = "+z", say: Say) -> Surface:
     """Surface in a file, repaired and checked.
 
     Parameters

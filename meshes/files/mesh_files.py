@@ -6,6 +6,8 @@ facet set is a block of triangles for which the cell array `facets:<name>` is 1.
 are physical groups.
 """
 
+from __future__ import annotations
+
 import contextlib
 import io
 import os

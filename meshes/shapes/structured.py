@@ -6,6 +6,8 @@ makes neighbouring prisms cut their common side along the same diagonal, so that
 conforms without a search, and has the mirror symmetries of its grid.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

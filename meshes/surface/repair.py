@@ -3,6 +3,8 @@
 Every refusal counts what is wrong and says where the first of it is, in millimetre.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,5 +1,7 @@
 """Triangulated surfaces. Triangles are seen anticlockwise from outside."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

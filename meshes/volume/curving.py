@@ -1,5 +1,7 @@
 """Ten-node elements whose boundary follows a level set instead of its facets."""
 
+from __future__ import annotations
+
 import logging
 from collections.abc import Callable
 from dataclasses import replace

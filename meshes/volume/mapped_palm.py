@@ -7,6 +7,8 @@ take those inside along by transfinite interpolation (Gordon and Hall, Int J Num
 7:461, 1973).
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from itertools import combinations
 

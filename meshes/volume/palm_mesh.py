@@ -1,5 +1,7 @@
 """Tetrahedral mesh of a palm, with its boundary nodes on the level set."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 from meshes.facets import seen_from_above, tag_boundary

@@ -1,5 +1,7 @@
 """Element quality of tetrahedra: angles, sizes, and distortion by curved sides."""
 
+from __future__ import annotations
+
 from itertools import combinations
 
 import numpy as np

@@ -7,6 +7,8 @@ and a folder of its own with a time limit, its result is checked, and cached on 
 is meshed once per machine.
 """
 
+from __future__ import annotations
+
 import logging
 import tempfile
 from collections.abc import Callable, Mapping

@@ -1,5 +1,7 @@
 """A body and its kind, and the registry of kinds."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf, isfinite
@@ -16,6 +18,7 @@ from simple_model.dispersion import DispersionCurves
 from simple_model.material import NOT_SKIN, PRESETS
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.grid import Grid
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
     FLAT,
@@ -163,7 +166,7 @@ class Body:
             )
 
     @property
-    def of_kind(self) -> "BodyKind":
+    def of_kind(self) -> BodyKind:
         """The registered record of its kind."""
         return kind_of(self.kind)
 
@@ -266,6 +269,7 @@ class BodyKind:
     morph : called as `discretise`, and with a `reference`: the mesh that this has with elements of
         the size, its nodes moved in proportion to the thicknesses of the body's layers; None where
         they do not follow these
+    grid : grid of its structured mesh, whose lines may be where the error is; None without one
     check_size : raises a ValueError for an element size in metre that has too many elements
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
@@ -295,6 +299,7 @@ class BodyKind:
     words: Callable[[Body], str] = lambda body: _size(body)
     discretise: Callable[[Body, float], Discretised] | None = None
     morph: Callable[..., Discretised] | None = None
+    grid: Grid | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3
@@ -308,7 +313,7 @@ class BodyKind:
     is_symmetric: bool = False
     is_bounded: bool = True
     may_be_layered: bool = True
-    actual_size: Callable[["Body", float], float] | None = None
+    actual_size: Callable[[Body, float], float] | None = None
     conforming: bool = False
     may_be_coated: bool = False
     normal_patch: float = 0.0

@@ -13,6 +13,7 @@ from fem.coat import Coat
 from fem.materials import Material
 from fem.plane_stiffness import SIDES, Tension
 from meshes import TetMesh, half
+from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretised
@@ -56,6 +57,7 @@ def build(
     h: float | None = None,
     symmetry: str = "",
     discretise: Callable[[Body, float], Discretised] | None = None,
+    lines: Lines | None = None,
 ) -> Build:
     """Mesh of a body with its materials and boundary conditions.
 
@@ -66,6 +68,7 @@ def build(
     symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
         part with positive coordinates is meshed, with symmetry conditions on these planes
     discretise : instead of that of its kind
+    lines : grid lines (n,) in metre along x, y and z, of a kind that has some, instead of a size
 
     Returns
     -------
@@ -77,9 +80,13 @@ def build(
         If the body is "none", or would have too many degrees of freedom.
     """
     size = checked(body, h or default_size(body), COMPARED)
-    discretise = discretise or body.of_kind.discretise
-    assert discretise  # else refused
-    made = discretise(body, size)
+    if lines:
+        assert body.of_kind.grid  # else there are none
+        made = body.of_kind.grid.discretise(body, lines)
+    else:
+        discretise = discretise or body.of_kind.discretise
+        assert discretise  # else refused
+        made = discretise(body, size)
     mesh = made.mesh
     sides = {"sides": body.sides} if isinstance(body.sides, str) else body.sides.by_name
     ends = {"bottom": body.base, **sides}

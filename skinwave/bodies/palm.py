@@ -1,6 +1,7 @@
 """Parametric palm: soft tissue on bone, meshed finely under the focus."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -8,11 +9,13 @@ import fem
 from fem.load_and_probe import facet_points
 from meshes import Grading, MeshError, TetMesh, boundary_facets, graded_axis, mapped_palm, palm_mesh
 from meshes.files.import_body import GROWTH
+from meshes.shapes.equidistributed import Lines
 from meshes.shapes.palm import gradient
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
 
 COARSEST = 2.0  # elements far from the middle, over those of h
@@ -36,23 +39,49 @@ def discretise(body: Body, h: float) -> Discretised:
     MeshError
         If it cannot be meshed.
     """
-    # Larger elements do not follow the rim, where waves reflect and the base's support ends.
-    coarsest = max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
-    side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
-    lines = _grid_lines(body, side * SURFACE * h, side * coarsest)
     try:
-        mesh = mapped_palm(body.palm, *lines)
+        mesh = mapped_palm(body.palm, *body_lines(body, h))
     except MeshError:  # a relief that a structured mesh cannot follow
-        mesh = palm_mesh(body.palm, h, sizing=_sizes(h, coarsest))
+        mesh = palm_mesh(body.palm, h, sizing=_sizes(h, _coarsest(body, h)))
+    return _supported(body, h, mesh)
+
+
+def on_lines(body: Body, lines: Lines) -> Discretised:
+    """Mapped mesh on grid lines (n,) in metre of the box around a palm without layers.
+
+    Raises
+    ------
+    MeshError
+        If its relief is too steep for it.
+    """
+    return _supported(body, hand_size(body), mapped_palm(body.palm, *lines))
+
+
+def _supported(body: Body, h: float, mesh: TetMesh) -> Discretised:
     mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
-    return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
+    return in_its_layers(body, h, mesh, partial(_support, body))
 
 
-def _grid_lines(body: Body, finest: float, coarsest: float) -> tuple[Floats, Floats, Floats]:
-    """Grid lines in metre along x, y and z of cells as `_sizes` asks for."""
+def cells(lines: Lines, mesh: TetMesh) -> Ints:
+    """Cell (e, 3) of each element of all of a mapped mesh, which are numbered by `kuhn_tets`."""
+    counts = tuple(len(line) - 1 for line in lines)
+    places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.tile(places, (len(mesh.tets) // len(places), 1))
+
+
+def _coarsest(body: Body, h: float) -> float:
+    """Largest element: larger ones do not follow the rim, where waves reflect and the base's
+    support ends.
+    """
+    return max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
+
+
+def body_lines(body: Body, h: float) -> Lines:
+    """Grid lines in metre along x, y and z of the box around a palm, for cells as `_sizes` asks."""
+    side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
+    finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
-    halves = [graded_axis(side / 2, finest, along) for side in (body.width, body.height)]
-    x, y = (np.concatenate([-half[:0:-1], half]) for half in halves)
+    x, y = (mirrored(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
     # No cell is higher than asked for: two element sizes that are compared then have different
     # numbers of layers more often, and one more changes as much as all that is beside it.
     heights = [finest]
@@ -90,6 +119,13 @@ PALM = register(
         presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
         discretise=discretise,
+        grid=Grid(
+            lines=body_lines,
+            discretise=on_lines,
+            cells=cells,
+            coarsest=lambda body: body.relief.edge_radius,
+            has=lambda body: not body.layers,
+        ),
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
         named_sides=("front", "back"),

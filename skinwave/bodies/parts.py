@@ -1,5 +1,7 @@
 """Parts of a body: its layers, the relief of a palm, and its placement under the device."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -124,6 +126,10 @@ class Placement:
         if self == FLAT:
             return points
         return points @ self.rotation.T + [*self.offset, self.lift]
+
+    def undone(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) under the device where they lie in the body before it is placed."""
+        return points if self == FLAT else (points - [*self.offset, self.lift]) @ self.rotation
 
 
 STEEPEST, FURTHEST_LIFT = np.pi / 3, 0.05

@@ -4,15 +4,17 @@ from functools import partial
 
 import numpy as np
 
-from meshes import Grading, extrude, graded_axis
+from meshes import Grading, TetMesh, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
+from meshes.shapes.equidistributed import Lines
 from meshes.shapes.structured import check_size, with_planes
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints
 from simple_model.compliance import layered
 from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.parts import Layer
 
@@ -23,7 +25,7 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 def discretise(body: Body, h: float) -> Discretised:
     """Structured mesh whose elements follow the layers, with any absorbing layer around it."""
-    return _on_lines(body, *slab_lines(body, h))
+    return on_lines(body, body_lines(body, h))
 
 
 def morph(body: Body, h: float, *, reference: Body) -> Discretised:
@@ -39,36 +41,61 @@ def morph(body: Body, h: float, *, reference: Body) -> Discretised:
     -------
     Discretised
     """
-    x, y, z = slab_lines(reference, h)
+    x, y, z = body_lines(reference, h)
     before, now = (
         np.array([*(start for start, _ in each.strata), each.depth]) for each in (reference, body)
     )
-    return _on_lines(body, x, y, -np.interp(-z, before, now))
+    return on_lines(body, (x, y, -np.interp(-z, before, now)))
 
 
-def _on_lines(body: Body, x: Floats, y: Floats, z: Floats) -> Discretised:
-    mesh = extrude(x, y, z)
+def on_lines(body: Body, lines: Lines) -> Discretised:
+    """Structured mesh on grid lines (n,) in metre through the body, with any absorbing layer around
+    it; planes between its layers are met instead of lines that are close to them.
+    """
+    x, y, z = lines
+    planes = [-start for start, _ in body.strata[1:]]
+    mesh = extrude(*_extended(body, x, y), with_planes(z, planes))
     depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh, materials = in_layers(mesh, body.strata, depths)
     drag = partial(layer_drag, body) if has_layer(body) else None
     return Discretised(mesh=mesh, materials=materials, drag=drag)
 
 
-def slab_lines(body: Body, h: float) -> tuple[Floats, Floats, Floats]:
-    """Grid lines along x, y and z: fine where the focus travels, with any absorbing layer."""
+def body_lines(body: Body, h: float) -> Lines:
+    """Grid lines along x, y and z through a body: fine where the focus travels."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
-    ends = ((body.width, "left", "right"), (body.height, "front", "back"))
-    x, y = (_line(body, graded_axis(side / 2, h, along), *names) for side, *names in ends)
+    x, y = (mirrored(graded_axis(side / 2, h, along)) for side in (body.width, body.height))
     return x, y, -_depth_line(body, h)[::-1]
 
 
-def _line(body: Body, half: Floats, *ends: str) -> Floats:
-    """Grid lines from one end to the other of a half, with an absorbing layer where an end has."""
-    layer = half[-1] + layer_line(body, half) if has_layer(body) else half[:0]
-    low, high = (
-        np.concatenate([half, layer]) if body.side(end) == "absorbing" else half for end in ends
+def slab_lines(body: Body, h: float) -> Lines:
+    """The same with those of any absorbing layer."""
+    x, y, z = body_lines(body, h)
+    return *_extended(body, x, y), z
+
+
+def cells(lines: Lines, mesh: TetMesh) -> Ints:
+    """Cell (e, 3) of each element; of those in an absorbing layer the nearest one."""
+    middles = mesh.points[mesh.tets[:, :4]].mean(axis=1)
+    each = zip(lines, middles.T, strict=True)
+    return np.column_stack([
+        np.clip(np.searchsorted(line, x) - 1, 0, len(line) - 2) for line, x in each
+    ])  # fmt: skip
+
+
+def _extended(body: Body, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Grid lines through a body along x and y, with an absorbing layer where an end has one."""
+    if not has_layer(body):
+        return x, y
+    return _beyond(body, x, "left", "right"), _beyond(body, y, "front", "back")
+
+
+def _beyond(body: Body, line: Floats, low: str, high: str) -> Floats:
+    before, after = (
+        end[-1] + layer_line(body, end) if body.side(name) == "absorbing" else end[:0]
+        for name, end in ((low, -line[::-1]), (high, line))
     )
-    return np.concatenate([-low[:0:-1], high])
+    return np.concatenate([-before[::-1], line, after])
 
 
 def _depth_line(body: Body, h: float) -> Floats:
@@ -109,6 +136,7 @@ SLAB = register(
         },
         discretise=discretise,
         morph=morph,
+        grid=Grid(lines=body_lines, discretise=on_lines, cells=cells),
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),

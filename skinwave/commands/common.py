@@ -50,7 +50,8 @@ def add_width(parser: argparse.ArgumentParser) -> None:
     """The width of figures."""
     parser.add_argument(
         "--width", type=float, metavar="INCH",
-        help="of every figure, for print, with letters of 8 points: 3.5 or 7 for a journal",
+        help="of every figure, for print, with letters of 8 points (subscripts 5.6): 3.5 or 7 for "
+        "a journal",
     )  # fmt: skip
 
 

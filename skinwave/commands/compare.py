@@ -127,18 +127,11 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
         return None
     if options.scene == "paper-15":
         raise ValueError("--measured is of one scene, and paper-15 has 15; name its scene file")
-    from skinwave.measurements.reading import read
+    from skinwave.measurements.reading import read_alone
     from skinwave.studies.measured_study import Measured
 
     delay = None if options.delay is None else options.delay / 1e3
-    try:
-        found = read(options.measured)
-    except ValueError as error:
-        raise ValueError(
-            f"{error}; `skinwave measured {options.measured} --out DIR` takes such options, and "
-            "writes DIR/measurement.npz, which says all"
-        ) from None
-    return Measured(measurement=found, delay=delay, gain=options.gain)
+    return Measured(measurement=read_alone(options.measured), delay=delay, gain=options.gain)
 
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":

@@ -83,7 +83,10 @@ def _command_again(
     place = next((name for name in PLACES if name in asked), PLACES[-1])
     given = str(scene) if kept["scene"] is not None else asked.get(place)
     if name not in REPEATED:
-        raise ValueError(f"the record's command '{name}' is none of {', '.join(REPEATED)}")
+        raise ValueError(
+            f"the record's command '{name[:40]}' is none of {', '.join(REPEATED)}; type it again, "
+            f"with another --out: {kept['command']['typed'][:300]}"
+        )
     words = [word for key, value in asked.items() if key != place for word in _words(key, value)]
     again = _parsed(name, [*words, *([] if given is None else ["--", str(given)])])
     if strange := [key for key in asked if key != "scheduler" and key not in vars(again)]:

@@ -1,12 +1,16 @@
 """Sentences on a fit: what was found, and what of it is not to be trusted."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from skinwave.fits.fit import Fit
-from skinwave.fits.identify import Direction, Estimate, combined
+from skinwave.fits.identify import Direction, Estimate, combined, sharing
 from skinwave.fits.measured_lines import some
 from skinwave.fits.parameters import DELAY
+from skinwave.fits.posterior import LONG
 from skinwave.measurements.alignment import opposite_sign
+from skinwave.measurements.flaws import flaws
 from skinwave.numbers import significant
 
 MISFIT = 1.5  # chi squared over its degrees of freedom, of known errors, from which a model misfits
@@ -51,9 +55,9 @@ def cautions(found: Fit) -> list[str]:
         "or closer limits"
     ] * (not solution.converged)
     said += [_at_limit(found, each) for each in found.estimates if each.at_limit]
-    said += [_unresolved(found, each) for each in found.unresolved]
+    said += [_unresolved(found, each) for each in sharing(found.unresolved)]
     said += _beyond_errors(found) + _coloured(found) + _elsewhere(found)
-    said += _left_out(found)
+    said += _left_out(found) + flaws(found.measured, found.target.scene.pressure) + _short(found)
     named = {key for each in found.unresolved for key in each.keys}
     said += [
         f"the data do not determine {each.key} between its limits; measure more, or leave it out"
@@ -75,24 +79,36 @@ def _at_limit(found: Fit, each: Estimate) -> str:
     )
 
 
-def _unresolved(found: Fit, direction: Direction) -> str:
-    """Sentence on keys of which the data determine a combination, or nothing."""
-    keys = direction.keys
+def _unresolved(found: Fit, directions: Sequence[Direction]) -> str:
+    """Sentence on keys of which the data determine a combination, or nothing, by directions that
+    share them.
+    """
+    keys = tuple(dict.fromkeys(key for each in directions for key in each.keys))
     if len(keys) == 1:
         return f"the data do not determine {keys[0]} between its limits; fix it, or measure more"
-    together = f"{', '.join(keys[:-1])} and {keys[-1]}"
-    said = f"the data do not resolve {together} from each other"
-    if np.isfinite(direction.exponent):
-        value, low, high = combined(found.solution, direction)
-        power = round(direction.exponent, 2)
-        product = (
-            f"{keys[0]} times {keys[1]}" if power == 1
-            else f"{keys[0]} over {keys[1]}" if power == -1
-            else f"{keys[0]} times {keys[1]} to the power of {power:g}"
-        )  # fmt: skip
-        middle, least, most = shown(value, low, high)
-        said += f"; only {product} is determined, {middle} (95 % interval {least} to {most})"
+    if len(directions) >= len(keys):
+        none = f"neither {keys[0]} nor {keys[1]}" if len(keys) == 2 else f"none of {_list(keys)}"
+        return f"the data determine {none} between their limits; fix them, or measure more"
+    said = f"the data do not resolve {_list(keys)} from each other"
+    if np.isfinite(directions[0].exponent):
+        value, low, high = combined(found.solution, directions[0])
+        if np.isfinite(low):
+            middle, least, most = shown(value, low, high)
+            said += f"; only {_product(directions[0])} is determined, {middle} "
+            said += f"(95 % interval {least} to {most})"
     return f"{said}; fix {'one' if len(keys) == 2 else 'some'} of them"
+
+
+def _list(keys: Sequence[str]) -> str:
+    return f"{', '.join(keys[:-1])} and {keys[-1]}"
+
+
+def _product(direction: Direction) -> str:
+    """Words for the combination of two keys that a direction leaves."""
+    (first, second), power = direction.keys, round(direction.exponent, 2)
+    if abs(power) == 1:
+        return f"{first} {'times' if power == 1 else 'over'} {second}"
+    return f"{first} times {second} to the power of {power:g}"
 
 
 def _beyond_errors(found: Fit) -> list[str]:
@@ -126,6 +142,17 @@ def _factors(found: Fit) -> str:
 def probability(p: float) -> str:
     """A probability with its sign of relation."""
     return f"= {significant(p, 2)}" if p >= LEAST else f"< {LEAST:g}"
+
+
+def _short(found: Fit) -> list[str]:
+    """Sentence on chains of the posterior that are too short for their intervals."""
+    drawn = found.posterior
+    if drawn is None or drawn.is_long:
+        return []
+    return [
+        f"the chains of the posterior are {significant(drawn.lengths, 2)} autocorrelation times "
+        f"long, and below {LONG} their intervals are rough; give more --samples"
+    ]
 
 
 def _turned(found: Fit) -> list[str]:

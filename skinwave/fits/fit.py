@@ -9,6 +9,7 @@ from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from skinwave.bodies.analytic import has_exact_waves
 from skinwave.effort import Progress, silent
+from skinwave.fits.fitted import fitted
 from skinwave.fits.identify import (
     Direction,
     Estimate,
@@ -20,15 +21,15 @@ from skinwave.fits.identify import (
     widenings,
 )
 from skinwave.fits.observed import KINDS, data_of
-from skinwave.fits.parameters import check, of_scene, parse
+from skinwave.fits.parameters import check, parse
 from skinwave.fits.posterior import Posterior, posterior
 from skinwave.fits.predicted import Target, target, with_reduction
 from skinwave.fits.problem import Problem
 from skinwave.fits.profile import Profile, profiles
 from skinwave.fits.solve import Solution, solve
 from skinwave.measurements import Measurement
+from skinwave.models.flat_body import FLAT_BODY
 from skinwave.scene import Scene
-from skinwave.sweeps.variation import varied
 
 STARTS = 8
 
@@ -69,8 +70,8 @@ class Fit:
 
     @property
     def scene(self) -> Scene:
-        """The scene with the estimates."""
-        return varied(self.target.scene, of_scene(self.values))
+        """The scene with the estimates, each with its spread."""
+        return fitted(self.target.scene, self.solution, self.estimates)
 
     @property
     def predicted(self) -> Floats:
@@ -176,4 +177,4 @@ def _model(scene: Scene, model: str) -> str:
     if model != "auto":
         return model
     flat = has_exact_waves(scene.body) or scene.body.of_kind.is_plate
-    return "flat-body" if flat else "fem"
+    return FLAT_BODY.name if flat and FLAT_BODY.takes_load(scene) else "fem"

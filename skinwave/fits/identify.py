@@ -8,7 +8,9 @@ and Sethna, Phys Rev E 83:036701 (2011), of such sloppy directions). Where resid
 intervals are widened as `coloured` says.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from scipy.stats import chi2, t
@@ -154,7 +156,8 @@ def _direction(solution: Solution, parts: Floats) -> Direction:
 
 
 def combined(solution: Solution, direction: Direction) -> tuple[float, float, float]:
-    """Value and 95 % interval of the combination of two keys that is determined, by its exponent.
+    """Value and 95 % interval of the combination of two keys that a direction leaves, by its
+    exponent.
 
     Parameters
     ----------
@@ -163,22 +166,35 @@ def combined(solution: Solution, direction: Direction) -> tuple[float, float, fl
 
     Returns
     -------
-    value, low and high, in the unit of the first key times that of the second to the exponent
+    value, low and high, in the unit of the first key times that of the second to the exponent; nan
+    for the limits where the combination is not determined, since it has a part in other directions
+    that are not resolved
     """
     parameters = solution.problem.parameters
     at = [parameters.keys.index(key) for key in direction.keys]
     powers = np.zeros(len(solution.u))
     powers[at] = [1.0, direction.exponent]
-    spans = np.array([each.span for each in parameters.free])
+    across = powers * np.array([each.span for each in parameters.free])
     left, singular, v = _singular(solution)
-    resolved = _resolved(solution)
-    parts = ((powers * spans) @ v[:, resolved]) / singular[resolved]
-    (factor,) = _widened(solution, (parts @ left[:, resolved].T)[None])
+    parts = (across @ v) / singular
+    (factor,) = _widened(solution, (parts @ left.T)[None])
     half = width(solution) * float(factor * np.linalg.norm(parts))
     values = parameters.values(solution.u)
     first, second = (values[key] for key in direction.keys)
     middle = first * second**direction.exponent
+    if half >= 0.5 * np.abs(across).sum():  # of the range of the combination
+        return middle, np.nan, np.nan
     return middle, middle * np.exp(-half), middle * np.exp(half)
+
+
+def sharing(directions: Sequence[Direction]) -> list[list[Direction]]:
+    """Directions in groups, such that those of two groups have no key in common."""
+    groups: list[list[Direction]] = []
+    for each in directions:
+        joined = [g for g in groups if any(set(one.keys) & set(each.keys) for one in g)]
+        groups = [g for g in groups if g not in joined]
+        groups.append([*chain.from_iterable(joined), each])
+    return groups
 
 
 def _singular(solution: Solution) -> tuple[Floats, Floats, Floats]:

@@ -18,6 +18,7 @@ from skinwave.fits.figures import (
 )
 from skinwave.fits.findings import cautions, probability, sentences, shown
 from skinwave.fits.fit import Fit
+from skinwave.fits.fitted import notes
 from skinwave.fits.identify import Estimate
 from skinwave.fits.measured_lines import LeftOut
 from skinwave.fits.starts import Start
@@ -105,16 +106,9 @@ STARTS = "Where the search began and ended, the best first: chi squared over tha
 
 
 def fitted_scene(found: Fit) -> str:
-    """The scene with the estimates, and in comments what of the fit is no key of a scene."""
-    outside = [
-        f"# {key} = {value:.6g} of the measurement, which is no part of the scene\n"
-        for key, value in found.values.items() if "." not in key
-    ]  # fmt: skip
-    missing = [
-        f"# {each.key} is not resolved by the measurement\n"
-        for each in found.estimates if not each.is_resolved
-    ]  # fmt: skip
-    return "".join(["# fitted\n", *outside, *missing, dumps(found.scene)])
+    """The scene with the estimates and their spreads, and in comments what it cannot hold."""
+    said = notes(found.solution, found.estimates, found.correlations)
+    return "".join(["# fitted\n", *(f"# {each}\n" for each in said), dumps(found.scene)])
 
 
 def whiteness_sentence(found: Fit) -> str:
@@ -229,6 +223,7 @@ def summary(found: Fit) -> dict[str, Any]:
         "widened": dict(
             zip(solution.problem.parameters.keys, found.widenings.tolist(), strict=True)
         ),
+        "posterior_autocorrelation_times": found.posterior and found.posterior.lengths,
         "left_out": [
             {
                 "line": line.name,

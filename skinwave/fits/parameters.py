@@ -19,7 +19,7 @@ from skinwave.sweeps.variation import varied
 
 GAIN, DELAY, OFFSET_X, OFFSET_Y = "gain", "delay_ms", "offset_x_mm", "offset_y_mm"
 NUISANCES = {GAIN: 1.0, DELAY: 0.0, OFFSET_X: 0.0, OFFSET_Y: 0.0}  # and where they are not fitted
-PRESSURE = "focus.peak_pressure_pa"  # which linear waves are in proportion to
+PRESSURE, FORCE = "focus.peak_pressure_pa", "load.force_n"  # which linear waves go with
 Values = Mapping[str, float]
 
 

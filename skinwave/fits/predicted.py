@@ -14,16 +14,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from meshes.tetmesh import Floats
-from simple_model.flat_body import steady_lines
-from simple_model.flat_quantities import from_rest, steady, surface_field
 from simple_model.material import Complex
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
 from skinwave import parametric
-from skinwave.bodies.analytic import exact_waves
 from skinwave.effort import Progress
+from skinwave.fits.flat_lines import flat_history, flat_lines
 from skinwave.fits.parameters import (
     DELAY,
+    FORCE,
     GAIN,
     OFFSET_X,
     OFFSET_Y,
@@ -33,19 +32,16 @@ from skinwave.fits.parameters import (
     of_scene,
 )
 from skinwave.models import Model, check_reading, named
-from skinwave.models.free_materials import free_keys
+from skinwave.models.affine_scenes import check_scene
+from skinwave.models.free_keys import free_keys
 from skinwave.parametric import ParametricBody
-from skinwave.scene import SAMPLE_RATE, Scene, check_load
+from skinwave.scene import SAMPLE_RATE, Scene
 from skinwave.simulation import compute
 from skinwave.sweeps.variation import varied
 
 Predict = Callable[[Values], np.ndarray]
-THRESHOLD = 1e-5  # of the strongest line of the load: weaker ones are left out of a prediction
 SAME = 1e-3  # of a frequency: lines as near as that are one
 KEPT = 32  # predictions
-SETTLED = 1e-4  # of the largest motion: what is left of the transient where it is left out
-PARTS = (1 / 12, 1 / 4)  # of a record, after which it may have decayed
-BEFORE_END = 0.9  # of such a part: its last samples see it end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +65,18 @@ class Target:
     @property
     def linear(self) -> tuple[str, ...]:
         """Keys that a prediction is in proportion to."""
-        loaded = self.scene.pressure.peak_pressure > 0
-        return (GAIN, PRESSURE) if loaded and not self.record.is_nonlinear else (GAIN,)
+        load, (key, strength) = self.scene.load, self.strength
+        alone = not (load.gravity or load.support_motion or self.record.is_nonlinear)
+        return (GAIN, key) if strength > 0 and alone else (GAIN,)
+
+    @property
+    def strength(self) -> tuple[str, float]:
+        """Key of the strength of the load, and its value in the scene: of a device its pressure,
+        else its force.
+        """
+        if self.scene.load.of_kind.is_of_device:
+            return PRESSURE, self.scene.pressure.peak_pressure
+        return FORCE, self.scene.load.force
 
     def varied(self, values: Values) -> Scene:
         """The scene at values of its keys, its probes at the places with their offset."""
@@ -81,13 +87,13 @@ class Target:
 
     def factor(self, values: Values) -> float:
         """Factor of the linear keys."""
-        pressure = self.scene.pressure.peak_pressure
-        relative = values[PRESSURE] / pressure if self._is_scaled(values) else 1.0
+        key, strength = self.strength
+        relative = values[key] / strength if self._is_scaled(values) else 1.0
         return float(values.get(GAIN, 1.0) * relative)
 
     def rest(self, values: Values) -> dict[str, float]:
         """Values of all keys but the delay and the linear ones."""
-        left_out = {GAIN, DELAY} | ({PRESSURE} if self._is_scaled(values) else set())
+        left_out = {GAIN, DELAY} | ({self.strength[0]} if self._is_scaled(values) else set())
         return {key: value for key, value in values.items() if key not in left_out}
 
     def predicts(self, frequencies: Floats) -> np.ndarray:
@@ -96,7 +102,7 @@ class Target:
         return np.asarray((np.abs(known[:, None] - frequencies) <= SAME * frequencies).any(axis=0))
 
     def _is_scaled(self, values: Values) -> bool:
-        return PRESSURE in values and PRESSURE in self.linear
+        return self.strength[0] in values and self.strength[0] in self.linear
 
 
 def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
@@ -117,9 +123,8 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     ------
     ValueError
         If the model or the quantity is not one of motion normal to a body, a place is not known or
-        off the body, or the model refuses the scene.
+        off the body, or the model refuses the scene or its load.
     """
-    check_load(scene, "a fit")
     if not quantity.is_normal:
         raise ValueError(
             "a fit is to displacement, velocity or acceleration into the body, not "
@@ -158,11 +163,9 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
     scene = aim.varied({})
-    if not parametric.has_affine_operators(scene.body):
-        return aim
     try:
-        free_keys(scene.body, ranges)
-    except ValueError:  # of a key that changes more than materials
+        check_scene(scene, free_keys(scene.body, ranges), parametric.TOLERANCE)
+    except ValueError:  # of a key that changes more than materials, or what no affine sum gives
         return aim
     return replace(aim, reduced=parametric.prepare(scene, ranges, progress=progress))
 
@@ -211,12 +214,10 @@ def _kept(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
 
 def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Lines by wavenumber integrals."""
-    scene = aim.varied(values)
-    body = exact_waves(scene.body, aim.model)
-    f, a = steady_lines(body, scene.pressure, scene.probe_points, threshold=THRESHOLD)
+    f, a = flat_lines(aim.varied(values), aim.model)
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
     _check_lines(f[at], frequencies, values)
-    return np.asarray(a[at] * aim.quantity.factor(2j * pi * f[at])[:, None])
+    return np.asarray(a[at])
 
 
 def _reduced_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
@@ -251,20 +252,4 @@ def _history(aim: Target, values: Values, last: float) -> CubicSpline:
         found = compute(scene, aim.model)
         return CubicSpline(found.times, found.values)
     times = np.asarray(np.arange(int(np.ceil(last * SAMPLE_RATE)) + 2) / SAMPLE_RATE, np.float64)
-    return CubicSpline(times, _flat_history(aim, scene, times))
-
-
-def _flat_history(aim: Target, scene: Scene, times: Floats) -> Floats:
-    """Waveforms (t, p) by wavenumber integrals: from rest until that is the steady state."""
-    field = surface_field(aim.quantity, exact_waves(scene.body, aim.model))
-    asked = (field, aim.quantity, scene.pressure, scene.probe_points)
-    if scene.tacton.trajectory.shape == "recorded":
-        return from_rest(*asked, times)
-    later = steady(*asked, times)
-    for part in PARTS:
-        n = int(part * len(times))
-        begun = from_rest(*asked, times[:n])[: int(BEFORE_END * n)]
-        left = np.abs(begun - later[: len(begun)])[2 * n // 3 :].max()
-        if left <= SETTLED * np.abs(later).max():
-            return np.concatenate([begun, later[len(begun) :]])
-    return from_rest(*asked, times)
+    return CubicSpline(times, flat_history(scene, aim.model, times))

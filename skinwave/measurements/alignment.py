@@ -17,6 +17,8 @@ from skinwave.measurements.lines import MeasuredLines
 
 AS_GOOD = 10.83  # of chi-square: 99.9 % of one degree of freedom
 SHARED = 20.0  # degrees of freedom
+MISFITS = 3.0  # chi-square over its degrees of freedom: a model leaves more than noise
+NEARLY = 1.3  # times the power that a misfit leaves at the best delay: it is nearly as small
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,19 +52,21 @@ def align(
     model: np.ndarray,
     *,
     window: float = 2.0,
+    centre: float = 0.0,
     delay: float | None = None,
     gain: float | None = None,
 ) -> Alignment:
     """Delay and gain by weighted least squares over the lines.
 
     The gain is taken as positive unless another is given. Of delays that fit equally well within
-    the noise, as those a period apart do, the least is taken.
+    the noise, as those a period apart do, the least is taken; of those of a model that leaves more
+    than noise, of all whose misfit is nearly as small.
 
     Parameters
     ----------
     lines : MeasuredLines
     model : (f, p) complex, amplitudes of the same lines in the model
-    window : s, the delay is sought within half of it either way
+    window, centre : s, the delay is sought within half of the window either way of its centre
     delay : s, if it is known
     gain : unit of the measurement over that of the model, if it is known
 
@@ -87,7 +91,7 @@ def align(
     products = (weights * model.conj() * lines.mean).sum(axis=1)
     sign = -1.0 if gain is not None and gain < 0 else 1.0
     found, repeats = (float(delay), np.inf) if delay is not None else _delay(
-        lines, sign * products, size, abs(gain or 0.0), window)  # fmt: skip
+        lines, sign * products, size, abs(gain or 0.0), window, centre)  # fmt: skip
     height = float(correlation(lines.frequencies, products, np.array([found]))[0])
     fitted = height / size if gain is None else float(gain)
     bend = float(-correlation(lines.frequencies, products, np.array([found]), 2)[0]) * fitted
@@ -134,20 +138,28 @@ def _weights(lines: MeasuredLines) -> Floats:
 
 
 def _delay(
-    lines: MeasuredLines, products: np.ndarray, size: float, gain: float, window: float
+    lines: MeasuredLines,
+    products: np.ndarray,
+    size: float,
+    gain: float,
+    window: float,
+    centre: float,
 ) -> tuple[float, float]:
     """The least delay in s that fits as well as any within the noise, and how far off the next is.
 
     Chi-square is 2 (sum w |z|^2 - c^2 / b) with correlation c and size b or, with a given gain g,
     2 (sum w |z|^2 - 2 g c + g^2 b). Where the model does not fit within the noise, what it leaves
-    takes the place of the noise.
+    takes the place of the noise, and what it leaves at other delays is as systematic.
     """
-    delays, heights = maxima(lines.frequencies, products, window)
+    shifted = products * np.exp(2j * np.pi * lines.frequencies * centre)
+    delays, heights = maxima(lines.frequencies, shifted, window)
+    delays = delays + centre
     left = _left(lines, heights, size, gain)
     scale = max(float(left.min()) / max(2 * lines.variance.size - 2, 1), 1.0)
     if not np.isfinite(lines.variance).any():  # whose noise is unknown
         scale = float(left.min()) / max(2 * lines.variance.size - 2, 1)
-    alike = delays[left <= left.min() + AS_GOOD * scale + 1e-9 * np.abs(left).max()]
+    most = left.min() + AS_GOOD * scale + 1e-9 * np.abs(left).max()
+    alike = delays[left <= max(most, NEARLY * left.min() * (scale > MISFITS))]
     chosen = float(alike[np.argmin(np.abs(alike))])
     away = np.abs(alike - chosen)
     return chosen, float(away[away > 1e-9 * window].min(initial=np.inf))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from simple_model.trajectory import Floats
+from skinwave.measurements.measurement import Measurement
 
 RUN = 3  # samples in a row at the same extreme,
 RUNS = 2  # and so many of these, or
@@ -20,6 +21,13 @@ def clipped(waveform: Floats) -> int:
     if np.ptp(waveform) == 0:
         return 0
     return _cut_off(waveform) + _cut_off(-waveform)
+
+
+def clipped_samples(measured: Measurement) -> np.ndarray:
+    """Samples (r, p) that are cut off, by repetition and place; none of spectra."""
+    if measured.is_spectrum:
+        return np.zeros((len(measured.values), measured.values.shape[2]), int)
+    return np.array([[clipped(waveform) for waveform in run.T] for run in measured.values])
 
 
 def _cut_off(x: Floats) -> int:

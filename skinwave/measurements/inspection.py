@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simple_model.trajectory import Floats
-from skinwave.measurements.clipping import clipped
+from skinwave.measurements.clipping import clipped_samples
 from skinwave.measurements.mains import hum_of
 from skinwave.measurements.measurement import Measurement
 from skinwave.measurements.noise_floor import floor_of
@@ -81,14 +81,19 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     noise = np.full(len(kept), np.nan)
     if spectrum is not None:
         noise = np.sqrt(np.median(spectrum.floor[LOWEST:-1], axis=0))
-    cut = np.zeros((len(values), values.shape[2]), int)
-    if not measured.is_spectrum:
-        cut = np.array([[clipped(waveform) for waveform in run.T] for run in values])
     return Inspection(
         measured=measured, spectrum=spectrum, origins=_origins(measured, spectrum, samples),
-        kept=kept, noise=noise, clipped=cut, constant=constant,
+        kept=kept, noise=noise, clipped=clipped_samples(measured), constant=constant,
         missing=(*_missing(measured), *said),
     )  # fmt: skip
+
+
+def kept_lines(measured: Measurement) -> tuple[SpectralLine, ...]:
+    """Lines above the noise in the samples and at the places that an inspection looks at."""
+    constant = np.flatnonzero(np.ptp(measured.values, axis=1).max(axis=0) == 0)
+    kept, samples, _ = _kept(measured, constant)
+    spectrum = _spectrum(measured, kept, samples, ALARM)
+    return spectrum.lines if spectrum else ()
 
 
 def _kept(measured: Measurement, constant: np.ndarray) -> tuple[np.ndarray, int, list[str]]:

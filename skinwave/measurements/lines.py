@@ -17,6 +17,7 @@ BESIDE = np.array([3.0, 5.5, 8.0, 10.5, 13.0, 15.5])
 CLEAR = 2.5  # bins from any line, within which there is no noise alone
 FEWEST_BESIDE = 4  # bins, of which a noise is told
 MEDIAN_LOSS = 2.08  # 1 / ln(2)^2, variance of an exponential's median over that of its mean
+OCTAVE = 2.0  # in frequency, within which a line without a noise of its own takes a neighbour's
 FEWEST_BINS = 16  # of a spectrum, fewer are single lines
 NEAREST = 1.0  # Hz, within which a spectrum must have a line
 
@@ -33,6 +34,7 @@ class MeasuredLines:
     freedom : float, degrees of freedom of the variance, of real numbers
     shifts : (r,) float, s, by which repetitions came later than their mean and were shifted; zeros
         where they are in step within their noise
+    borrowed : int, how many lines have the variance of their neighbours, for want of bins beside
     """
 
     frequencies: Floats
@@ -40,6 +42,7 @@ class MeasuredLines:
     variance: Floats
     freedom: float
     shifts: Floats
+    borrowed: int = 0
 
     @property
     def mean(self) -> Complex:
@@ -94,8 +97,9 @@ def lines_of(
     """Lines of a measurement by weighted least squares, as `simple_model.response.fit_lines`.
 
     Repetitions give the noise: the variance of their mean. Of a single one it is that in the bins
-    beside each line, by their median. Repetitions that are out of step (F test at 0.1 %, as of a
-    trigger that jitters) are shifted by the delay that fits each best.
+    beside each line, by their median, and where lines leave too few of these the larger of that of
+    the next lines on both sides, at the same place. Repetitions that are out of step (F test at
+    0.1 %, as of a trigger that jitters) are shifted by the delay that fits each best.
 
     Parameters
     ----------
@@ -124,16 +128,19 @@ def lines_of(
         each, beside = _of_spectra(measurement, frequencies)
     else:
         each, beside = _of_waveforms(measurement, frequencies, settle)
+    borrowed = 0
     if len(each) > 1:
         each, shifts = in_step(each, frequencies)
         variance = each.var(axis=0, ddof=1) / len(each)
         freedom = 2.0 * (len(each) - 1)
     else:
         shifts = np.zeros(1)
-        variance, freedom = _noise_beside(beside)
+        own, freedom = _noise_beside(beside)
+        variance = _borrowed(frequencies, own)
+        borrowed = int((np.isnan(own) & np.isfinite(variance)).any(axis=1).sum())
     return MeasuredLines(
         frequencies=frequencies, each=each, variance=np.asarray(variance), freedom=freedom,
-        shifts=shifts,
+        shifts=shifts, borrowed=borrowed,
     )  # fmt: skip
 
 
@@ -202,3 +209,18 @@ def _noise_beside(beside: Complex) -> tuple[Floats, float]:
         variance[enough] = np.nanmedian(power[:, enough], axis=0) / np.log(2)
     fewest = int(counts[enough].min(initial=len(power)))
     return variance, 2 * fewest / MEDIAN_LOSS
+
+
+def _borrowed(frequencies: Floats, variance: Floats) -> Floats:
+    """Variance (f, p) with that of the nearest lines that have one, within an octave on either
+    side, the larger of both, where there is none.
+    """
+    known = np.isfinite(variance).all(axis=1)
+    found, f = variance.copy(), frequencies
+    for k in np.flatnonzero(~known):
+        near = known & (f < OCTAVE * f[k]) & (f > f[k] / OCTAVE)
+        sides = [np.flatnonzero(near & beyond) for beyond in (f < f[k], f > f[k])]
+        beside = [side[np.argmin(np.abs(f[side] - f[k]))] for side in sides if len(side)]
+        if beside:
+            found[k] = variance[beside].max(axis=0)
+    return found

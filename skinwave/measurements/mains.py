@@ -1,10 +1,12 @@
 """Mains hum: lines at multiples of one frequency near 50 or 60 Hz."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skinwave.measurements.spectral_lines import SpectralLine
+if TYPE_CHECKING:
+    from skinwave.measurements.spectral_lines import SpectralLine
 
 MAINS = (50.0, 60.0)
 WANDER = 0.004  # of its frequency: how far the mains of any grid are from it
@@ -13,7 +15,7 @@ HIGHEST = 20  # multiple
 
 
 def hum_of(
-    lines: Sequence[SpectralLine], duration: float, driven: Container[int] = ()
+    lines: Sequence["SpectralLine"], duration: float, driven: Container[int] = ()
 ) -> dict[int, str]:
     """Names of lines that may be mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
 
@@ -34,14 +36,7 @@ def hum_of(
     names by number
     """
     found: dict[int, str] = {}
-    for mains in MAINS:
-        at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
-        first = next((n for n in (1, 2) if at[n] is not None), 0)
-        if at[1] is None and (at[2] is None or at[3] is None):
-            continue
-        if at[first] in driven:
-            continue
-        line = lines[at[first]]  # type: ignore[index]
+    for mains, line, first in _bases(lines, driven):
         base, spread = line.frequency / first, line.error / first
         for k, other in enumerate(lines):
             n = round(other.frequency / base)
@@ -56,7 +51,26 @@ def hum_of(
     return found
 
 
-def _nearest(lines: Sequence[SpectralLine], frequency: float, within: float) -> int | None:
+def mains_in(lines: Sequence["SpectralLine"], driven: Container[int] = ()) -> list[float]:
+    """Mains frequencies in Hz, as found, of the hum among lines; arguments as of `hum_of`."""
+    return [line.frequency / first for _, line, first in _bases(lines, driven)]
+
+
+def _bases(
+    lines: Sequence["SpectralLine"], driven: Container[int]
+) -> Iterator[tuple[float, "SpectralLine", int]]:
+    """Mains frequencies that lines have, the line that tells of each, and which multiple it is."""
+    for mains in MAINS:
+        at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
+        first = next((n for n in (1, 2) if at[n] is not None), 0)
+        if at[1] is None and (at[2] is None or at[3] is None):
+            continue
+        k = at[first]
+        if k is not None and k not in driven:
+            yield mains, lines[k], first
+
+
+def _nearest(lines: Sequence["SpectralLine"], frequency: float, within: float) -> int | None:
     """Number of the line nearest to a frequency, if it is within so many Hz."""
     if not lines:
         return None

@@ -29,7 +29,7 @@ def read(path: Path, given: Given) -> Recording:
     found = _arrays(path)
     if not found:
         raise ValueError("the file has no arrays of numbers; save the signals as such")
-    return zigzag.recording(found) if zigzag.fits(found) else named.recording(found, given)
+    return zigzag.recording(found, given) if zigzag.fits(found) else named.recording(found, given)
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:

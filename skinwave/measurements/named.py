@@ -66,7 +66,7 @@ def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
         times, frequencies = (times, np.empty(0)) if values.dtype.kind != "c" else (
             np.empty(0), frequencies)  # fmt: skip
     axis = times if len(times) else frequencies
-    places = _places(short)
+    places = _places(short) if given.places is None else given.places
     ordered, said = in_order(values, len(axis), len(places), name)
     drive = vector(short, DRIVES)
     return Recording(

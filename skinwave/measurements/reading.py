@@ -86,6 +86,28 @@ def read(
         raise ValueError(said if said.startswith(str(path)) else f"{path}: {said}") from None
 
 
+def read_alone(path: str | Path) -> Measurement:
+    """Measurement in a file that says all, for commands without options of what it does not say.
+
+    Raises
+    ------
+    ValueError
+        As `read` does, with the command that makes such a file of another.
+    """
+    try:
+        return read(path)
+    except ValueError as error:
+        raise ValueError(f"{error}; {completing(path)}") from None
+
+
+def completing(path: str | Path) -> str:
+    """Words on the command that adds to a file what it does not say."""
+    return (
+        f"`skinwave measured {path} --out DIR` takes such options, and writes DIR/measurement.npz, "
+        "which says all"
+    )
+
+
 def reader_of(path: Path) -> Reader:
     """Reader of a file of such a name; raises a ValueError if nothing does."""
     for reader in READERS:

@@ -56,10 +56,8 @@ def _clipping(found: Inspection) -> str:
         return "Clipping cannot be seen in spectra."
     if not len(where):
         return "No clipping: no runs of samples at the same extreme."
-    names = ", ".join(place_words(found.measured, int(p)) for p in where[:MOST_NAMED])
-    more = f" and {len(where) - MOST_NAMED} more" if len(where) > MOST_NAMED else ""
-    count = int(found.clipped.sum())
-    return f"Clipped: {count:,} samples in runs at the same extreme, at {names}{more}."
+    count, places = int(found.clipped.sum()), places_words(found.measured, where)
+    return f"Clipped: {count:,} samples in runs at the same extreme, at {places}."
 
 
 def _constant(found: Inspection) -> list[str]:
@@ -67,6 +65,12 @@ def _constant(found: Inspection) -> list[str]:
         return []
     names = ", ".join(place_words(found.measured, int(p)) for p in found.constant[:MOST_NAMED])
     return [f"Nothing varies at {len(found.constant)} of the places: {names}."]
+
+
+def places_words(measured: Measurement, places: np.ndarray) -> str:
+    """The first of some places, by their numbers."""
+    names = ", ".join(place_words(measured, int(p)) for p in places[:MOST_NAMED])
+    return names + f" and {len(places) - MOST_NAMED} more" * (len(places) > MOST_NAMED)
 
 
 def place_words(measured: Measurement, place: int) -> str:

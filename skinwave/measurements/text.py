@@ -37,7 +37,7 @@ def read(path: Path, given: Given) -> Recording:
     ValueError
         If it is no table of numbers below a header, or its columns do not make a measurement.
     """
-    table = _table(reading.text(path, LARGEST), given)
+    table = _table(reading.exported_text(path, LARGEST), given)
     if table.of(headers.X) >= 0 or table.of(headers.Y) >= 0:
         return long(table)
     return wide(table, given)
@@ -51,7 +51,7 @@ def places(path: Path) -> Floats:
     ValueError
         If it has no such columns, or they are no numbers.
     """
-    lines = [line for line in reading.text(path, LARGEST).splitlines() if line.strip()]
+    lines = [line for line in reading.exported_text(path, LARGEST).splitlines() if line.strip()]
     delimiter = delimiter_of(lines[0]) if lines else ","
     head = split(lines[0], delimiter) if lines else []
     bare = len(head) == 2 and _are_numbers(head)

@@ -4,6 +4,7 @@ Each set is a place and, of several at one place, a repetition. Coordinates are 
 or 2411 in the same file, lengths in the unit of set 164.
 """
 
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ TIME, FREQUENCY = 17, 18
 # Types of functions: of time, complex ones of frequency, and those without a phase.
 IN_TIME, IN_FREQUENCY = (1,), (4, 12)
 GENERAL = 0
+TAG = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")  # line before and after each set
 NORMAL = 3  # along z, out of the body, the way a vibrometer above it looks
 
 
@@ -64,8 +66,9 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         import pyuff
     except ImportError:
         raise ValueError(MISSING) from None
-    with reading.opened(path, LARGEST):
-        pass
+    with reading.opened(path, LARGEST) as content:
+        if len(TAG.findall(content.read())) % 2:
+            raise ValueError("the file ends within a set, so that data are missing; export it anew")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

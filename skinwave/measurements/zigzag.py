@@ -14,7 +14,7 @@ from scipy.signal import correlate
 
 from simple_model.trajectory import Floats
 from skinwave.measurements import named
-from skinwave.measurements.recording import Recording, nowhere
+from skinwave.measurements.recording import Given, Recording, nowhere
 
 SOURCE = "https://zenodo.org/records/7686560"
 LARGEST_HAND = 3.0  # of the spread of places: beyond it these are in mm, not in m
@@ -27,13 +27,13 @@ def fits(arrays: Mapping[str, Any]) -> bool:
     return y is not None and np.ndim(y) == 3 and np.shape(y)[2] == 2 and "r" in arrays
 
 
-def recording(arrays: Mapping[str, Any]) -> Recording:
+def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
     """The recording, its places aligned in time by the reference where each has its own.
 
     Raises
     ------
     ValueError
-        If y holds no real numbers.
+        If y holds no real numbers, or several arrays may be the places and none are given.
     """
     y = np.asarray(arrays["y"])
     if y.dtype.kind not in "fiu" or not y.size:
@@ -45,9 +45,9 @@ def recording(arrays: Mapping[str, Any]) -> Recording:
     rate = named.rate(arrays)
     if np.isnan(rate) and len(times) > 1:
         rate = (len(times) - 1) / float(np.ptp(times))
+    places = nowhere(len(y)) if given.places is not None else _places(arrays, len(y))
     return Recording(
-        values=values, rate=rate, quantity="velocity", unit="m/s", places=_places(arrays, len(y)),
-        drive=drive,
+        values=values, rate=rate, quantity="velocity", unit="m/s", places=places, drive=drive,
         remarks=("velocity along the laser, taken as normal to the skin", said),
     )  # fmt: skip
 
@@ -95,12 +95,38 @@ def delays(reference: Floats) -> np.ndarray:
 
 
 def _places(arrays: Mapping[str, Any], count: int) -> Floats:
-    """Places (p, 2) in metre of the point map; nan where there is none."""
-    for name, found in arrays.items():
-        points = np.asarray(found)
-        if name not in ("y", "r") and points.ndim == 2 and count in points.shape:
-            points = points if points.shape[0] == count else points.T
-            if points.shape[1] in (2, 3) and points.dtype.kind in "fiu":
-                spread = float(np.nanmax(np.ptp(points, axis=0), initial=0.0))
-                return points[:, :2] / (1e3 if spread > LARGEST_HAND else 1.0)
-    return nowhere(count)
+    """Places (p, 2) in metre of the point map: an array of places by its name, else the only one of
+    fractions; nan where there is none.
+    """
+    maps = {name: np.asarray(one) for name, one in arrays.items() if name not in ("y", "r")}
+    maps = {name: one for name, one in maps.items() if _may_be_places(one, count)}
+    by_name = {n: one for n, one in maps.items() if _last(n) in (*named.PLACES, *named.MILLIMETRES)}
+    found = by_name or {name: one for name, one in maps.items() if one.dtype.kind == "f"}
+    every = [_in_metre(_last(name), one, count) for name, one in found.items()]
+    if not every:
+        return nowhere(count)
+    if not all(np.allclose(every[0], one, equal_nan=True) for one in every):
+        raise ValueError(f"the places may be {' or '.join(found)}; give --places, in mm")
+    return every[0]
+
+
+def _last(name: str) -> str:
+    """Name of an array in lower case, without that of its structure."""
+    return name.rpartition(".")[2].lower()
+
+
+def _may_be_places(points: np.ndarray, count: int) -> bool:
+    """Whether an array has two or three real coordinates for each place."""
+    sizes = (2, 3)
+    return (
+        points.dtype.kind in "fiu" and points.ndim == 2
+        and ((points.shape[0] == count and points.shape[1] in sizes)
+             or (points.shape[1] == count and points.shape[0] in sizes))
+    )  # fmt: skip
+
+
+def _in_metre(name: str, points: np.ndarray, count: int) -> Floats:
+    points = points if points.shape[0] == count and points.shape[1] in (2, 3) else points.T
+    spread = float(np.nanmax(np.ptp(points, axis=0), initial=0.0))
+    in_mm = name in named.MILLIMETRES or spread > LARGEST_HAND
+    return np.asarray(points[:, :2] / (1e3 if in_mm else 1.0), np.float64)

@@ -22,9 +22,12 @@ from skinwave.models.laws import has_table
 from skinwave.models.sources import LAYERS
 from skinwave.scene import Scene
 
+STEP = "wavenumber integral"
+
 
 def _from_rest(scene: Scene, request: Request) -> Response:
     compliance = exact_waves(scene.body, "flat-body")
+    request.report(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
         return _read("flat-body", from_rest, scene, request)
     return simple_model.flat_body(compliance, scene.pressure, scene.probe_points, request.times)
@@ -32,6 +35,7 @@ def _from_rest(scene: Scene, request: Request) -> Response:
 
 def _steady(scene: Scene, request: Request) -> Response:
     compliance = exact_waves(scene.body, "flat-body-harmonic")
+    request.report(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
         return _read("flat-body-harmonic", steady, scene, request)
     return steady_state(compliance, scene.pressure, scene.probe_points, request.times)
@@ -90,7 +94,7 @@ def field_read(scene: Scene, depth: float) -> Field:
 FLAT_BODY = register(
     Model(
         name="flat-body",
-        method="wavenumber integral",
+        method=STEP,
         words="linear waves of a laterally infinite flat body, by the wavenumber integral",
         solve=_from_rest,
         refuse=lambda body: exact_waves(body, "flat-body"),

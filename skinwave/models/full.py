@@ -11,6 +11,7 @@ from scipy import sparse
 
 import fem
 from meshes import cache
+from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, path_samples, synthesise
@@ -44,13 +45,18 @@ MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 
 def meshed(
-    body: Body, h: float | None, clock: Clock, report: Progress, symmetry: str = ""
+    body: Body,
+    h: float | None,
+    clock: Clock,
+    report: Progress,
+    symmetry: str = "",
+    lines: Lines | None = None,
 ) -> Build:
     """Mesh of a body with its materials and boundary conditions, timed and reported.
 
     Parameters
     ----------
-    body, h, symmetry : as for `bodies.build.build`, with its errors
+    body, h, symmetry, lines : as for `bodies.build.build`, with its errors
     clock : Clock, which takes the time
     report : called with the name of the phase and the fraction done
 
@@ -60,7 +66,7 @@ def meshed(
     """
     with clock("mesh"):
         report("mesh", 0.0)
-        return build_body(body, h, symmetry)
+        return build_body(body, h, symmetry, lines=lines)
 
 
 def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:

@@ -8,6 +8,7 @@ from scipy import sparse
 
 import fem
 from meshes import cache
+from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_width
@@ -41,7 +42,7 @@ from skinwave.models.reduction import (
     respond,
     select_lines,
 )
-from skinwave.models.symmetry import axes_of_probes, even_part, mirrored_axes
+from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
@@ -97,6 +98,7 @@ def prepare(
     symmetry: str = "",
     reading: Reading = SURFACE,
     load: Load = PRESSURE,
+    lines: Lines | None = None,
 ) -> Prepared:
     """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
     cache, once per machine.
@@ -113,23 +115,23 @@ def prepare(
     symmetry : as in `bodies.build.build`: of the load of all Tactons, wherever the probes lie
     reading : what the probes read; with symmetry, of normal motion alone
     load : what pushes, with its gravity; with symmetry, a pressure
+    lines : as in `bodies.build.build`, instead of h
 
     Returns
     -------
     `Prepared`
     """
     clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
-    alike = mirrored_axes(body, reading, load)
-    seen = axes_of_probes(probes, alike)
-    symmetry = "".join(axis for axis in "xy" if axis in symmetry or axis in seen)
+    symmetry = modelled_axes(body, probes, symmetry, reading, load)
     (progress or silent)("mesh", 0.0)
-    build = meshed(body, h, clock, silent, symmetry)
-    outputs, solids = probe_rows(body, build, _mirrored(probes, symmetry), reading)
+    build = meshed(body, h, clock, silent, symmetry, lines)
+    outputs, solids = probe_rows(body, build, images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
     name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
     with clock("read from cache"):
         entry = cache.load(name)
-    size, report = h or default_size(body), progress or silent
+    size = 0.0 if lines else h or default_size(body)
+    report = progress or silent
     found = _from_cache(entry, size, probes, outputs.shape[0], clock) if entry else None
     if not found:
         with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
@@ -254,14 +256,6 @@ def _prepared_anew(
         probes=probes, read=model.outputs, sag=still, carried=arrays["carried"],
         body=replace(reduced, effort=effort),
     )  # fmt: skip
-
-
-def _mirrored(probes: Floats, symmetry: str) -> Floats:
-    """Mirror images of the probes in the part that is modelled."""
-    kept = probes.copy()
-    for axis in ("xy".index(a) for a in symmetry):
-        kept[:, axis] = np.abs(kept[:, axis])
-    return kept
 
 
 def answer(

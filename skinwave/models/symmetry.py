@@ -45,6 +45,32 @@ def axes_of_probes(probes: Floats, among: str) -> str:
     return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < ON_PLANE)
 
 
+def modelled_axes(body: Body, probes: Floats, symmetry: str, reading: Reading, load: Load) -> str:
+    """Axes, of "xy", across whose middle planes only one side of a body is modelled.
+
+    Parameters
+    ----------
+    body : Body
+    probes : (p, 2) float, metre
+    symmetry : axes across which the load is its own mirror image at all times
+    reading, load : as for `mirrored_axes`
+
+    Returns
+    -------
+    str
+    """
+    seen = axes_of_probes(probes, mirrored_axes(body, reading, load))
+    return "".join(axis for axis in "xy" if axis in symmetry or axis in seen)
+
+
+def images(probes: Floats, axes: str) -> Floats:
+    """Mirror images (p, 2) of probes in the part of a body with positive coordinates."""
+    found = probes.copy()
+    for axis in ("xy".index(a) for a in axes):
+        found[:, axis] = np.abs(found[:, axis])
+    return found
+
+
 def even_part(P: sparse.csr_array, points: Floats, axes: str) -> tuple[sparse.csr_array, Floats]:
     """Load operator of the even part of a load, on the part of a body with positive coordinates.
 

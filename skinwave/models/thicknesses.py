@@ -90,18 +90,18 @@ def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
     return tuple(np.where(moved, geometries[k], at).tolist())
 
 
-def build_at(bodies: Range, at: Sequence[float]) -> Build:
+def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
     """The mesh that all have, moved to the thicknesses at shares (k,) of the range; of the
-    materials that it was meshed with.
+    materials that it was meshed with. The `symmetry` is as of `bodies.build.build`.
     """
     reference = bodies.body(bodies.meshed)
     if len(bodies.geometries) == 1:
-        return build(reference, bodies.h)
+        return build(reference, bodies.h, symmetry)
     moved = np.ptp(np.array(bodies.geometries), axis=0) > 0
     body = bodies.body(np.where(moved, at, bodies.meshed).tolist())
     h = bodies.h or body.of_kind.default_size(reference)
     assert body.of_kind.morph  # else refused
-    return build(body, h, discretise=partial(body.of_kind.morph, reference=reference))
+    return build(body, h, symmetry, partial(body.of_kind.morph, reference=reference))
 
 
 def _functions(body: Body) -> Floats:

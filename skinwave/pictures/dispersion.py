@@ -1,6 +1,6 @@
 """Figures of dispersion curves: speeds and 1/e lengths over frequency, mode shapes over depth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -11,6 +11,7 @@ from matplotlib.ticker import FuncFormatter
 
 from meshes.tetmesh import Floats
 from simple_model.dispersion import DispersionCurves, Mode
+from simple_model.drawing import small
 from skinwave.pictures.figures import REPORT, SPARE
 from skinwave.pictures.levels import written
 from skinwave.pictures.styles import Style
@@ -18,9 +19,17 @@ from skinwave.pictures.styles import Style
 COLOURS = ("#0072B2", "#D55E00", *SPARE)
 FINE = 600  # frequencies of a drawn curve
 PALE = 0.35  # opacity of a curve where its mode is evanescent
-ROWS = 3  # of the names of lines above the panels
-APART = 0.085  # of the axis: names nearer than this are in rows of their own
+ROWS = 3  # of the names of lines above the panels, two in a narrow figure
+LETTER, GAP, LINE = 0.55, 0.7, 1.45  # width of their letters, between two, and of a row, over size
+HANDLE, WRITTEN = 3.7, 0.52  # widths in the legend, over its size: beside a label, of its letters
+SHARE = 0.68  # of a figure's width for the curves, where the shapes are beside them
+WIDE, TIGHT = 5.6, 2.8  # inch: narrower figures in print have one column, and titles in two rows
+TALL = {True: 6.8, False: 4.9}  # inch, height of such a figure of a body with a depth, without
 MOST_SHAPES = 4
+LABELS = (
+    ("phase speed", "ω / |Re k|, m/s"), ("1/e length", "1 / |Im k|, mm"),
+    ("group speed", "dω / d Re k, m/s"),
+)  # fmt: skip
 
 
 def colour(number: int) -> str:
@@ -49,23 +58,24 @@ def dispersion_figure(
     -------
     Figure
     """
-    thick = len(curves.depths) > 2
+    between = "\n" if style.columns else " "  # letters of print are large beside its figures
     with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(11.5 if thick else 8.5, 8.4), layout="constrained")
-        left, *right = figure.subfigures(1, 2 if thick else 1, squeeze=False,
-                                         width_ratios=(2.1, 1)[: 1 + thick])[0]  # fmt: skip
+        figure, left, right, width = _parts(style, thick=len(curves.depths) > 2)
         axes = left.subplots(3, 1, sharex=True, height_ratios=(1.25, 1, 1))
         _speeds(axes[0], curves, focus_speed)
         _decay(axes[1], curves)
         _group(axes[2], curves)
-        for ax in axes:
+        for ax, words in zip(axes, LABELS, strict=True):
             ax.set_xlim(0, curves.frequencies[-1])
-            _marks(ax, lines, named=ax is axes[0])
+            ax.set_ylabel(between.join(words))
+            for frequency in lines.values():
+                ax.axvline(frequency, color="0.55", lw=0.9, ls=":", zorder=0)
             ax.grid(alpha=0.25)
+        _name_lines(axes[0], lines, width, ROWS - _is_narrow(style))
         axes[-1].set_xlabel("frequency, Hz")
-        _legend(left, curves, focus_speed)
-        for part in right:
-            _shapes(part.subplots(2, 1, sharex=True), curves, at)
+        _legend(figure, curves, focus_speed)
+        if right is not None:
+            _shapes(right, curves, at, style)
     return figure
 
 
@@ -113,10 +123,34 @@ def wavenumber_figure(
         ax.set(xlim=(f[0], f[-1]), ylim=(0, k[-1]), xlabel="frequency, Hz",
                ylabel="wavenumber Re k, rad/m")  # fmt: skip
         ax.set_title(title, fontsize="medium", parse_math=False)
-        ax.legend(loc="upper left", fontsize="small")
+        ax.legend(loc="upper left", fontsize=small())
         bar = figure.colorbar(mesh, ax=ax)
         bar.set_label("magnitude over the largest at each frequency")
     return figure
+
+
+def _is_narrow(style: Style) -> bool:
+    """Whether the shapes have room below the curves only."""
+    return style.columns is not None and max(style.columns) < WIDE
+
+
+def _parts(
+    style: Style, *, thick: bool
+) -> tuple[Figure, Figure | SubFigure, SubFigure | None, float]:
+    """A figure, its parts for curves and, of a body with a depth, for shapes; and the width in
+    points of the panels of the curves.
+    """
+    size = style.size(11.5 if thick else 8.5, 9.2 if style.columns else 8.4)
+    narrow = _is_narrow(style)
+    figure = Figure(figsize=(size[0], TALL[thick]) if narrow else size, layout="constrained")
+    beside = 8 * style.font  # labels of the axis
+    if not thick:
+        return figure, figure, None, 72 * size[0] - beside
+    if narrow:
+        above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(2.1, 1))[:, 0]
+        return figure, above, below, 72 * size[0] - beside
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(SHARE, 1 - SHARE))[0]
+    return figure, left, right, 72 * SHARE * size[0] - beside
 
 
 def _fine(mode: Mode) -> tuple[Floats, np.ndarray, np.ndarray]:
@@ -143,7 +177,6 @@ def _speeds(ax: Axes, curves: DispersionCurves, focus_speed: float) -> None:
     if focus_speed:
         ax.axhline(focus_speed, color=mpl.rcParams["text.color"], lw=1.2, ls="--")
     ax.set_ylim(0, 1.8 * max(typical) or 1.0)
-    ax.set_ylabel("phase speed ω / |Re k|, m/s")
 
 
 def _decay(ax: Axes, curves: DispersionCurves) -> None:
@@ -154,7 +187,7 @@ def _decay(ax: Axes, curves: DispersionCurves) -> None:
             length = 1e3 / np.abs(np.sqrt(squared).imag)
         _drawn(ax, n, fine, length, wave)
         largest = max(largest, float(np.nanmax(np.where(wave, length, 0.0))))
-    ax.set(yscale="log", ylim=(1, min(2 * largest, 3e3)), ylabel="1/e length 1 / |Im k|, mm")
+    ax.set(yscale="log", ylim=(1, min(2 * largest, 3e3)))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
 
 
@@ -169,26 +202,28 @@ def _group(ax: Axes, curves: DispersionCurves) -> None:
     top = 1.8 * max(typical)
     for n, speed in enumerate(drawn):
         ax.plot(fine, np.where(speed < top, speed, np.nan), color=colour(n), lw=2.2)
-    ax.set(ylim=(0, top), ylabel="group speed dω / d Re k, m/s")
+    ax.set_ylim(0, top)
 
 
-def _marks(ax: Axes, lines: Mapping[str, float], *, named: bool) -> None:
-    """Vertical marks of lines, the names of the first panel in rows where they are close."""
-    width, ends = ax.get_xlim()[1], [-np.inf] * ROWS
-    for name, frequency in sorted(lines.items(), key=lambda item: item[1]):
-        ax.axvline(frequency, color="0.55", lw=0.9, ls=":", zorder=0)
-        free = [r for r in range(ROWS) if frequency / width - ends[r] > APART]
-        row = free[0] if free else int(np.argmin(ends))
-        ends[row] = frequency / width
-        if named:
-            ax.annotate(
-                written(name), (frequency, 1.0), (0, 2 + 12 * row),
-                xycoords=("data", "axes fraction"), textcoords="offset points", ha="center",
-                va="bottom", fontsize="small",
-            )  # fmt: skip
+def _name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int) -> None:
+    """Names of lines above a panel of a width in points, the strongest that have room in rows."""
+    size, taken = small(), [list[tuple[float, float]]() for _ in range(rows)]
+    for name, frequency in lines.items():
+        half = size * (LETTER * len(name.replace("_", "")) + GAP) / 2
+        middle = width * frequency / ax.get_xlim()[1]
+        low, high = middle - half, middle + half
+        free = [k for k, others in enumerate(taken) if all(high < a or b < low for a, b in others)]
+        if not free or high > width + 2 * size:
+            continue
+        taken[free[0]].append((low, high))
+        ax.annotate(
+            written(name), (frequency, 1.0), (0, 2 + LINE * size * free[0]),
+            xycoords=("data", "axes fraction"), textcoords="offset points", ha="center",
+            va="bottom", fontsize=size,
+        )  # fmt: skip
 
 
-def _legend(figure: SubFigure, curves: DispersionCurves, focus_speed: float) -> None:
+def _legend(figure: Figure, curves: DispersionCurves, focus_speed: float) -> None:
     ink = mpl.rcParams["text.color"]
     handles = [Line2D([], [], color=colour(n), lw=2.2) for n in range(len(curves.modes))]
     labels = [mode.name for mode in curves.modes]
@@ -199,12 +234,25 @@ def _legend(figure: SubFigure, curves: DispersionCurves, focus_speed: float) -> 
     if focus_speed:
         handles.append(Line2D([], [], color=ink, lw=1.2, ls="--"))
         labels.append(f"focus, {focus_speed:g} m/s")
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5),
-                  fontsize="small")  # fmt: skip
+    figure.legend(handles, labels, loc="outside lower center", fontsize=small(), handlelength=1.5,
+                  columnspacing=1.0, ncols=_columns(labels, figure.get_figwidth()))  # fmt: skip
 
 
-def _shapes(axes: np.ndarray, curves: DispersionCurves, at: float) -> None:
+def _columns(labels: Sequence[str], width: float) -> int:
+    """Columns of a legend of small letters that a figure of a width in inch has room for."""
+
+    def needed(count: int) -> float:
+        longest = (max(map(len, part)) for part in np.array_split(labels, count))
+        return small() / 72 * sum(HANDLE + WRITTEN * letters for letters in longest)
+
+    counts = range(min(len(labels), 5), 1, -1)
+    return next((count for count in counts if needed(count) < width), 1)
+
+
+def _shapes(figure: SubFigure, curves: DispersionCurves, at: float, style: Style) -> None:
     """Displacement over depth of the least evanescent modes, in phase with the surface."""
+    narrow = _is_narrow(style)
+    axes = figure.subplots(*(1, 2) if narrow else (2, 1), sharex=True, sharey=True)
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]
     known.sort(key=lambda n: abs(curves.modes[n].wavenumbers[number].imag))
@@ -214,11 +262,19 @@ def _shapes(axes: np.ndarray, curves: DispersionCurves, at: float) -> None:
         pale = 1.0 if curves.modes[n].is_wave[number] else PALE
         for axis, part in ((0, turned[:, 1].real), (1, turned[:, 0].real)):
             axes[axis].plot(part, 1e3 * curves.depths, color=colour(n), lw=2, alpha=pale)
-    titles = (f"shapes at {curves.frequencies[number]:.0f} Hz: into the body", "along the surface")
+    said = f"shapes at {curves.frequencies[number]:.0f} Hz"
+    between = "\n" if style.columns and (not narrow or max(style.columns) < TIGHT) else " "
+    titles = (f"into{between}the body", f"along{between}the surface")
+    if narrow:
+        figure.suptitle(said)
+        figure.supxlabel(f"displacement over the{between}largest of the mode", fontsize="medium")
+    else:
+        titles = (f"{said}:{between}into the body", "along the surface")
+        axes[-1].set_xlabel(f"displacement over the{between}largest of the mode")
     for ax, title in zip(axes, titles, strict=True):
-        ax.invert_yaxis()
         ax.set_title(title, fontsize="medium")
         ax.axvline(0, color="0.6", lw=0.8, zorder=0)
-        ax.set(xlim=(-1.05, 1.05), ylabel="depth, mm")
+        ax.set(xlim=(-1.05, 1.05), xticks=(-1, 0, 1), ylim=(1e3 * curves.depths[-1], 0))
         ax.grid(alpha=0.25)
-    axes[-1].set_xlabel("displacement over the largest of the mode")
+    for ax in axes[:1] if narrow else axes:
+        ax.set_ylabel("depth, mm")

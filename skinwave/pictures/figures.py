@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from meshes.tetmesh import Floats
 from simple_model import spectrum
+from simple_model.drawing import small
 from simple_model.quantities import Quantity
 from skinwave.comparison import moving_rms
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
@@ -35,6 +36,8 @@ WHOLE = (
     "spectrum, dB re the model's largest line",
 )
 WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
+LETTER, GAP = 0.45, 0.3  # of a line's name, and between two, over the size of its letters
+LAID_OUT = 1.2  # width of a panel with the margins of a figure, over that before
 IN_A_ROW = 3  # entries of a legend, at most
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
@@ -239,12 +242,19 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
     ax.set_yticks(np.arange(FLOOR, 1, 20))
     ax.grid(alpha=0.25)
     if named:
+        points, marked = small(), list[tuple[float, float]]()  # places and half widths, Hz
+        share = LAID_OUT * ax.get_position().width
+        panel = 72 * share * ax.figure.get_figwidth()  # type: ignore[union-attr]
         for name, frequency in runs[0].frequencies.items():
             if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
+                half = (LETTER * len(name) + GAP) * points / panel * HIGHEST / 2
+                if any(abs(frequency - other) < half + width for other, width in marked):
+                    continue
+                marked.append((frequency, half))
                 text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
                 ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
                 box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize="small", bbox=box)
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize=points, bbox=box)
 
 
 def _spread(ax: Axes, runs: list[Run]) -> None:
@@ -259,7 +269,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
     if path:
         ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
-        ax.text(path, -58, " focus path", fontsize="small", color="0.4", va="bottom")
+        ax.text(path, -58, " focus path", fontsize=small(), color="0.4", va="bottom")
     ax.set_ylim(-60, 4)
     ax.grid(alpha=0.25)
 

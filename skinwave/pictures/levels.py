@@ -8,8 +8,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from simple_model import sensation_level, threshold
+from simple_model.drawing import small
 from simple_model.quantities import DISPLACEMENT
 from simple_model.threshold import BAND, HIGHEST, LOWEST
 from skinwave.pictures.figures import answered, colour, marker
@@ -18,7 +20,7 @@ from skinwave.run import Run
 
 LOWEST_LEVEL = -30.0  # dB re threshold, below which lines are left out
 MOST_NAMED = 9  # lines of a panel
-APART = 0.13  # of the frequency, within which two names would be drawn over each other
+HEIGHT = 1.8  # of a name, which stands, over the size of its letters
 
 
 def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
@@ -28,12 +30,15 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     runs = [run for run in runs if run.response.record.of_body]
     with mpl.rc_context(style.rc):
         count, narrow = max(len(runs), 1), style.is_narrow
-        size = (style.size(1, 1)[0], 3.0 * count) if narrow else style.size(5.2 * count, 4.4)
+        size = style.size(5.2 * count, 4.6)
+        size = (size[0], 3.0 * count + 0.5) if narrow else size
         figure = Figure(figsize=size, layout="constrained")
         grid = (count, 1) if narrow else (1, count)
         axes = figure.subplots(*grid, sharex=True, sharey=True, squeeze=False).ravel()
+        panel = 72 * size[0] / (1 if narrow else count) - 8 * style.font  # points
         for ax, run in zip(axes, runs, strict=False):
-            _draw(ax, run, probe)
+            _draw(ax, run, probe, HEIGHT * small() / panel * np.log(HIGHEST / LOWEST))
+        _legend(figure, list(axes), runs)
         x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
         asked = runs[0].response.record if runs else DISPLACEMENT
         between = "\n" if style.columns else " "  # letters of print are large beside its figures
@@ -61,7 +66,7 @@ def sensation_levels(run: Run, probe: int) -> dict[str, float]:
     return dict(sorted(levels.items(), key=lambda item: -item[1]))
 
 
-def _draw(ax: Axes, run: Run, probe: int) -> None:
+def _draw(ax: Axes, run: Run, probe: int, apart: float) -> None:
     if run.is_skin:
         _draw_threshold(ax)
     per = run.response.record.per_unit
@@ -73,12 +78,11 @@ def _draw(ax: Axes, run: Run, probe: int) -> None:
     ax.plot(frequencies, heights, ls="none", **style)
     for kind in dict.fromkeys(peak.kind for peak in run.unnamed):
         peaks = [(x.frequency, per * x.amplitudes[probe]) for x in run.unnamed if x.kind == kind]
-        ax.plot(*np.transpose(peaks), ls="none", mfc="none", label=kind, **style)
-    apart = APART * (2 if ax.figure.get_figwidth() < NARROW else 1)  # type: ignore[union-attr]
+        ax.plot(*np.transpose(peaks), ls="none", mfc="none", **style)
     for name in _named(run, shown, apart):
         ax.annotate(
             written(name), (run.listed[name], per * run.table.amplitudes[name][probe]), rotation=90,
-            xytext=(0, 7), textcoords="offset points", ha="center", va="bottom", fontsize="small",
+            xytext=(0, 7), textcoords="offset points", ha="center", va="bottom", fontsize=small(),
         )  # fmt: skip
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
     if run.response.record is DISPLACEMENT:
@@ -86,8 +90,18 @@ def _draw(ax: Axes, run: Run, probe: int) -> None:
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
     ax.set_title(answered(run))
     ax.grid(alpha=0.25)
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="upper left", fontsize="small", frameon=False)
+
+
+def _legend(figure: Figure, axes: Sequence[Axes], runs: Sequence[Run]) -> None:
+    """The threshold and the kinds of unnamed peaks of all panels, below them."""
+    entries = {label: handle for ax in axes
+               for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}  # fmt: skip
+    for kind in dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+        entries[f"open: {kind}"] = Line2D([], [], color="0.3", marker="o", mfc="none", ls="")
+    if entries:
+        narrow = figure.get_figwidth() < NARROW
+        figure.legend(entries.values(), entries, loc="outside lower center", fontsize=small(),
+                      ncols=1 if narrow else len(entries), frameon=False)  # fmt: skip
 
 
 def _draw_threshold(ax: Axes) -> None:
@@ -107,9 +121,11 @@ def _shown(run: Run, probe: int) -> list[str]:
 
 
 def _named(run: Run, shown: Sequence[str], apart: float) -> list[str]:
-    """The highest lines whose names have room."""
+    """The highest lines within the axis whose names have room."""
     chosen: list[str] = []
     for name in shown:
+        if not LOWEST <= run.listed[name] <= HIGHEST:
+            continue
         near = (abs(np.log(run.listed[name] / run.listed[other])) for other in chosen)
         if len(chosen) < MOST_NAMED and all(distance > apart for distance in near):
             chosen.append(name)

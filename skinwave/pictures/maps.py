@@ -12,6 +12,7 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 
 from meshes.tetmesh import Floats
+from simple_model.drawing import small
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
 from skinwave.pictures.figures import inked, label, sized
@@ -23,6 +24,7 @@ SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # distinguishable with every kind of c
 PIXELS = 201  # of a map's side
 DEEPEST = -40.0  # dB shown
 FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
+LINES = {"ray": ("surface wave", "dashed"), "track": ("focus", "solid")}  # of a trace
 DROPS = {-6: "solid", -20: "dashed"}
 THRESHOLD = "#ff2fd0"  # the detection contour
 MAP, LEGEND = 3.4, 0.4  # inch, side of a map and height of a legend
@@ -186,7 +188,7 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
     """Motion over place and time: outwards from the path after the start, and along the path."""
     narrow = style.is_narrow
     traced = [("ray", "distance, mm" if narrow else "distance from the path, mm")]
-    along = [("track", "along the path, mm" if narrow else "place along the path, mm")]
+    along = [("track", "along path, mm" if narrow else "place along the path, mm")]
     traced += along if views[0].track else []
     with mpl.rc_context(style.rc):
         size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
@@ -207,6 +209,9 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
         title = "motion about its mean over the largest\n(above: at its place)"
         bar = figure.colorbar(image, ax=axes, label=title, shrink=0.6)
         bar.set_ticks([-1, -0.5, 0, 0.5, 1])
+        if narrow:
+            lines = {said: {"color": style.ink, "ls": dashes} for said, dashes in LINES.values()}
+            _legend(figure, lines)
     return figure
 
 
@@ -288,21 +293,22 @@ def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
         between = 1 / max(view.tone, 20.0)
         for t in 1e3 * np.arange(start % between - 2 * between, view.ray.times[-1], between):
             ax.plot([0, view.speed * 100], [t, t + 100], color="black", lw=1.1, ls="dashed")
-        named = f"surface wave, {view.speed:.2g} m/s"
-        ax.plot([], [], color="black", lw=1.1, ls="dashed", label=named)
+        ax.plot([], [], color="black", lw=1.1, ls="dashed", label=f"{view.speed:.2g} m/s")
     if name == "track" and view.track is not None:
         length = 1e3 * path.length
         turns = int(view.track.times[-1] * path.drawing_frequency) + 1
         for n in range(turns):
             t = 1e3 * n / path.drawing_frequency
             ax.plot([0, length], [t, t + length / path.speed], color="black", lw=1.1)
-        ax.plot([], [], color="black", lw=1.1, label=f"focus, {path.speed:g} m/s")
+        ax.plot([], [], color="black", lw=1.1, label=f"{path.speed:g} m/s")
     ax.set_xlim(limits[0])
     ax.set_ylim(limits[1])
-    if ax.get_legend_handles_labels()[0]:
-        narrow = ax.figure.get_figwidth() < NARROW  # type: ignore[union-attr]
-        ax.legend(loc="upper right", fontsize="x-small" if narrow else "small", framealpha=0.9,
-                  labelcolor="black", facecolor="white")  # fmt: skip
+    handles, labels = ax.get_legend_handles_labels()
+    if handles:
+        if ax.figure.get_figwidth() >= NARROW:  # type: ignore[union-attr]
+            labels = [f"{LINES[name][0]}, {labels[0]}"]
+        ax.legend(handles, labels, loc="upper right", fontsize=small(), framealpha=0.9,
+                  labelcolor="black", facecolor="white", handlelength=1.3)  # fmt: skip
 
 
 def _legend(figure: Figure, entries: dict[str, dict[str, Any]]) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import drawing
 from simple_model.focus import spot_width
+from simple_model.numbers import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 BODY, PATH, FOCUS, PROBE = "#e8d5c4", "#222222", "#D55E00", "#0072B2"
 REACH = 4.0  # widths of a focal spot that its contour is looked for in
 HALF = 0.5  # of the pressure at a focus: its contour
+NARROW = 0.5  # inch for each point of its letters, below which a legend has one column
 MOST_NUMBERED = 20  # probes
 MARGIN = 5e-3  # metre beside what there is to see
 
@@ -35,8 +37,10 @@ def draw(scene: "Scene", ax: "Axes | None") -> "Axes":
     ax.set_aspect("equal")
     ax.set_xlabel("x, mm")
     ax.set_ylabel("y, mm")
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, fontsize="small",
-              borderaxespad=0.2, handlelength=1.5, columnspacing=1.0)  # fmt: skip
+    narrow = ax.figure.get_figwidth() < NARROW * drawing.small()  # type: ignore[union-attr]
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=1 if narrow else 2, frameon=False,
+              fontsize=drawing.small(), borderaxespad=0.2, handlelength=1.5,
+              columnspacing=1.0)  # fmt: skip
     return ax
 
 
@@ -83,6 +87,22 @@ def draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
     ax.autoscale_view()
 
 
+def line(scene: "Scene") -> str:
+    """Name, Tacton, body and probes in a line."""
+    tacton, body = scene.tacton, scene.body
+    path = tacton.trajectory
+    moved = f"{path.shape} of {1e3 * path.size:.4g} mm at {path.speed:g} m/s"
+    driven = [f"AM {_tones(scene)}"] if _tones(scene) else []
+    driven += ["focus at rest" if path.is_static else moved, f"{tacton.duration:g} s"]
+    if not scene.load.is_plain:
+        driven.append(scene.load.words)
+    said = [", ".join(driven), body.of_kind.words(body)]
+    if body.of_kind.discretise:
+        said[-1] += f", {_material(scene)}"
+    said.append(f"{counted(len(scene.probes), 'probe')}, {scene.reading.words}")
+    return f"<Scene {scene.name!r}: {'; '.join(said)}>"
+
+
 def page(scene: "Scene") -> str:
     """Small page of a scene for notebooks."""
 
@@ -98,10 +118,9 @@ def _facts(scene: "Scene") -> list[list[str]]:
     tacton, pressure, body = scene.tacton, scene.pressure, scene.body
     path = tacton.trajectory
     moved = f"{path.shape} at {path.speed:g} m/s, {path.drawing_frequency:.4g} Hz"
-    tones = ", ".join(f"{f:g} Hz" for f in (tacton.am_frequency, tacton.second_am_frequency) if f)
     rows = [
         ["focus", "at rest" if path.is_static else moved],
-        ["amplitude modulation", tones or "none"],
+        ["amplitude modulation", _tones(scene) or "none"],
         ["duration", f"{tacton.duration:g} s"],
     ]
     if not scene.load.force:  # of a contact, which has no focus
@@ -116,11 +135,20 @@ def _facts(scene: "Scene") -> list[list[str]]:
     rows.append(["body", body.of_kind.words(body)])
     if body.of_kind.discretise:
         rows.append(["supports", f"base {body.base}, sides {body.sides}"])
-        layers = [f"{1e3 * layer.thickness:g} mm of {_named(layer.material)}"
-                  for layer in body.layers]  # fmt: skip
-        rows.append(["material", "; below it ".join([*layers, _named(body.material)])])
+        rows.append(["material", _material(scene)])
         rows += [[f"region {name}", _named(material)] for name, material in body.regions]
     return [*rows, ["probes", f"{len(scene.probes)}, {scene.reading.words}"]]
+
+
+def _tones(scene: "Scene") -> str:
+    both = scene.tacton.am_frequency, scene.tacton.second_am_frequency
+    return ", ".join(f"{f:g} Hz" for f in both if f)
+
+
+def _material(scene: "Scene") -> str:
+    body = scene.body
+    layers = [f"{1e3 * layer.thickness:g} mm of {_named(layer.material)}" for layer in body.layers]
+    return "; below it ".join([*layers, _named(body.material)])
 
 
 def _named(material: object) -> str:
@@ -151,4 +179,4 @@ def _draw_probes(ax: "Axes", probes: Floats) -> None:
     ax.plot(x, y, ls="none", marker="o", ms=4, color=PROBE, label="probes")
     for k in range(min(len(probes), MOST_NUMBERED)):
         ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=PROBE,
-                    fontsize="small")  # fmt: skip
+                    fontsize=drawing.small())  # fmt: skip

@@ -59,8 +59,10 @@ class Style:
         """Settings of matplotlib."""
         inks = ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")
         papers = ("figure.facecolor", "axes.facecolor", "savefig.facecolor")
+        titles = ("axes.titlesize", "figure.titlesize") if self.columns else ()
         return {
             "font.size": self.font,
+            **dict.fromkeys(titles, "medium"),
             **dict.fromkeys(inks, self.ink),
             **dict.fromkeys(papers, self.paper),
         }
@@ -96,8 +98,8 @@ def style(name: str, width: float | None = None) -> Style:
 @contextmanager
 def paper(width: float = 3.5, height: float | None = None) -> Iterator[None]:
     """Settings of matplotlib for figures of a paper: this width and height in inch (0.7 of the
-    width if not given), letters of 8 points, 300 dots an inch, TrueType fonts in PDF and text as
-    text in SVG, drawn and saved within.
+    width if not given), letters of 8 points (subscripts of 5.6), 300 dots an inch, TrueType fonts
+    in PDF and text as text in SVG, drawn and saved within.
     """
     import matplotlib as mpl
 

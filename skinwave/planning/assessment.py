@@ -41,6 +41,7 @@ def assessed(
     solver: str = "auto",
     *,
     compared: Coarser | None = None,
+    meshed: Body | None = None,
 ) -> Response:
     """Response of a reduced body with its expected error and all warnings.
 
@@ -52,13 +53,14 @@ def assessed(
     h : float, metre, element size, the default of the body if not given
     tolerance, solver : as for `simulate`
     compared : element size in metre to compare with, and the body with it; chosen if not given
+    meshed : body whose mesh both sizes are of, if its nodes were moved to those of the scene's
 
     Returns
     -------
     Response
     """
     fine = quantity_of_interest(prepared, scene, response)
-    return told(scene, response, fine, h, tolerance, solver, compared=compared)
+    return told(scene, response, fine, h, tolerance, solver, compared=compared, meshed=meshed)
 
 
 def told(
@@ -70,12 +72,13 @@ def told(
     solver: str = "auto",
     *,
     compared: Coarser | None = None,
+    meshed: Body | None = None,
 ) -> Response:
     """Response of any linear finite-element model, with its expected error and all warnings.
 
     Parameters
     ----------
-    scene, response, h, tolerance, solver, compared : as for `assessed`
+    scene, response, h, tolerance, solver, compared, meshed : as for `assessed`
     fine : quantity of interest of the response: waveforms (t, p), or the lines (f, p) of an
         unconstrained body
 
@@ -88,7 +91,7 @@ def told(
     same = coarse.effort.dofs == response.effort.dofs
     fine = about_its_rest(scene, fine)
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
-    _, error = convergence(body, (other, size), (found, fine), tolerance, same=same)
+    _, error = convergence(meshed or body, (other, size), (found, fine), tolerance, same=same)
     error += series_error(scene, response.model, tolerance, coarse)
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)

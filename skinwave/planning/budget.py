@@ -19,6 +19,7 @@ from meshes.tetmesh import Floats
 from simple_model.compliance import layered
 from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import Complex
+from simple_model.numbers import percent, stated_error
 from skinwave.bodies.analytic import flattened
 from skinwave.models import takes
 from skinwave.models.plate_modes import MODES
@@ -32,7 +33,6 @@ from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
 FAINT = 1e-3  # of the load's strongest line: lines that no budget needs
 LEFT_OUT = ("placement.", "probes.")  # sections of numbers that flat layers know nothing of
-LEAST = 0.005  # numerical error that is told: wavenumber integrals and elements agree to 0.002
 ENOUGH = 0.1  # of another error: a numerical one below it gains nothing
 
 
@@ -54,8 +54,10 @@ class ErrorBudget:
     @property
     def parts(self) -> str:
         """The three, without what they are of."""
-        numerical = _numerical(self.numerical)
-        return f"numerical {numerical}; one standard deviation of the {self.spreads}"
+        return (
+            f"numerical {stated_error(self.numerical)}; one standard deviation of the "
+            f"{self.spreads}"
+        )
 
     @property
     def spreads(self) -> str:
@@ -74,15 +76,8 @@ class ErrorBudget:
         return (name, known[name]) if isfinite(known[name]) else ("", 0.0)
 
 
-def _numerical(error: float) -> str:
-    """An expected error; wavenumber integrals state none below `LEAST`."""
-    if not isfinite(error):
-        return "not known"
-    return f"below {_percent(LEAST)}" if error < LEAST else _percent(error)
-
-
 def _percent(value: float) -> str:
-    return f"{significant(100 * value, 2)} %" if isfinite(value) else "not computed"
+    return percent(value) if isfinite(value) else "not computed"
 
 
 def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:

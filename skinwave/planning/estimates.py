@@ -160,7 +160,7 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     """
     body = scene.body
     width = spot_scale(scene.pressure)
-    path = _along(scene.tacton.trajectory)
+    path = path_places(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0
     foci = np.array([path, *_mirrored(path, half)])
@@ -196,12 +196,12 @@ def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
 
 def _to_edge(scene: Scene, half: Floats) -> float:
     """Distance from the path or the probes to the nearest side, metre."""
-    used = np.vstack([_along(scene.tacton.trajectory), scene.probe_points])
+    used = np.vstack([path_places(scene.tacton.trajectory), scene.probe_points])
     return float((half - np.abs(used).max(axis=0)).min())
 
 
-def _along(path: Trajectory) -> Floats:
-    """Sample positions (k, 2) in metre of the focus."""
+def path_places(path: Trajectory) -> Floats:
+    """Some positions (k, 2) in metre of the focus."""
     if path.shape in BY_POINTS:
         return path.outline[:: max(1, len(path.points) // 24)]
     return path.at_phase(np.arange(24) / 24)

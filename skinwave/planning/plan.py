@@ -1,5 +1,7 @@
 """Plan of a scene: the cheapest model, extent and element size within a tolerance, with reasons."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,21 +17,21 @@ from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws
 from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.prepared import Prepared, reduction_tolerance, sample_times
-from skinwave.models.reduction import BAND
-from skinwave.models.symmetry import axes_of_probes, mirrored_axes
+from skinwave.models.prepared import Prepared, sample_times
 from skinwave.planning.estimates import (
     cutoff_frequency,
     has_wavenumber_solution,
     reflection_and_transient,
     response_spectrum,
 )
-from skinwave.planning.extent import PlanRow, coat_rows, extent, left_out, symmetry
-from skinwave.planning.refinement import Convergence, Refined, refined
+from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
+from skinwave.planning.goal_oriented import goal_refined, has_goal_oriented
+from skinwave.planning.mesh_rows import element_rows
+from skinwave.planning.refinement import refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
 from skinwave.planning.sheets import why_modes
-from skinwave.planning.warnings import error_not_estimated, of_elements, over_tolerance
+from skinwave.planning.warnings import error_not_estimated, of_mesh, over_tolerance
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
@@ -40,7 +42,8 @@ class Plan:
     """Plan of a simulation.
 
     `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
-    element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
+    element size `h` in metre (None without a mesh; of a goal-oriented one that of uniform elements
+    that are predicted to be as accurate); the `highest` line in Hz that matters; the
     expected relative `error`; predicted `seconds` and bytes of `memory` of the first response;
     a reason for each; `warnings` where a request is not met; and the reduced body, `prepared`,
     on the mesh that was found.
@@ -57,6 +60,9 @@ class Plan:
     rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return notebook.plan_line(self)
 
     def _repr_html_(self) -> str:
         return notebook.plan_page(self)
@@ -139,9 +145,14 @@ def plan(
         PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
         *cut,
     ]
-    axes = symmetry(scene) if asked is None or asked.is_reduced else ""
+    reduced = asked is None or asked.is_reduced
+    axes = symmetry(scene) if reduced else ""
+    goal = reduced and h is None and has_goal_oriented(scene, body)
     try:
-        mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
+        if goal:
+            mesh = goal_refined(scene, body, tolerance, progress, symmetry=axes, solver=solver)
+        else:
+            mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     except fem.NotReduced as error:
         if not takes(FROM_REST, scene):
             raise
@@ -154,9 +165,9 @@ def plan(
         error=mesh.error + step_error + start_error,
         seconds=sum(mesh.prepared.effort.seconds.values()),
         memory=mesh.prepared.effort.peak_memory,
-        rows=(*rows, *_element_rows(scene, tolerance, axes, mesh, highest, h)),
+        rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
         warnings=(
-            *of_elements(scene, mesh.h, mesh.error, tolerance),
+            *of_mesh(scene, mesh, tolerance),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *over_tolerance("fem-harmonic, which leaves out the initial transient,", start_error,
@@ -249,63 +260,6 @@ def _without_mesh(
 def _section(body: Body) -> str:
     layers = len(body.strata)
     return "a homogeneous flat slab" if layers == 1 else f"a flat slab of {layers} layers"
-
-
-def _symmetry_row(scene: Scene, axes: str) -> PlanRow:
-    """Row of the part that symmetry of the load, and the places of probes, leave to be modelled."""
-    among = mirrored_axes(scene.body, scene.reading, scene.load)
-    seen = [a for a in axes_of_probes(scene.probe_points, among) if a not in axes]
-    reasons = []
-    if axes:
-        reasons.append(f"the load is its own mirror image across {' and '.join(axes)} = 0")
-    if seen:
-        reasons.append(
-            f"probes at {' = '.join(seen)} = 0 see the even part of the motion across it alone"
-        )
-    return PlanRow(
-        what="symmetry",
-        value=("none", "half", "a quarter")[len(axes) + len(seen)],
-        reason="; ".join(reasons) or "all of the body is modelled",
-    )
-
-
-def _element_rows(
-    scene: Scene, tolerance: float, axes: str, found: Refined, highest: float, h: float | None
-) -> list[PlanRow]:
-    effort = found.prepared.effort
-    kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
-    return [
-        _symmetry_row(scene, axes),
-        PlanRow(
-            what="element size",
-            value=f"{1e3 * found.h:.2f} mm, {effort.dofs:,} dofs",
-            reason=f"{_why_size(found, tolerance, h)}: those of "
-            f"{1e3 * found.compared:.2f} mm differ by so much that an error of "
-            f"{100 * found.error:.2g} % is left"
-            if found.convergence is not Convergence.SINGLE_MESH
-            else "the file's own, without another to compare it with",
-        ),
-        *coat_rows(scene.body, found.h),
-        PlanRow(
-            what="reduction",
-            value=f"{effort.reduced_dofs} dofs, {effort.estimate:.0e} up to {BAND:.0f} Hz",
-            reason=f"asked for {reduction_tolerance(tolerance):.1g}: it costs little",
-        ),
-        *left_out(scene, highest),
-        PlanRow(
-            what="cost",
-            value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
-            reason=f"the last mesh{kept}; 0.05 s for each further Tacton on the same body",
-        ),
-    ]
-
-
-def _why_size(found: Refined, tolerance: float, h: float | None) -> str:
-    if h:
-        return "as asked"
-    if found.convergence is not Convergence.REACHED:
-        return "the finest that is tried"
-    return f"refined until less than {100 * tolerance:g} % is left"
 
 
 def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
@@ -58,9 +59,7 @@ class SizeController:
         """Relative error of a quantity of interest (k, p) by that of another mesh with elements
         `ratio` times as large.
         """
-        size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
-        change = np.linalg.norm(found - other, axis=0)
-        return float((change / size).max() / abs(ratio**self.order - 1))
+        return relative_change(other, found) / abs(ratio**self.order - 1)
 
     def size(self, h: float, error: float, tolerance: float) -> float:
         """Element size in metre that meets a tolerance, by the error with h."""
@@ -73,6 +72,12 @@ class SizeController:
 
 
 CONTROLLER = SizeController()
+
+
+def relative_change(other: NDArray[Any], found: NDArray[Any]) -> float:
+    """Change of a quantity of interest (k, p) from another mesh's, relative, of the worst probe."""
+    size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
+    return float((np.linalg.norm(found - other, axis=0) / size).max())
 
 
 class Convergence(Enum):
@@ -93,6 +98,10 @@ class Refined:
     """Refined mesh: element size `h` in metre, the `convergence` and the expected relative `error`
     with it, the size in metre that it was `compared` with, and the reduced body, `prepared` with
     it.
+
+    Of a goal-oriented mesh its `goal_lines`, three (n,) in metre, and the degrees of freedom of the
+    one that it was compared with, `compared_dofs`; h is then the size of uniform elements that are
+    predicted to be as accurate, and `compared` that of the coarse mesh.
     """
 
     h: float
@@ -100,6 +109,8 @@ class Refined:
     error: float
     compared: float
     prepared: Prepared
+    goal_lines: Lines | None = None
+    compared_dofs: int = 0
 
 
 def refined(

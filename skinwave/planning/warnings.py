@@ -11,15 +11,45 @@ from skinwave.bodies.sheet import tension
 from skinwave.models import named
 from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
 from skinwave.planning.extent import mean_sag
-from skinwave.planning.refinement import enough
+from skinwave.planning.goal_oriented import widest_on_path
+from skinwave.planning.refinement import Refined, enough
 from skinwave.scene import Scene
 
+NONLINEAR = "use --model fem-nonlinear"
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its band is up to 0.3
 
 
+def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
+    """Warnings of linear elements on the mesh of a plan.
+
+    Parameters
+    ----------
+    scene : Scene, with the body that is meshed
+    mesh : Refined, uniform or goal-oriented
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    sentences
+    """
+    if mesh.goal_lines is None:
+        return of_elements(scene, mesh.h, mesh.error, tolerance)
+    size = 1e3 * enough(scene.body, mesh.h, mesh.error, tolerance)
+    return (
+        *_of_scene(scene, tolerance),
+        *over_tolerance(
+            f"the goal-oriented mesh of {mesh.prepared.effort.dofs:,} dofs", mesh.error, tolerance,
+            f"an element size of about {size:.2g} mm is",
+        ),
+        *under_resolved(
+            widest_on_path(scene, scene.body, mesh.goal_lines), spot_scale(scene.pressure)
+        ),
+    )  # fmt: skip
+
+
 def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple[str, ...]:
-    """Warnings of linear elements.
+    """Warnings of linear elements of one size.
 
     Parameters
     ----------
@@ -35,13 +65,16 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
     size = 1e3 * enough(scene.body, h, error, tolerance)
     return (
         *error_unknown(error),
-        *rigid_body_drift(scene),
-        *_scene_damping_misfit(scene, tolerance),
+        *_of_scene(scene, tolerance),
         *over_tolerance(
             f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"
         ),
         *under_resolved(h, spot_scale(scene.pressure)),
     )
+
+
+def _of_scene(scene: Scene, tolerance: float) -> tuple[str, ...]:
+    return *rigid_body_drift(scene), *_scene_damping_misfit(scene, tolerance)
 
 
 def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
@@ -59,7 +92,7 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth
     if factor <= LINEAR:
         return ()
-    cure = "use --model fem-nonlinear" if clamped else "take a thicker sheet or a lower pressure"
+    cure = NONLINEAR if clamped else "take a thicker sheet or a lower pressure"
     return (
         f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
         f"of it; {cure}",

@@ -144,13 +144,23 @@ def _undecidable(measured: LinesByName, claim: str) -> str:
     if not is_resolved(measured, claim):
         lost = ", ".join(measured.unresolved) or "lines that it is about"
         return f"the record is too short, or sampled too slowly, to resolve {lost}"
-    if any(np.isnan(r).any() for r in measured.radius.values()):
-        return "its noise is unknown: there are no repetitions, and no bins beside the lines"
+    about = _lines_of(measured, claim)
+    if unknown := [name for name in about if np.isnan(measured.radius[name]).any()]:
+        of = f"the noise of {', '.join(unknown)}" if len(unknown) < len(about) else "its noise"
+        return f"{of} is unknown: there are no repetitions, and no bins beside the lines"
     if claim in OF_PLACES:
         return _no_peaks(measured, claim)
     if not (measured.lines["f_AM"] > measured.radius["f_AM"]).any():
         return "f_AM is not above the noise at any place"
     return ""
+
+
+def _lines_of(measured: LinesByName, claim: str) -> list[str]:
+    """Names of the lines that a claim is about; all, unless it names some."""
+    for names in NEEDED.get(claim, ()):
+        if measured.frequencies.keys() >= set(names):
+            return list(names)
+    return list(measured.radius)
 
 
 def _no_peaks(measured: LinesByName, claim: str) -> str:

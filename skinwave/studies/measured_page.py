@@ -5,9 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
+from simple_model.numbers import stated_error
 from skinwave import document
 from skinwave.document import Markup, paragraph
 from skinwave.measurements.alignment import opposite_sign
+from skinwave.measurements.flaws import flaws
 from skinwave.measurements.significance import radius
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label, measured
@@ -19,6 +21,7 @@ from skinwave.studies.measured_study import (
     MeasuredComparison,
     body_columns,
     main_column,
+    overlap,
 )
 from skinwave.studies.measured_tables import (
     claims_table,
@@ -27,6 +30,7 @@ from skinwave.studies.measured_tables import (
     differences_table,
 )
 
+SURELY = 0.85  # of the record, or of the Tacton, that is within the other at the true delay
 FEW = 4  # repetitions: of fewer the noise is poorly known
 STEADY, CLEARLY = 0.8, 6.0  # least over largest amplitude; standard errors between them
 MOST_NAMED = 3  # lines that a sentence names
@@ -117,8 +121,8 @@ def conclusion(found: MeasuredComparison, column: Column) -> str:
 def _numerical(found: MeasuredComparison, column: Column) -> str:
     """How many of the differences may be numerical."""
     few = int((column.differs & found.is_numerical(column)).sum())
-    error = significant(100 * column.run.response.expected_error, 2)
-    return f" ({few} of them within the model's numerical error of {error} %)" if few else ""
+    error = stated_error(column.run.response.expected_error)
+    return f" ({few} of them within the model's numerical error of {error})" if few else ""
 
 
 def _detectable(found: MeasuredComparison) -> float:
@@ -163,9 +167,7 @@ def remarks(found: MeasuredComparison) -> list[str]:
     said = f"{measurement.name or 'The measurement'}: {measurement.record.words} at "
     said += f"{len(measurement.places)} place{'s' * (len(measurement.places) > 1)}, "
     if r == 1:
-        unknown = np.isnan(found.lines.variance).any()
-        how = "is unknown" if unknown else "is that in the bins beside each line"
-        said += f"one repetition, whose noise {how}."
+        said += f"one repetition, whose noise {_noise_of_one(found)}."
     else:
         said += f"{r} repetitions, whose spread is the noise"
         step = f"; they are out of step by up to {1e3 * np.ptp(shifts):.3g} ms, and were shifted"
@@ -175,16 +177,49 @@ def remarks(found: MeasuredComparison) -> list[str]:
     return [
         said,
         *_opposite(main),
+        *_outside(found, main),
         *([f"Not compared, since record or model cannot resolve them: {lost}."] if lost else []),
         *_changes(found),
+        *(f"{said[0].upper()}{said[1:]}." for said in flaws(measurement, found.scene.pressure)),
         *measurement.remarks,
     ]
+
+
+def _noise_of_one(found: MeasuredComparison) -> str:
+    """Where the noise of a single repetition is from."""
+    lines = found.lines
+    unknown = int(np.isnan(lines.variance).any(axis=1).sum())
+    if unknown == len(lines.frequencies):
+        return "is unknown"
+    said = "is that in the bins beside each line"
+    if lines.borrowed:
+        said += f", of {_count(lines.borrowed)} too close to others that of the next ones"
+    return said + (f", and unknown for {_count(unknown)}" if unknown else "")
+
+
+def _count(lines: int) -> str:
+    return f"{lines} line{'s' * (lines > 1)}"
 
 
 def _opposite(column: Column) -> list[str]:
     """A sentence where the other sign of the measurement fits as well."""
     said = opposite_sign(f"the {label(column.run.column)}", has_delay=True)
     return [f"{said[0].upper()}{said[1:]}."] * column.may_be_turned
+
+
+def _outside(found: MeasuredComparison, column: Column) -> list[str]:
+    """A sentence where much of the record lies outside the Tacton at its delay."""
+    times, delay = found.measurement.times, column.alignment.delay
+    if found.measurement.is_spectrum:
+        return []
+    inside, most = overlap(found.measurement, column.run, delay), float(np.ptp(times))
+    if inside > SURELY * min(most, float(np.ptp(column.run.response.times))):
+        return []
+    return [
+        f"At its delay of {1e3 * delay:.3g} ms only {1e3 * max(inside, 0.0):.3g} of the "
+        f"{1e3 * most:.3g} ms of the record lie within the Tacton, and another delay may be the "
+        "true one: give --delay, or cut off what lies before and after."
+    ]
 
 
 def _changes(found: MeasuredComparison) -> list[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from skinwave.scene import Scene
 from skinwave.studies.measured_claims import MeasuredClaim, assess_measured, by_name
 from skinwave.studies.measured_lines import lines_to_compare, spectrum_of
 
+WITHIN = 0.75  # of a record, or of the Tacton, that is to lie within the other
 LEVEL = 0.05  # chance that any difference at all is declared where there is none
 AGREES, DIFFERS, NUMERICAL, SILENT, UNKNOWN = (
     "within the noise", "beyond the noise", "beyond the noise, within the numerical error",
@@ -92,8 +94,13 @@ class MeasuredComparison:
 
     @property
     def noise(self) -> float:
-        """Misfit that noise alone would leave; nan if it is unknown."""
-        return float(np.sqrt(self.lines.variance.sum() / (np.abs(self.lines.mean) ** 2).sum()))
+        """Misfit that noise alone would leave; nan if it is unknown, and where it is of some lines
+        they count as the others do.
+        """
+        known = self.lines.variance[np.isfinite(self.lines.variance)]
+        whole = float((np.abs(self.lines.mean) ** 2).sum())
+        return float(np.sqrt(known.mean() * self.lines.variance.size / whole)) if len(known) else (
+            np.nan)  # fmt: skip
 
     def is_numerical(self, column: Column) -> np.ndarray:
         """Mask (f, p) of differences no larger than the numerical error that a model's waveform is
@@ -153,11 +160,12 @@ def _scene_of(runs: Sequence[Run]) -> Scene:
 def _column(asked: Measured, run: Run, lines: MeasuredLines) -> Column:
     z = heard_phasors(run.response, tuple(lines.frequencies.tolist()))
     gain = asked.gain if run.response.record.of_body else None
-    window = 2 * max(float(np.ptp(run.response.times)), 1 / float(lines.frequencies.min()))
-    found = align(lines, z, window=window, delay=asked.delay, gain=gain)
+    window, centre = delay_window(asked.measurement, run, lines)
+    aligned = partial(align, window=window, centre=centre, delay=asked.delay, gain=gain)
+    found = aligned(lines, z)
     model = found.applied(lines.frequencies, z)
     away = lines.mean - model
-    turned = align(replace(lines, each=-lines.each), z, window=window, delay=asked.delay, gain=gain)
+    turned = aligned(replace(lines, each=-lines.each), z)
     fits = 2 * lines.variance.size * (turned.chi_square - found.chi_square) < AS_GOOD
     nearer = abs(turned.delay) < abs(found.delay) or turned.chi_square < found.chi_square
     return Column(
@@ -165,6 +173,26 @@ def _column(asked: Measured, run: Run, lines: MeasuredLines) -> Column:
         misfit=float(np.linalg.norm(away) / np.linalg.norm(lines.mean)),
         may_be_turned=bool(fits and nearer),
     )  # fmt: skip
+
+
+def delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> tuple[float, float]:
+    """Width and centre in s of the delays at which most of a record lies within the Tacton, or most
+    of the Tacton within the record; at least a period of the lowest line wide.
+    """
+    begin, end = (float(t) for t in run.response.times[[0, -1]])
+    period = 1 / float(lines.frequencies.min())
+    if measurement.is_spectrum:
+        return 2 * max(end - begin, period), 0.0
+    first, last = (float(t) for t in measurement.times[[0, -1]])
+    within = WITHIN * min(last - first, end - begin)
+    low, high = first + within - end, last - within - begin
+    return max(high - low, period), (low + high) / 2
+
+
+def overlap(measurement: Measurement, run: Run, delay: float) -> float:
+    """Time in s of a record that lies within the Tacton, at a delay of the record."""
+    begin, end = (float(t) + delay for t in run.response.times[[0, -1]])
+    return min(float(measurement.times[-1]), end) - max(float(measurement.times[0]), begin)
 
 
 def body_columns(comparison: MeasuredComparison) -> list[Column]:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from simple_model.numbers import stated_error
 from skinwave import document
 from skinwave.numbers import significant
 from skinwave.pictures.figures import REPORT, measured, png
@@ -43,7 +44,7 @@ def sentences(scene: Scene, found: QuantityMap) -> list[str]:
         + (", or further: the map ends there." if border.any() else "."),
         f"Computed by {found.note}"
         + (
-            f"; expected error {100 * found.error:.2g} % of the largest."
+            f"; expected error {stated_error(found.error)} of the largest."
             if isfinite(found.error)
             else "."
         ),

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from simple_model.numbers import stated_error
 from skinwave.document import Markup, paragraph, table
 from skinwave.numbers import decibel, significant
 from skinwave.pictures.figures import REPORT, label, sized
@@ -162,7 +163,7 @@ def _sure(shown: Shown) -> str:
     if shown.budget is not None:
         error = shown.budget.words
     elif np.isfinite(shown.error):
-        error = f"Numerical error about {_percent(shown.error)}"
+        error = f"Numerical error {stated_error(shown.error)}"
     if shown.body.scene.body.of_kind.is_plate:
         text = "grammage, stiffness and support of the sheet that was measured are not published"
         return f"{error}; {text}."

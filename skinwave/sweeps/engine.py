@@ -118,7 +118,8 @@ def _run_here(
     get: Callable[..., Any] = multiprocessing.get if own else threaded.get
     called = partial(guarded, work) if own else work
     graph = {k: (partial(called, item),) for k, item in items.items()}
-    several = pool(count, as_worker) if own else _threads(count)
+    threads = max(1, usable_cores() // count)  # of linear algebra in each process
+    several = pool(count, partial(as_worker, threads)) if own else _threads(count)
     with several as executor, Callback(posttask=finished):
         get(graph, list(graph), pool=executor, num_workers=count, chunksize=1)
 

@@ -1,5 +1,7 @@
 """Sweeps of a scene in Python: the table that the command line writes, as an object."""
 
+from __future__ import annotations
+
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from simple_model import drawing
 from simple_model.choices import choose
 from simple_model.conversion import library
+from simple_model.numbers import counted
 from skinwave.effort import Progress
 from skinwave.numbers import significant
 from skinwave.progress_bar import reported
@@ -59,13 +62,13 @@ class SweepTable:
         choose("column", column, self.columns)
         return [row.get(column) for row in self.rows]
 
-    def to_pandas(self) -> "pd.DataFrame":
+    def to_pandas(self) -> pd.DataFrame:
         """The table with a row for each run; lists are entries, units end the names of columns."""
         return library("pandas").DataFrame([dict(row) for row in self.rows])
 
     def plot(
-        self, column: str = "peak_um", x: str = "", by: str = "", *, ax: "Axes | None" = None
-    ) -> "Axes":
+        self, column: str = "peak_um", x: str = "", by: str = "", *, ax: Axes | None = None
+    ) -> Axes:
         """Draw a column over a key, with a curve for each value of another; those that were varied
         if they are not given. Of what is told at every probe the largest, or that of "peak_um[2]".
         """
@@ -78,6 +81,11 @@ class SweepTable:
         curves(ax, finished(self.rows), column, x, by or (others[0] if others else None))
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
         return ax
+
+    def __repr__(self) -> str:
+        said = f"{counted(len(self), 'run')} over {', '.join(self.varied)}"
+        said += f"; {len(self.columns)} columns"
+        return f"<SweepTable: {said}{f', {len(self.failed)} failed' * bool(self.failed)}>"
 
     def _repr_html_(self) -> str:
         names = [*self.varied, *(name for name in RESULTS if name in self.columns)]

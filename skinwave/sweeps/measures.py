@@ -10,7 +10,7 @@ from simple_model import Response, named_lines, point_kernel, sensation_level
 from simple_model.quantities import DISPLACEMENT
 from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import ASSESSED, Run
+from skinwave.run import ASSESSED, SUPPORT, Run
 from skinwave.scene import Scene
 from skinwave.sweeps.variation import DesignPoint
 
@@ -23,8 +23,8 @@ TEXTS = (
 NUMBERS = (
     "tolerance", "asked_h_mm", "h_mm", "expected_error", "drawing_frequency_hz",
     "rayleigh_speed_m_per_s", "spread_6db_mm", "spread_20db_mm", "kernel_spread_6db_mm",
-    "kernel_spread_20db_mm", "seconds", "dofs", "reduced_dofs", "steps", "reduction_error",
-    "energy_imbalance", "radiated", "peak_memory_gib",
+    "kernel_spread_20db_mm", "seconds", "dofs", "reduced_dofs", "reduced_together", "steps",
+    "reduction_error", "energy_imbalance", "radiated", "peak_memory_gib",
 )  # fmt: skip
 AT_PROBES = (
     "probe_x_mm", "probe_y_mm", "peak_um", "rms_um", "level_db", "kernel_peak_pa", "kernel_rms_pa",
@@ -66,8 +66,11 @@ def _others(scene: Scene) -> list[str]:
 
 
 def _columned(scene: Scene) -> Iterable[str]:
-    """Lines that have columns: the strongest of the load, and those that claims are about."""
-    return named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
+    """Lines that have columns: the strongest of the load, those that claims are about, and that
+    of a support that moves.
+    """
+    found = named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
+    return [*found, *([SUPPORT] if scene.load.support_motion else [])]
 
 
 def commanded(case: DesignPoint) -> dict[str, Any]:

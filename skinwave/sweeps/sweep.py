@@ -1,8 +1,8 @@
 """Parameter sweep: many scenes in one table, each body reduced once, each run once."""
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.metadata import version
 from math import isfinite
@@ -11,22 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Response, named_lines
+from simple_model import Response
 from simple_model.choices import choose
+from skinwave import parametric
 from skinwave.effort import Progress, silent
 from skinwave.models import named, names
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
 from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
-from skinwave.scene import Body, Load, Reading, Scene
+from skinwave.scene import Scene
 from skinwave.simulation import answered, check_options
 from skinwave.sweeps import dataset, engine
+from skinwave.sweeps.families import (
+    Family,
+    Mesh,
+    Solid,
+    Values,
+    families,
+    highest,
+    mesh_of,
+    reduced,
+)
 from skinwave.sweeps.measures import columns, commanded, measured
 from skinwave.sweeps.variation import DesignPoint
 
 BATCH = 8  # runs of one body that are handed out together, at most
 KEPT = 4  # bodies that a worker caches in memory, on two meshes each
+LOST = Mesh(error="its worker was killed each time; give it more memory or larger elements")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,17 +49,6 @@ class ModelOptions:
     tolerance: float = 0.05
     h: float | None = None
     solver: str = "auto"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Mesh:
-    """The element size in metre that the runs on a body share, that of the `coarser` mesh by which
-    the error of each is estimated, or the `error` why there is none.
-    """
-
-    h: float | None = None
-    coarser: float | None = None
-    error: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,10 +164,6 @@ def _check(model_options: ModelOptions) -> None:
         raise ValueError(f"tolerance = {model_options.tolerance} is outside 0 < tolerance < 1")
 
 
-# A body, its probes, what they read, and what pushes it.
-Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
-
-
 def _key(scene: Scene) -> Solid:
     return scene.body, scene.probes, scene.reading, scene.load
 
@@ -190,37 +187,61 @@ def _shared_meshes(
     count: int,
     report: Progress,
 ) -> dict[Solid, Mesh]:
-    """Find a mesh for each body that several runs share, and reduce it, each body once."""
-    hardest: dict[Solid, Scene] = {}
-    for case in runs.values():
-        if (solid := _solid(case, model_options)) and case.scene:
-            before = hardest.get(solid, case.scene)
-            hardest[solid] = max(before, case.scene, key=_highest)
-    found: dict[Solid, Mesh] = {}
-    solids = list(hardest)
+    """Find a mesh for each body that several runs share, and reduce it, each body once; families of
+    bodies together, where they can be.
+    """
 
-    def done(k: int, mesh: Mesh) -> None:
-        found[solids[k]] = mesh
-        report("reduce bodies", len(found) / len(solids))
+    def on_workers(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
+        found = dict.fromkeys(range(len(items)), LOST)
+
+        def done(k: int, mesh: Mesh) -> None:
+            found[k] = mesh
+            report("reduce bodies", sum(each is not LOST for each in found.values()) / len(items))
+
+        engine.run_all(partial(work, model_options), items, scheduler, count, done)
+        return list(found.values())
 
     report("reduce bodies", 0.0)
-    engine.run_all(partial(_mesh, model_options), list(hardest.values()), scheduler, count, done)
-    lost = Mesh(error="its worker was killed each time; give it more memory or larger elements")
-    return {solid: found.get(solid, lost) for solid in solids}
+    hardest = _hardest(runs, model_options)
+    shared = families(hardest, model_options.tolerance, count)
+    meshes = on_workers(_mesh_of_family, [family for family, _ in shared])
+    found = {
+        solid: replace(mesh, values=values)
+        for (_, members), mesh in zip(shared, meshes, strict=True)
+        for solid, values in members.items()
+        if not mesh.error
+    }
+    alone = {solid: case.scene for solid, case in hardest.items() if solid not in found}
+    return found | dict(zip(alone, on_workers(_mesh, list(alone.values())), strict=True))
 
 
-def _highest(scene: Scene) -> float:
-    """The highest line in Hz of a load that is above -40 dB of its strongest."""
-    return max(named_lines(scene.pressure, 1e-2).values(), default=0.0)
+def _hardest(runs: dict[str, DesignPoint], model_options: ModelOptions) -> dict[Solid, DesignPoint]:
+    """Run with the highest line on each body that runs share."""
+    found: dict[Solid, tuple[float, DesignPoint]] = {}
+    for case in runs.values():
+        if (solid := _solid(case, model_options)) and case.scene:
+            line = highest(case.scene)
+            if solid not in found or line > found[solid][0]:
+                found[solid] = line, case
+    return {solid: case for solid, (_, case) in found.items()}
+
+
+def _mesh_of_family(model_options: ModelOptions, family: Family) -> Mesh:
+    """Mesh of a family, or the error why its bodies are reduced one by one; cached on disk."""
+    asked = model_options.tolerance, model_options.h, model_options.solver
+    try:
+        return mesh_of(family, *asked)
+    except Exception as error:  # any: each body has its own then
+        return Mesh(error=_said(error))
 
 
 def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
     """The mesh that the hardest scene of a body requires; cached on disk for all workers."""
     try:
         if model_options.h:
-            _prepared(_key(scene), model_options.h, model_options)
+            _prepared(_key(scene), model_options.h, model_options, None, ())
             coarser = compared_with(scene.body, model_options.h)
-            _prepared(_key(scene), coarser, model_options)
+            _prepared(_key(scene), coarser, model_options, None, ())
             return Mesh(h=model_options.h, coarser=coarser)
         found = refined(scene, scene.body, model_options.tolerance, solver=model_options.solver)
         return Mesh(h=found.h, coarser=found.compared)
@@ -229,11 +250,19 @@ def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
 
 
 @lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
-def _prepared(solid: Solid, h: float, model_options: ModelOptions) -> Prepared:
+def _prepared(
+    solid: Solid,
+    h: float,
+    model_options: ModelOptions,
+    family: Family | None,
+    values: Values,
+) -> Prepared:
+    tolerance, solver = model_options.tolerance, model_options.solver
+    if family:
+        return parametric.at(reduced(family, h, tolerance, solver), dict(values))
     body, probes, reading, load = solid
-    tolerance = reduction_tolerance(model_options.tolerance)
     return prepare(
-        body, np.array(probes), h=h, solver=model_options.solver, tolerance=tolerance,
+        body, np.array(probes), h=h, solver=solver, tolerance=reduction_tolerance(tolerance),
         reading=reading, load=load,
     )  # fmt: skip
 
@@ -284,8 +313,9 @@ def _row(case: DesignPoint, model_options: ModelOptions, mesh: Mesh | None) -> d
                 solver=model_options.solver,
             )
         else:
-            response = _on_mesh(case.scene, model_options, mesh)
+            response, mesh = _on_mesh(case.scene, model_options, mesh)
             row["h_mm"] = 1e3 * (mesh.h or 0.0)
+            row["reduced_together"] = mesh.family.members if mesh.family else 1
         if isfinite(response.expected_error):
             row["expected_error"] = response.expected_error
         row |= measured(case.scene, response)
@@ -294,17 +324,26 @@ def _row(case: DesignPoint, model_options: ModelOptions, mesh: Mesh | None) -> d
     return row | {"seconds": time.perf_counter() - started}
 
 
-def _on_mesh(scene: Scene, model_options: ModelOptions, mesh: Mesh) -> Response:
-    """Response of a reduced body, with its expected relative error."""
+def _on_mesh(scene: Scene, model_options: ModelOptions, mesh: Mesh) -> tuple[Response, Mesh]:
+    """Response of a reduced body, with its expected relative error, and the mesh that it is on: the
+    body's own where that of its family is too coarse.
+    """
     if mesh.error or mesh.h is None:
         raise ValueError(mesh.error)
-    prepared = _prepared(_key(scene), mesh.h, model_options)
-    assert mesh.coarser is not None
-    coarse = _prepared(_key(scene), mesh.coarser, model_options)
-    return assessed(
+    prepared, coarse = (
+        _prepared(_key(scene), h or 0.0, model_options, mesh.family, mesh.values)
+        for h in (mesh.h, mesh.coarser)
+    )
+    response = assessed(
         scene, answer(prepared, scene), prepared, mesh.h, model_options.tolerance,
-        model_options.solver, compared=(mesh.coarser, coarse),
+        model_options.solver, compared=(mesh.coarser or 0.0, coarse), meshed=mesh.meshed,
     )  # fmt: skip
+    if not mesh.family:
+        return response, mesh
+    error = response.expected_error + prepared.effort.estimate
+    if error > model_options.tolerance and not model_options.h:
+        return _on_mesh(scene, model_options, _mesh(model_options, scene))
+    return replace(response, expected_error=error), mesh
 
 
 def _said(error: Exception) -> str:

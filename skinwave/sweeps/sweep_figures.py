@@ -12,6 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from simple_model.choices import choose
+from simple_model.drawing import small
 from simple_model.threshold import BAND
 from skinwave.pictures.styles import Style
 from skinwave.sweeps.dataset import Row
@@ -142,10 +143,10 @@ def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
                 ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
             ax.set_ylabel(axis_label(column))
         axes[0].set_ylim(bottom=0)
-        axes[0].legend(fontsize="small", frameon=False)
+        axes[0].legend(fontsize=small(), frameon=False)
         band = axes[1].axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0)
         said = f"threshold, ±{BAND:g} dB between people"
-        axes[1].legend([band], [said], fontsize="small", frameon=False)
+        axes[1].legend([band], [said], fontsize=small(), frameon=False)
         axes[1].set_xlabel(axis_label(SPEED))
     return figure
 
@@ -180,7 +181,7 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     if by is not None and many:
         ax.figure.colorbar(scale, ax=ax, label=axis_label(by))
     elif by is not None:
-        ax.legend(fontsize="small", frameon=False)
+        ax.legend(fontsize=small(), frameon=False)
     ax.grid(alpha=0.25)
 
 

@@ -21,6 +21,7 @@ from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, from_table, loads, parsed, read, to_table
 from skinwave.scene_keys import SECTIONS, renamed, with_key, write_material
+from skinwave.spreads import SCALES, scaled
 from skinwave.sweeps.saltelli import EDGE, saltelli_shares
 
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
@@ -253,10 +254,13 @@ def _split(text: str) -> list[str]:
 
 
 def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
-    scene, error, changed = None, "", _changed(table, complete, varied)
+    scene, error = None, ""
+    scales = {key: x for key, x in varied.items() if key.rpartition(".")[2] in SCALES}
+    plain = {key: x for key, x in varied.items() if key not in scales}
+    changed = _changed(table, complete, plain)
     try:
         text = tomli_w.dumps(changed)
-        scene = loads(text)
+        scene = scaled(loads(text), scales)
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)

@@ -16,7 +16,7 @@ from simple_model.flat_body import flat_body
 from simple_model.trajectory import Floats
 from skinwave.bodies.analytic import compliance
 from skinwave.measurements import Measurement
-from skinwave.measurements.reading import read
+from skinwave.measurements.reading import completing, read_alone
 from skinwave.validate.waves import BODIES
 
 SPEEDS = (1.0, 2.0, 4.0, 7.0, 11.0)  # m/s, along the hand
@@ -76,7 +76,7 @@ def measured(file: Path, speed: float) -> Profile:
     ValueError
         If the file cannot be read, has no velocity or no places.
     """
-    found = read(file)
+    found = read_alone(file)
     if found.quantity != "velocity" or found.is_spectrum:
         raise ValueError(
             f"{file} holds no waveforms of velocity, which the zigzag is compared by; give one of "
@@ -85,8 +85,8 @@ def measured(file: Path, speed: float) -> Profile:
     known = np.asarray(np.isfinite(found.places).all(axis=1))
     if known.sum() < 2:
         raise ValueError(
-            f"{file} holds no places of its {len(known)} points; give a file with its point map, "
-            "x and y of each"
+            f"{file} holds no places of its {len(known)} points; give its point map, x and y of "
+            f"each, by --places: {completing(file)}"
         )
     along, rms = _along(found, known)
     return Profile(name=f"measured, {file.name}", speed=speed, places=along, rms=rms)

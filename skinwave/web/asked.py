@@ -55,12 +55,22 @@ def is_file(given: Any) -> bool:
 SET: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(KEYS, lambda given: is_number(given) or is_text(given)),
     **dict.fromkeys(
-        ("hold", "solid", "published", "dark", "about", "drawer", "decibel", "against"), is_switch
+        (
+            "hold",
+            "solid",
+            "published",
+            "dark",
+            "about",
+            "drawer",
+            "decibel",
+            "against",
+            "layers_open",
+        ),
+        is_switch,
     ),
     "span": lambda given: is_text(given) and given in SPANS,
     "highest": lambda given: is_number(given) and given in HIGHEST,
     "third": lambda given: is_text(given) and given in THIRD,
-    "phase": lambda given: is_number(given) and 0 <= given <= 100,
     "pulse": lambda given: is_number(given) and given >= 0,
     "rhythm_span": lambda given: is_number(given) and given >= 0,
     "opened": is_file,

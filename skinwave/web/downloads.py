@@ -9,17 +9,20 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from simple_model.choices import choose
-from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from skinwave.exports import sampled, waveform_table
 from skinwave.patterns import Options
 from skinwave.patterns.conversion import write_pattern
+from skinwave.pictures.styles import style
 from skinwave.processes import apart
 from skinwave.scene import BODIES, Scene, body_name, with_body
 from skinwave.scene_file import dumps
-from skinwave.web.model import REACH, Answer, drawn_paths, influenced
+from skinwave.web.asked import numbers
+from skinwave.web.model import Answer
+from skinwave.web.saved_figure import figure_of, seen, view_of
 
 PATTERNS = (".adaptics", ".py", ".csv")
+WIDTH = 7.0  # inch of a figure: two columns
 FORMATS = ("svg", "png", "pdf")  # matplotlib knows others, some of which start a program
 
 
@@ -40,10 +43,13 @@ def offered(session: Any) -> dict[str, Callable[..., Any]]:
         async with one_at_a_time:
             return await elsewhere(report_of, session.scene, there())
 
-    async def figure(kind: str) -> bytes:
+    async def figure(kind: str, width: float = WIDTH, view: str = "") -> bytes:
         choose("format of a figure", str(kind), FORMATS)
+        (width,) = numbers(width)
+        style("print", width)  # refuses what is no width of a page
+        there()
         async with one_at_a_time:
-            return await elsewhere(figure_of, session.scene, there(), kind)
+            return await elsewhere(figure_of, seen(session, view_of(str(view))), kind, width)
 
     return {
         "scene_toml": lambda: dumps(session.scene).encode(),
@@ -102,7 +108,6 @@ def report_of(scene: Scene, answers: Sequence[Answer]) -> bytes:
     """The report of `skinwave report` as one page, of the responses there are; no model is run."""
     from skinwave.effort import silent, versions
     from skinwave.files import fill
-    from skinwave.pictures.styles import style
     from skinwave.reports.scene_report import write_report
     from skinwave.run import Run
 
@@ -125,44 +130,3 @@ def _body_of(scene: Scene, answer: Answer) -> str:
     if not answer.response.record.of_body:
         return "none"
     return body_name(scene.body)
-
-
-def _column(scene: Scene, answer: Answer) -> str:
-    """Name of a response in tables and figures, as `Run.column`."""
-    name = _body_of(scene, answer)
-    return answer.response.model if name == "none" else name
-
-
-def figure_of(scene: Scene, answers: Sequence[Answer], kind: str) -> bytes:
-    """Maps, waveform and spectrum; `kind` is one of `FORMATS`."""
-    from matplotlib.figure import Figure
-
-    from skinwave.pictures.figures import colour, drawn, label
-
-    figure = Figure(figsize=(11, 3.2 * len(answers)), layout="constrained")
-    for row, answer in zip(figure.subplots(len(answers), 3, squeeze=False), answers, strict=True):
-        asked = answer.response.record
-        seen = DISPLACEMENT if asked.of_body else asked  # on the map
-        edge, line_style = 1e3 * REACH, {"lw": 1, "color": colour(_column(scene, answer))}
-        image = row[0].imshow(
-            seen.per_unit * answer.map.rms,
-            extent=(-edge, edge, -edge, edge),
-            origin="lower",
-            cmap="cividis",
-        )
-        figure.colorbar(image, ax=row[0], label=f"RMS, {seen.shown}")
-        for line in drawn_paths(scene.tacton):
-            row[0].plot(*(1e3 * line.T), color="#56B4E9")
-        for line in influenced(scene.tacton, scene.pressure.height):
-            row[0].plot(*(1e3 * line.T), color="white", ls="dotted")
-        for line in answer.map.threshold:
-            row[0].plot(*(1e3 * line.T), color="#ff2fd0", lw=1)
-        row[0].plot(*(1e3 * answer.response.probes.T), "x", color="white")
-        row[0].set(xlabel="x, mm", ylabel="y, mm", title=label(_column(scene, answer)))
-        shown = answer.response.times <= 0.06
-        row[1].plot(1e3 * answer.response.times[shown],
-                    asked.per_unit * answer.response.values[shown, 0], **line_style)  # fmt: skip
-        row[1].set(xlabel="time, ms", ylabel=asked.shown, title="waveform at the point")
-        row[2].plot(answer.frequencies, asked.per_unit * answer.spectrum, **line_style)
-        row[2].set(xlabel="frequency, Hz", ylabel=asked.shown, title="spectrum", xlim=(0, 600))
-    return drawn(figure, kind, 150)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from meshes.tetmesh import Floats
 from simple_model import Tacton
 from simple_model.joined import parted
-from skinwave.web.model import Answer, AreaMap
+from skinwave.web.model import Answer, AreaMap, LineAtPoint
 
+MOST_ROWS, MOST_PINNED = 12, 4  # of a table of lines, and of those that A alone has
 DEEPEST = 30.0  # dB, of differences
 LEAST = 10 ** (-DEEPEST / 20)  # of the largest: what is less counts as that
 NO_BANDS: Mapping[str, tuple[float, float]] = {}
@@ -26,7 +27,7 @@ def picture(found: AreaMap) -> str:
     """RMS of a map as the address of a PNG, from dark (none) to light (its largest)."""
     largest = float(np.nanmax(found.rms, initial=0.0)) or 1.0
     relative = np.nan_to_num(found.rms / largest)
-    return _png(_shades()[np.round(255 * relative).astype(int)], np.isnan(found.rms))
+    return _png(shades()[np.round(255 * relative).astype(int)], np.isnan(found.rms))
 
 
 def difference(found: AreaMap, reference: AreaMap) -> str:
@@ -35,9 +36,8 @@ def difference(found: AreaMap, reference: AreaMap) -> str:
     """
     levels = [20 * np.log10(np.maximum(each.rms / (np.nanmax(each.rms, initial=0.0) or 1.0), LEAST))
               for each in (found, reference)]  # fmt: skip
-    part = np.clip(np.nan_to_num(levels[0] - levels[1]) / DEEPEST, -1, 1)[..., None]
-    way = np.where(part > 0, INTO, OUT)
-    return _png(STILL + np.abs(part) * (way - STILL), np.isnan(found.rms))
+    part = np.clip(np.nan_to_num(levels[0] - levels[1]) / DEEPEST, -1, 1)
+    return _png(signed_shade(part, root=False), np.isnan(found.rms))
 
 
 def _png(colours: Floats, outside: NDArray[np.bool_]) -> str:
@@ -75,18 +75,21 @@ def ends(largest: float, unit: str) -> list[str]:
 
 
 def rows(
-    kernel: Answer, waves: Answer | None, bands: Mapping[str, tuple[float, float]] = NO_BANDS
+    kernel: Answer,
+    waves: Answer | None,
+    bands: Mapping[str, tuple[float, float]] = NO_BANDS,
+    pinned: Answer | None = None,
 ) -> list[dict[str, str]]:
-    """The named lines as a table: frequency, amplitudes and level above threshold, with its 5 and
-    95 % by the name of the line.
+    """The named lines as a table: frequency, amplitudes, also of pinned waves, and level above
+    threshold, with its 5 and 95 % by the name of the line.
     """
     by_wave = {line.name: line for line in waves.lines} if waves else {}
     per = waves.response.record.per_unit if waves else 1.0
     by_kernel = {line.name: line for line in kernel.lines}
-    names = dict.fromkeys([line.name for line in (waves.lines if waves else ())]
-                          + [line.name for line in kernel.lines])  # fmt: skip
+    names = dict.fromkeys([*by_wave, *by_kernel])
+    kept = _pinned_lines(pinned, {**by_kernel, **by_wave})
     found = []
-    for name in list(names)[:12]:
+    for name in list(names)[:MOST_ROWS]:
         line = by_wave.get(name) or by_kernel[name]
         pa, um = by_kernel.get(name), by_wave.get(name)
         level = um.sensation if um else None
@@ -97,7 +100,28 @@ def rows(
             "displacement": f"{per * um.amplitude:.3g}" if um else "",
             "level": "" if level is None or not np.isfinite(level) else f"{level:+.0f}",
             "band": " to ".join(f"{end:+.0f}" for end in bands.get(name, ())),
+            "pinned": kept.pop(name, ("", ""))[1],
         })  # fmt: skip
+    left = dict.fromkeys(("pressure", "displacement", "level", "band"), "")
+    own = [left | {"name": f"A: {written(name)}", "frequency": frequency, "pinned": amplitude}
+           for name, (frequency, amplitude) in kept.items() if name not in names]  # fmt: skip
+    return found + own[:MOST_PINNED]
+
+
+def _pinned_lines(
+    pinned: Answer | None, others: Mapping[str, LineAtPoint]
+) -> dict[str, tuple[str, str]]:
+    """Frequency and amplitude of pinned lines, by their name or, at another frequency than the line
+    of that name among the others, by both.
+    """
+    if pinned is None:
+        return {}
+    found, per = {}, pinned.response.record.per_unit
+    for line in pinned.lines:
+        other, frequency = others.get(line.name), f"{line.frequency:.1f}"
+        same = other is None or f"{other.frequency:.1f}" == frequency
+        name = line.name if same else f"{line.name}, {frequency} Hz"
+        found[name] = (frequency, f"{per * line.amplitude:.3g}")
     return found
 
 
@@ -116,20 +140,23 @@ def _gradient(colours: Floats, places: Floats) -> str:
 
 
 @cache
-def _shades() -> NDArray[np.float64]:
+def shades() -> NDArray[np.float64]:
     """Colours (256, 3) from least to most, distinguishable with every kind of colour vision."""
     from matplotlib import colormaps
 
     return np.asarray(np.round(255 * colormaps["cividis"](np.arange(256))[:, :3]))
 
 
-def _signed_shades() -> str:
-    """As body.js colours motion: by the root of its share of the largest."""
-    part = np.linspace(-1, 1, 41)
-    way = np.where(part[:, None] > 0, INTO, OUT)
-    return _gradient(STILL + np.sqrt(np.abs(part))[:, None] * (way - STILL), (part + 1) / 2)
+def signed_shade(part: Floats, root: bool = True) -> Floats:
+    """Colours (..., 3) of 0..255 of a share -1..1 of the largest; by its `root` as body.js colours
+    motion into the body.
+    """
+    way = np.where(part[..., None] > 0, INTO, OUT)
+    strength = np.sqrt(np.abs(part)) if root else np.abs(part)
+    return np.asarray(STILL + strength[..., None] * (way - STILL))
 
 
-SEQUENTIAL = _gradient(_shades()[::15], np.linspace(0, 1, 18))
+_PARTS = np.linspace(-1, 1, 41)
+SEQUENTIAL = _gradient(shades()[::15], np.linspace(0, 1, 18))
 DIVERGING = _gradient(np.array([OUT, STILL, INTO]), np.array([0.0, 0.5, 1.0]))
-SIGNED = _signed_shades()
+SIGNED = _gradient(signed_shade(_PARTS), (_PARTS + 1) / 2)

@@ -22,16 +22,11 @@ from simple_model.material import Material
 from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.effort import Progress
-from skinwave.models.free_materials import (
-    Reference,
-    meshed_materials,
-    reference_of,
-    solids_of,
-    training_shares,
-)
+from skinwave.models.affine_scenes import has_affine_operators
+from skinwave.models.free_keys import training_shares
+from skinwave.models.free_materials import Reference, meshed_materials, reference_of, solids_of
 from skinwave.models.laws import relaxing
 from skinwave.models.reduction import BAND, ReducedBody, reduced_variant
-from skinwave.parametric import has_affine_operators
 from skinwave.scene import Body, Layer, solid_of
 from skinwave.web.layer_values import loss_factor
 
@@ -59,7 +54,7 @@ class FreeBody:
 
 def can_be_free(body: Body) -> bool:
     """Whether operators of a body are sums over its materials."""
-    return has_affine_operators(body) and not body.air and not body.regions
+    return has_affine_operators(body) and not body.air
 
 
 def covers(base: Body, body: Body) -> bool:

@@ -13,6 +13,7 @@ from typing import Any
 from fem.materials import Material
 from skinwave.scene import Body, Layer, solid_of
 
+PARTS = ("thickness", "modulus", "loss")
 THICKNESS = 0.01, 60.0  # mm; a slab of 60 mm is a half-space to the skin's waves
 MODULUS = 0.1, 10_000.0  # kPa
 LOSS, LOSS_AT = (0.0, 3.0), 200.0  # of a loss factor; Hz
@@ -136,10 +137,10 @@ def rows(body: Body, text: str) -> list[dict[str, Any]]:
 
 
 def _own(body: Body) -> list[tuple[float, str | Material]]:
-    """Thickness in metre and material of each layer of a body; none of a sheet, of a body with
-    regions, or of one from a file, whose thickness is not its depth.
+    """Thickness in metre and material of each layer of a body, around its regions; none of a sheet,
+    or of a body from a file, whose thickness is not its depth.
     """
-    if not (body.is_solid and body.of_kind.is_bounded) or body.regions:
+    if not (body.is_solid and body.of_kind.is_bounded):
         return []
     layers: list[tuple[float, str | Material]] = [(x.thickness, x.material) for x in body.layers]
     return [*layers, (body.depth - sum(thickness for thickness, _ in layers), body.material)]

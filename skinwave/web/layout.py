@@ -13,7 +13,7 @@ from simple_model.drive import DRIVES
 from simple_model.quantities import QUANTITIES
 from skinwave.web import controls, drawings
 from skinwave.web.examples import EXAMPLES
-from skinwave.web.help import HELP
+from skinwave.web.help import BAR, HELP
 from skinwave.web.plots import SPANS
 from skinwave.web.session import Session
 from skinwave.web.shown import HIGHEST, THIRD
@@ -62,16 +62,20 @@ PAGE = jinja2.Environment(
 ).get_template("interactive.html")  # fmt: skip
 
 
+def rendered() -> str:
+    """Text of the page, a template of Vue."""
+    return PAGE.render(
+        numbers=controls.NUMBERS, presets=controls.presets(),
+        sequential=drawings.SEQUENTIAL, signed=drawings.SIGNED, diverging=drawings.DIVERGING,
+        helps=HELP, bar=BAR, examples=EXAMPLES,
+    )  # fmt: skip
+
+
 def lay_out(session: Session) -> None:
     """Make the page of a session."""
     for module in (MODULE, v3):
         session.server.enable_module(module)
-    text = PAGE.render(
-        numbers=controls.NUMBERS, presets=controls.presets(),
-        sequential=drawings.SEQUENTIAL, signed=drawings.SIGNED, diverging=drawings.DIVERGING,
-        helps=HELP, examples=EXAMPLES,
-    )  # fmt: skip
     session.state.update({
         **ITEMS, "trame__title": "skinwave", "trame__template_error": LOST,
-        "trame__template_main": text,
+        "trame__template_main": rendered(),
     })  # fmt: skip

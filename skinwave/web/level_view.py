@@ -50,7 +50,9 @@ def level_plot(levels: Levels, waves: Answer | None) -> PlotlyFigure:
     number = controls.NUMBERS[key]
     curves = [("kernel", f"{LABELS['point-kernel']}, dB SL", levels.kernel)]
     if waves is not None and levels.waves is not None and np.isfinite(levels.waves).any():
-        curves.append(("waves", f"waves ({waves.response.model}), dB SL", levels.waves))
+        of_waves, count = f"waves ({waves.response.model}), dB SL", np.isfinite(levels.waves).sum()
+        name = of_waves if levels.of == "waves" else f"{of_waves} (at {count} of {len(levels.at)})"
+        curves.append(("waves", name, levels.waves))
     data: list[dict[str, Any]] = []
     for role, name, own in curves:
         known = np.isfinite(own)
@@ -66,12 +68,13 @@ def level_plot(levels: Levels, waves: Answer | None) -> PlotlyFigure:
     ]  # fmt: skip
     best, names = levels.best, []
     if best is not None:
-        level = float(curves[-1][2][levels.at == best][0])
+        level = float(getattr(levels, levels.of)[levels.at == best][0])
         names = [{"x": best, "y": max(level, FAINTEST), "axis": "y",
                   "said": [f"{best:.3g} {number.unit}", f"{level:+.0f} dB"]}]  # fmt: skip
     words = number.label[0].lower() + number.label[1:] if key != "am" else number.label
     return {
-        "title": f"Sensation level at the point by {words}", "data": data,
+        "title": f"Sensation level at the point by {words} (highest: {levels.of})",  # never cut
+        "data": data,
         "kept": levels.view, "legend": True, "names": names,
         "x": {"said": f"{words}, {number.unit}", "range": [low, high]},
         "y": {"said": "sensation level, dB", "range": ends},

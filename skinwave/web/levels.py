@@ -33,9 +33,14 @@ class Levels:
     waves: Floats | None = None
 
     @property
+    def of(self) -> str:
+        """Whose level `best` is: of "waves" if these are known at all values, else "kernel"."""
+        return "kernel" if self.waves is None or np.isnan(self.waves).any() else "waves"
+
+    @property
     def best(self) -> float | None:
-        """The value with the highest level, of waves if that is known; None if none is."""
-        shown = self.kernel if self.waves is None or np.isnan(self.waves).all() else self.waves
+        """The value with the highest level; None if none is known."""
+        shown = self.waves if self.waves is not None and self.of == "waves" else self.kernel
         return float(self.at[np.nanargmax(shown)]) if np.isfinite(shown).any() else None
 
 

@@ -25,7 +25,7 @@ from simple_model.focus import lobe_width
 from simple_model.joined import parted
 from simple_model.load_spectrum import load_lines, path_fourier, path_samples
 from simple_model.tacton import CARRIER, level, tones
-from skinwave.run import ASSESSED
+from skinwave.run import ASSESSED, lines_beside
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.web.moving import Moving
@@ -124,8 +124,10 @@ def named_lines(scene: Scene, response: Response) -> tuple[LineAtPoint, ...]:
     """The lines of a load in a response, the strongest first; and by their kind peaks that are no
     single one of them, such as a free vibration.
     """
-    table = line_table(scene.pressure, response, candidates=ASSESSED, most=MOST_LINES,
-                       highest=HIGHEST, settle=UNTRUSTED)  # fmt: skip
+    table = line_table(
+        scene.pressure, response, candidates=ASSESSED, beside=lines_beside(scene, response),
+        most=MOST_LINES, highest=HIGHEST, settle=UNTRUSTED,
+    )  # fmt: skip
     surface = scene.reading.is_plain and response.record.of_body
     is_skin = surface and scene.body.is_skin
     peaks = table.unnamed[:MOST_PEAKS]

@@ -16,14 +16,13 @@ from skinwave.web.controls import KEYS, NUMBERS, OWN_BODY, Values
 from skinwave.web.downloads import offered
 from skinwave.web.examples import EXAMPLES
 from skinwave.web.history import History
-from skinwave.web.layer_values import text_of
+from skinwave.web.layer_values import PARTS, text_of
 from skinwave.web.level_view import LEVELS
 from skinwave.web.paths import STARTS_AT, fitted
 from skinwave.web.session import Session, draw, put, refresh, solid, take, vary
 
 SHORTEST = 1e-4  # s that the commanded Tacton is zoomed to
 LIKE = 20.0  # mm: paths of several foci begin no larger, to have place beside each other
-LAYER_PARTS = ("thickness", "modulus", "loss")
 LARGEST_FILE = 1_000_000  # bytes of a scene that a page sends
 
 
@@ -32,7 +31,7 @@ def connect(session: Session) -> None:
     watched: tuple[tuple[Callable[[Session], None], tuple[str, ...]], ...] = (
         (controlled, KEYS), (hold, ("hold",)),
         (look, ("span", "highest", "third", "decibel", "against")),
-        (phase, ("phase",)), (solid, ("solid",)), (opened, ("opened",)),
+        (solid, ("solid",)), (opened, ("opened",)),
         (published, ("published",)), (measurement, ("measured_file",)),
     )  # fmt: skip
     for answered, keys in watched:
@@ -132,10 +131,10 @@ def own_layer(session: Session, which: int, part: str, given: str) -> None:
     rows, (which,) = session.state.body_layers, map(int, numbers(which))
     if not 0 <= which < len(rows):
         return  # of a body that is not shown any more
-    part = choose("part of a layer", str(part), LAYER_PARTS)
-    values = [{name: row[name] for name in LAYER_PARTS} for row in rows]
+    part = choose("part of a layer", str(part), PARTS)
+    values = [{name: row[name] for name in PARTS} for row in rows]
     values[which][part] = str(given).strip().replace(",", ".").replace("/", "")
-    turn(session, {"layers": text_of([[row[name] for name in LAYER_PARTS] for row in values])})
+    turn(session, {"layers": text_of([[row[name] for name in PARTS] for row in values])})
 
 
 def select(session: Session, x: float, y: float) -> None:
@@ -176,6 +175,7 @@ def pin(session: Session) -> None:
     """Keep what is shown, to compare with; or let go of what was kept."""
     session.pinned = () if session.pinned else session.answers
     if session.pinned:
+        session.state.solid = False  # maps of both stand beside each other
         session.state.pinned_query = controls.to_query(session.values)
         session.state.pinned_path = session.state.path
     session.state.pinned = bool(session.pinned)
@@ -203,10 +203,11 @@ def zoom(session: Session, start: float | None = None, end: float | None = None)
     if start is None or end is None:
         session.zoomed = None
     else:
-        start, end = numbers(start, end)
+        start, end = (given / 1e3 for given in numbers(start, end))
         last = session.scene.tacton.duration
-        start = min(max(0.0, start / 1e3), last - SHORTEST)
-        session.zoomed = (start, min(max(end / 1e3, start + SHORTEST), last))
+        wide = min(max(end - start, SHORTEST), last)
+        start = min(max(0.0, start), last - wide)
+        session.zoomed = (start, start + wide)
     shown.commanded(session.state, session.scene, session.zoomed)
 
 
@@ -217,11 +218,6 @@ def hold(session: Session) -> None:
         state.held_frequency = session.scene.tacton.drawing_frequency
     elif not state.hold:
         state.errors = {key: said for key, said in state.errors.items() if key != "hold"}
-
-
-def phase(session: Session) -> None:
-    """The foci are to be seen elsewhere on their path."""
-    shown.foci(session.state, session.scene)
 
 
 def published(session: Session) -> None:
@@ -249,9 +245,10 @@ def highest_level(session: Session) -> None:
 
 
 def example(session: Session, name: str) -> None:
-    """Take a worked example."""
-    choose("example", str(name), EXAMPLES)
-    restart(session, EXAMPLES[str(name)].query)
+    """Take a worked example, in the view that shows what it says; what is pinned stays."""
+    one = EXAMPLES[choose("example", str(name), tuple(EXAMPLES))]
+    session.state.update({"solid": one.solid, "layers_open": one.layers, "against": False})
+    turn(session, controls.from_query(one.query)[0], whole=True)
 
 
 def measurement(session: Session) -> None:

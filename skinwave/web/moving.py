@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import fem
 from meshes.tetmesh import Floats, Ints, boundary_facets
@@ -37,7 +38,7 @@ class Moving:
     """
 
     shape: Shape
-    frames: Floats
+    frames: NDArray[np.float32]
     period: float
     repeats: bool
 
@@ -86,7 +87,7 @@ def moving_of(
     span, count = shown_part(pressure, seen.max(initial=0.0))
     t = np.arange(count) * span / count
     return Moving(
-        shape=shape, frames=synthesise(frequencies, upwards, t), period=span,
+        shape=shape, frames=synthesise(frequencies, upwards, t).astype(np.float32), period=span,
         repeats=seam(pressure.tacton, span) < CLOSED,
     )  # fmt: skip
 

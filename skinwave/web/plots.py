@@ -31,6 +31,8 @@ SPANS = {"first 60 ms": (0.0, 0.06), "first 20 ms": (0.0, 0.02), "last 60 ms": (
          "all": (0.0, np.inf)}  # fmt: skip
 BESIDE = 2.5  # of the largest of the curves: what is seen of a band
 ROOM = 1.4  # of the tallest line of a spectrum, for names above it
+APART = 10.0  # times that A and B differ to be drawn each over its largest
+RELATIVE = ", each over its largest"  # of what an axis says then
 DYNAMIC = 80.0  # dB below the tallest line that are seen
 KERNEL = f"{LABELS['point-kernel']}, Pa"
 PlotlyFigure = dict[str, Any]
@@ -40,7 +42,8 @@ PlotlyFigure = dict[str, Any]
 class Curves:
     """Responses in one plot: the `kernel` under the load of the `waves`, which are of other
     controls while `stale`; the kernel as `published`; those that are `pinned`; the `bands` of the
-    waves or, without any, of the kernel; `levels` over a control; and what was `measured`.
+    waves or, without any, of the kernel; `levels` over a control; and what was `measured`. With
+    what is pinned, of the `pinned_body`, waves have the name of their `body`.
     """
 
     kernel: Answer
@@ -51,6 +54,13 @@ class Curves:
     stale: bool = False
     levels: Levels | None = None
     measured: Measurement | None = None
+    body: str = ""
+    pinned_body: str = ""
+
+    @property
+    def pinned_waves(self) -> Answer | None:
+        """Waves that are pinned, if any are."""
+        return next((a for a in self.pinned if a.response.record.of_body), None)
 
 
 def numbers(values: Floats) -> list[float]:
@@ -112,10 +122,11 @@ def waveform_plot(curves: Curves, span: tuple[float, float]) -> PlotlyFigure:
         t, y = thinned(times[shown], answer.response.values[shown, 0])
         data.append({"x": numbers(1e3 * t), "y": numbers(_in_unit(answer) * y), **style})
     data += _measured(curves, measured.waveform, 1e3, span)
+    data, second, _ = _apart(data, curves)
     return {
         "title": "Waveform at the point", "data": data, "kept": f"{span}", "legend": True,
         "x": {"said": "time, ms", "range": [1e3 * float(end) for end in span]},
-        **_axes(data, _second(curves)),
+        **_axes(data, second),
     }  # fmt: skip
 
 
@@ -137,11 +148,13 @@ def spectrum_plot(
     if with_threshold:
         data.append(_threshold_curve(highest, of_waves=waves is not None))
     named = waves if waves is not None and not curves.stale else curves.kernel
+    data, second, one = _apart(data, curves)
+    tallest = _tallest(curves, highest, with_threshold)
     return {
         "title": "Spectrum at the point", "data": data, "kept": f"{highest}", "legend": True,
         "x": {"said": "frequency, Hz", "range": [0.0, float(highest)]},
-        "names": _names(named, highest),
-        **_axes(data, _second(curves), _tallest(curves, highest, with_threshold), ROOM),
+        "names": _names(named, highest, one if named is waves else 1.0),
+        **_axes(data, second, tallest and tallest / one, ROOM),
     }  # fmt: skip
 
 
@@ -152,7 +165,8 @@ def in_decibel(plot: PlotlyFigure) -> PlotlyFigure:
     for axis, unit in factors.items():
         top = 20 * np.log10(max(plot[axis]["range"][1] / ROOM, 1e-30))
         words = plot[axis]["said"].rpartition(", ")[0]
-        spans[axis] = {"said": f"{words}, dB re 1 {unit}",
+        relative = plot[axis]["said"].endswith(RELATIVE)
+        spans[axis] = {"said": f"{words}{RELATIVE}, dB" if relative else f"{words}, dB re 1 {unit}",
                        "range": [top - DYNAMIC, top + 0.2 * DYNAMIC]}  # fmt: skip
 
     def level(axis: str, values: list[float]) -> list[float]:
@@ -212,6 +226,36 @@ def _in_unit(answer: Answer) -> float:
     return answer.response.record.per_unit
 
 
+def _apart(data: list[dict[str, Any]], curves: Curves) -> tuple[list[dict[str, Any]], str, float]:
+    """Curves, what is said of the axis of waves, and what 1 on it is of those that are shown: A and
+    B each over its largest if these differ by more than `APART` times or are not of one quantity.
+    """
+    words, pinned = _second(curves), curves.pinned_waves
+    if pinned is None or curves.waves is None:
+        return data, words, 1.0
+    units = {role: answer.response.record.shown
+             for role, answer in (("waves", curves.waves), ("pinned", pinned))}  # fmt: skip
+    largest = {
+        role: max((abs(value) for curve in data if curve["axis"] == "y2" and curve["role"] == role
+                   and "low" not in curve for value in curve["y"]), default=0.0)
+        for role in units
+    }  # fmt: skip
+    low, high = sorted(largest.values())
+    if not low or (high <= APART * low and len(set(units.values())) == 1):
+        return data, words, 1.0
+
+    def over_largest(curve: dict[str, Any]) -> dict[str, Any]:
+        if curve["axis"] != "y2":
+            return curve
+        role = "pinned" if curve["role"] == "pinned" else "waves"
+        one, unit = largest[role], units[role]
+        scaled = {key: numbers(np.array(curve[key]) / one) for key in ("y", "low") if key in curve}
+        name = curve.get("name", "").replace(f", {unit}", f", 1 = {one:.3g} {unit}")
+        return curve | scaled | {"name": name}
+
+    return [over_largest(curve) for curve in data], f"waves{RELATIVE}", largest["waves"]
+
+
 def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
     """Curves with their styles in the order of the legend: kernels, waves, all pinned ones as A."""
     shown = "B: " if curves.pinned else ""
@@ -221,20 +265,21 @@ def _styled(curves: Curves) -> list[tuple[Answer, dict[str, Any]]]:
         found.append((curves.published, {"role": "published", "name": name, "width": 0.8}))
     found.append((curves.kernel, {"role": "kernel", "name": shown + KERNEL}))
     if curves.waves is not None:
-        style = {"role": "waves", "name": shown + waves_name(curves.waves, curves.stale),
+        body = curves.body if curves.pinned else ""
+        style = {"role": "waves", "name": shown + waves_name(curves.waves, curves.stale, body),
                  "opacity": STALE if curves.stale else 1.0}  # fmt: skip
         found.append((curves.waves, style))
     for answer in curves.pinned:
         of_kernel = not answer.response.record.of_body
-        name = KERNEL if of_kernel else waves_name(answer)
+        name = KERNEL if of_kernel else waves_name(answer, body=curves.pinned_body)
         style = {"role": "pinned", "name": f"A: {name}", "dash": "dot" if of_kernel else "dash"}
         found.append((answer, style))
     return [(a, style | {"axis": "y2" if a.response.record.of_body else "y"}) for a, style in found]
 
 
-def waves_name(answer: Answer, stale: bool = False) -> str:
-    """The name of waves in every legend, with their unit."""
-    return f"waves ({answer.response.model}), {answer.response.record.shown}" + (
+def waves_name(answer: Answer, stale: bool = False, body: str = "") -> str:
+    """The name of waves, or of their body, in every legend, with their unit."""
+    return f"{body or 'waves'} ({answer.response.model}), {answer.response.record.shown}" + (
         " — being computed" if stale else ""
     )
 
@@ -266,8 +311,11 @@ def _tallest(curves: Curves, highest: float, with_threshold: bool) -> float | No
     return _in_unit(waves) * max(most, least)
 
 
-def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
-    """Names over the strongest lines; with the level above threshold if there is one."""
+def _names(answer: Answer, highest: float, one: float = 1.0) -> list[dict[str, Any]]:
+    """Names over the strongest lines, where `one` is 1 on their axis; with the level above
+    threshold if there is one.
+    """
+    per = _in_unit(answer) / one
     shown: list[Any] = []
     for line in answer.lines:
         far = all(abs(line.frequency - other.frequency) > 0.08 * highest for other in shown)
@@ -275,7 +323,7 @@ def _names(answer: Answer, highest: float) -> list[dict[str, Any]]:
             shown.append(line)
     return [
         {
-            "x": round(line.frequency, 2), "y": float(f"{_in_unit(answer) * line.amplitude:.4g}"),
+            "x": round(line.frequency, 2), "y": float(f"{per * line.amplitude:.4g}"),
             "axis": "y2" if answer.response.record.of_body else "y",
             "said": [written(line.name)] + (
                 [f"{line.sensation:+.0f} dB"] if line.sensation is not None

@@ -68,12 +68,17 @@ class Session:
         self._beside: asyncio.TimerHandle | None = None
         self._resting: asyncio.TimerHandle | None = None
         self.state.update({**self.good, **shown.first(own)})
-        self.state.client_only("draft", "helped", "hue")
+        self.state.client_only("draft", "helped", "hue", "phase")
 
     @property
     def values(self) -> Values:
         """Values of the controls."""
         return {key: self.state[key] for key in KEYS}
+
+    @property
+    def pinned_body(self) -> str:
+        """Name of the body that is pinned."""
+        return shown.body_named(controls.values_in(self.state.pinned_query)["body"])
 
     @property
     def answers(self) -> tuple[Answer, ...]:
@@ -237,6 +242,7 @@ def draw(session: Session) -> None:
             kernel=session.kernel, waves=session.waves, published=session.published,
             pinned=session.pinned, bands=session.bands, stale=bool(session.state.waves_stale),
             levels=session.levels, measured=session.measured,
+            body=shown.body_named(session.good["body"]), pinned_body=session.pinned_body,
         )  # fmt: skip
         shown.commanded(session.state, session.scene, session.zoomed)
         shown.plotted(session.state, session.scene, curves)
@@ -245,7 +251,6 @@ def draw(session: Session) -> None:
 
 def _beside(session: Session, curves: plots.Curves) -> None:
     """Maps, table and sentences beside the curves."""
-    shown.foci(session.state, session.scene)
     shown.answers(session.state, session.scene, curves)
     session.state.differs = (
         shown.differs(controls.values_in(session.state.pinned_query), session.good)

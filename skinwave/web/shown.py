@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import MovingPressure, named_lines, published
+from simple_model import MovingPressure, Tacton, named_lines, published
 from simple_model.line_names import line_names
+from simple_model.numbers import stated_error
 from simple_model.quantities import DISPLACEMENT
+from skinwave.pictures.styles import LABELS
 from skinwave.propagation import share_outside
 from skinwave.scene import Body, Scene
-from skinwave.web import drawings, guided, measured, model, moving, plots
+from skinwave.web import drawings, guided, insets, measured, model, moving, plots
 from skinwave.web.controls import CHOICES, KEYS, NAMES, OWN_BODY, Values, said
 from skinwave.web.level_view import LEVELS, level_plot
 from skinwave.web.levels import above_threshold, has_threshold
@@ -19,8 +21,14 @@ from skinwave.web.plots import Curves
 
 NAMED = 3  # lines that a sentence names
 PRESENT = 1e-2  # of the strongest line of a load: one that is named
+PHASES = 100  # of a drawing period, at which foci can be seen
 HIGHEST = (300, 600, 1000)  # Hz of the spectrum
 THIRD = ("spectrum", "dispersion", *LEVELS)  # what the third plot shows
+
+
+def body_named(name: str) -> str:
+    """Name of a body in sentences and legends."""
+    return LABELS.get(name, name.replace("-", " "))
 
 
 def bodies(own: Body | None) -> list[str]:
@@ -36,16 +44,17 @@ def first(own: Body | None) -> dict[str, Any]:
         "hold": False, "held_frequency": 0.0, "drawing_frequency": 0.0,
         "phase": 0, "pulse": 0, "rhythm_span": 0,
         "span": next(iter(plots.SPANS)), "highest": HIGHEST[1], "third": THIRD[0],
-        "dark": False, "solid": False, "decibel": False, "against": False, "helped": "",
+        "dark": False, "solid": True, "decibel": False, "against": False, "helped": "",
         "measured_file": None, "measured_said": "", "pinned_path": "", "hue": 0,
         "summary": [], "uncertainty": [], "warnings": [], "expected": "", "published": False,
         "pinned": False, "pinned_query": "", "differs": [],
         "query": "", "undoable": False, "redoable": False,
         "about": False, "draft": {}, "drawer": None, "opened": None, "bodies": bodies(own),
         "body_layers": [],
-        "path": "", "influenced": "", "own_speeds": "", "foci_at": [], "rows": [], "unresolved": "",
-        "lines_unit": "µm",
+        "path": "", "influenced": "", "own_speeds": "", "foci_track": [], "rows": [],
+        "unresolved": "", "lines_unit": "µm",
         "kernel_map": _map(None), "wave_map": _map(None), "pinned_map": _map(None),
+        "insets": {}, "levels_of": "", "layers_open": False,
         "body_shape": {}, "body_motion": {},
     }  # fmt: skip
 
@@ -56,22 +65,26 @@ def plotted(state: Any, scene: Scene, curves: Curves) -> None:
     state.update({
         "waveform_plot": plots.waveform_plot(curves, span),
         "spectrum_plot": third_plot(state, scene, curves),
+        "levels_of": curves.levels.of if curves.levels else "",
     })  # fmt: skip
 
 
 def answers(state: Any, scene: Scene, curves: Curves) -> None:
     """Maps, table and sentences of responses."""
     kernel, waves, stale, tacton = curves.kernel, curves.waves, curves.stale, scene.tacton
-    bands = curves.bands
+    bands, pinned = curves.bands, curves.pinned_waves
     state.update({
+        "foci_track": foci_track(tacton),
         "lines_unit": scene.reading.asked.shown,
         "path": drawings.drawn(model.drawn_paths(tacton)),
         "influenced": drawings.drawn(model.influenced(tacton, scene.pressure.height)),
-        "kernel_map": _map(kernel),
-        "wave_map": _against(waves, kernel) if waves and state.against else _map(waves),
-        "pinned_map": _map(next((a for a in curves.pinned if a.response.record.of_body), None)),
+        "kernel_map": _map(kernel, "Kernel, same load"),
+        "wave_map": _of_waves(curves, bool(state.against)),
+        "pinned_map": _map(pinned, f"A: {curves.pinned_body}"),
+        "insets": insets.beside(scene),
         "own_speeds": drawings.speeds(tacton) if tacton.trajectory.shape == "recorded" else "",
-        "rows": drawings.rows(kernel, None if stale else waves, bands.levels if bands else {}),
+        "rows": drawings.rows(kernel, None if stale else waves, bands.levels if bands else {},
+                              pinned),
         "uncertainty": list(bands.sentences) if bands else [],
         "measured_said": _measured(curves),
         "unresolved": unresolved(
@@ -79,7 +92,7 @@ def answers(state: Any, scene: Scene, curves: Curves) -> None:
         ),
     })  # fmt: skip
     told = [kernel] if waves is None or stale else [kernel, waves]
-    state.summary = summary(scene, told)
+    state.summary = [*summary(scene, told), *beside_pinned(curves)]
     state.update({"warnings": warnings(told), "expected": expected(told[-1])})
     seen = waves.moving if waves else None
     if seen is not None and not stale:
@@ -125,6 +138,24 @@ def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
     ]
 
 
+def beside_pinned(curves: Curves) -> list[str]:
+    """Sentence on the strongest lines of what is pinned, A, and of what is shown, B."""
+    a, b = curves.pinned_waves, curves.waves
+    if a is None or b is None or curves.stale:
+        return []
+    each = [f"{_strongest(a)} of A, {curves.pinned_body}", f"{_strongest(b)} of B, {curves.body}"]
+    return [f"Strongest line at the point: {'; '.join(each)}."]
+
+
+def _strongest(answer: Answer) -> str:
+    record = answer.response.record
+    line = next((line for line in answer.lines if line.frequency > 0), None)
+    if line is None:
+        return f"0 {record.shown}"
+    size = f"{record.per_unit * line.amplitude:.3g} {record.shown}"
+    return f"{size} at {line.frequency:.0f} Hz ({line.name})"
+
+
 def added_names(pressure: MovingPressure) -> list[str]:
     """Lines of a load that it lacks as published, the strongest first: what drive law and focus
     add.
@@ -142,7 +173,7 @@ def warnings(answers: Sequence[Answer]) -> list[str]:
 def expected(answer: Answer) -> str:
     """Expected relative error of a response, in words, if it has one."""
     error = getattr(answer.response, "expected_error", np.nan)
-    return f"Expected numerical error: {100 * error:.2g} %" if error > 0 else ""
+    return f"Expected numerical error: {stated_error(error)}" if error > 0 else ""
 
 
 def differs(pinned: Values, values: Values) -> list[dict[str, str]]:
@@ -168,12 +199,11 @@ def commanded(state: Any, scene: Scene, zoom: tuple[float, float] | None) -> Non
     state.commanded_plot = plots.commanded_plot(scene.pressure, *between)
 
 
-def foci(state: Any, scene: Scene) -> None:
-    """The foci where they are at the chosen part of a drawing period."""
-    tacton = scene.tacton
-    part = state.phase / 100 / tacton.n_paths
-    at = tacton.trajectory.at_phase([(part + phase) % 1 for phase in tacton.foci])
-    state.foci_at = [[round(1e3 * float(x), 2), round(-1e3 * float(y), 2)] for x, y in at]
+def foci_track(tacton: Tacton) -> list[list[list[float]]]:
+    """Places of the foci at each per cent of a drawing period, x and -y in mm as on a map."""
+    parts = np.arange(PHASES) / PHASES / tacton.n_paths
+    at = [tacton.trajectory.at_phase((parts + phase) % 1) for phase in tacton.foci]
+    return np.round(np.stack(at, axis=1) * [1e3, -1e3], 2).tolist()
 
 
 def _measured(curves: Curves) -> str:
@@ -188,17 +218,29 @@ def _measured(curves: Curves) -> str:
     return " ".join([said, *found.remarks])
 
 
-def _against(waves: Answer, kernel: Answer) -> dict[str, Any]:
-    """Map of by how many dB the waves are above the kernel, each re its own largest."""
+def _of_waves(curves: Curves, against: bool) -> dict[str, Any]:
+    """Map of the waves or, `against` the kernel, of by how many dB they are above it, each re its
+    own largest.
+    """
+    waves = curves.waves
+    found = _map(waves, f"B: {curves.body}" if curves.pinned else "Waves")
+    if waves is None or not against:
+        return found
     ends = [f"{end:+.0f} dB" if end else "0" for end in (-drawings.DEEPEST, 0, drawings.DEEPEST)]
-    return _map(waves) | {"picture": drawings.difference(waves.map, kernel.map), "ends": ends}
+    return found | {
+        "picture": drawings.difference(waves.map, curves.kernel.map), "ends": ends,
+        "said": "RMS re largest, less the kernel's", "signed": True,
+    }  # fmt: skip
 
 
-def _map(answer: Answer | None) -> dict[str, Any]:
+def _map(answer: Answer | None, title: str = "") -> dict[str, Any]:
+    """Map with its `title`, what it `said`, and whether its colours are `signed`."""
+    words = {"title": title, "signed": False}
     if answer is None:
-        return {"picture": "", "threshold": "", "ends": []}
+        return words | {"picture": "", "threshold": "", "ends": [], "said": ""}
     found, unit = answer.map, "m" if answer.response.record.of_body else "Pa"
-    return {
+    return words | {
+        "said": "RMS displacement, µm" if unit == "m" else "RMS pressure, Pa",
         "picture": drawings.picture(found),
         "threshold": drawings.drawn(found.threshold),
         "ends": drawings.ends(float(np.nanmax(found.rms, initial=0.0)), unit),

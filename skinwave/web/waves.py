@@ -34,7 +34,7 @@ from simple_model.prony import FIT_TOLERANCE
 from simple_model.response import step
 from skinwave.bodies.build import Build, build, operators
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Clock, Progress
+from skinwave.effort import Clock, Progress, silent
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import probe_rows, surface_load
 from skinwave.models.prepared import in_motion, sample_times
@@ -49,6 +49,7 @@ from skinwave.models.reduction import (
     select_lines,
 )
 from skinwave.planning.assessment import sentences
+from skinwave.planning.warnings import NONLINEAR
 from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
 from skinwave.web.free_bodies import FreeBody, can_be_free, covers, free_body, reduced_at
@@ -68,6 +69,8 @@ from skinwave.web.moving import Shape, moving_of, skin_of, slab_shape
 from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, tabulate, wavenumbers
 
 TAIL = 0.4  # s that motion may last after the Tacton
+# What a warning says instead of the name of a model, of which a page has linear ones alone.
+ON_PAGE = "save the scene and compute it with the model fem-nonlinear, which a page has not"
 FINER = 8  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
@@ -101,7 +104,7 @@ class BodyResponses:
 
     def __init__(self) -> None:
         self._kept: dict[str, dict[Any, Any]] = {
-            "known": {}, "table": {}, "body": {}, "reduced": {}, "free": {}
+            "known": {}, "beside": {}, "table": {}, "body": {}, "reduced": {}, "free": {}
         }  # fmt: skip
 
     def __call__(
@@ -124,23 +127,33 @@ class BodyResponses:
         return warned_of(scene, reduced_answer(body, scene, moving))
 
     def level(self, scene: Scene) -> float:
-        """Level of a scene's probe as `levels.level_of`; nan where it would take another table of
-        wavenumbers or reduction, or the probe reads something else than the threshold is of.
+        """Level of a scene's probe as `levels.level_of`; nan where it would take another reduction,
+        or the probe reads something else than the threshold is of.
         """
         if not (scene.body.is_skin and scene.reading.is_plain):
             return float("nan")
         if is_tabulated(scene.body):
-            known = self._kept["known"].get((scene.body, lowest(scene.pressure.height)))
-            kept = self._kept["table"].get((scene.body, scene.pressure.height))
-            if known is None:
+            try:
+                lines = flat_lines(self._table_beside(scene), scene)
+            except ArithmeticError:  # no grid of wavenumbers is fine enough
                 return float("nan")
-            lines = flat_lines(kept or tabulate(known, scene.pressure.height), scene)
         else:
             body = self._kept["reduced"].get(_reduction(scene))
             if body is None:
                 return float("nan")
             lines = reduced_lines_at(body, scene)
         return level_of(scene, *lines)
+
+    def _table_beside(self, scene: Scene) -> Table:
+        """Table of a scene's height, beside those of moves, which stay cached."""
+        height = scene.pressure.height
+        if (kept := self._kept["table"].get((scene.body, height))) is not None:
+            return kept
+        wide = scene.body, lowest(height)
+        known = self._kept["known"].get(wide)
+        if known is None:
+            known = self._keep("beside", wide, lambda: wavenumbers(*wide, silent))
+        return tabulate(known, height)
 
     def _reduce(self, scene: Scene, progress: Progress) -> Reduced:
         clock = Clock()
@@ -192,7 +205,8 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
     response = answer.response
     if is_tabulated(scene.body) and scene.body.sides == "absorbing":
         return answer  # an infinite slab, whose sides reflect nothing
-    said = sentences(scene, response, h=default_size(scene.body))
+    found = sentences(scene, response, h=default_size(scene.body))
+    said = tuple(sentence.replace(NONLINEAR, ON_PAGE) for sentence in found)
     effort = replace(response.effort, warnings=said)
     return replace(answer, response=replace(response, effort=effort))
 

@@ -1,7 +1,5 @@
 // The body in three dimensions: its surface as drawing.py sends it, moved through one period.
 (() => {
-  const LASTS = 4000; // ms that a period lasts on the screen at least
-  const SLOWED = 250; // times that a long one is slowed down
   const VERTEX = `#version 300 es
     in vec3 place; in float before; in float after;
     uniform mat3 turn; uniform vec3 middle; uniform vec2 size; uniform float part, drawn;
@@ -33,9 +31,7 @@
       colour = vec4(shown * light, 1.0);
     }`;
   let shown = null; // the body that is drawn
-  const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const view = { turned: -0.5, tipped: 0.95, near: 1, at: 0, playing: !still, last: null, cut: 1,
-                 hue: 0 };
+  const view = { turned: -0.5, tipped: 0.95, near: 1, at: 0, cut: 1, hue: 0 };
 
   function program(gl) {
     const made = gl.createProgram();
@@ -144,12 +140,10 @@
   function said({ motion }) {
     const slider = document.getElementById("body-time"), time = view.at * motion.period;
     const now = `${time.toFixed(2)} of ${motion.period.toFixed(2)} ms`;
-    if (document.activeElement !== slider || view.playing) slider.value = 1000 * view.at;
+    if (document.activeElement !== slider || window.trame.utils.skinwave.playing)
+      slider.value = 1000 * view.at;
     slider.setAttribute("aria-valuetext", now);
     document.getElementById("body-now").textContent = now;
-    const button = document.getElementById("body-play");
-    button.textContent = view.playing ? "❚❚" : "▶";
-    button.setAttribute("aria-label", view.playing ? "Pause" : "Play one period again and again");
   }
 
   function listen(at) {
@@ -176,20 +170,14 @@
       if (keys[event.key]) turn(...keys[event.key]);
       else if (event.key === "+") nearer(1.1);
       else if (event.key === "-") nearer(1 / 1.1);
-      else if (event.key === " ") play();
+      else if (event.key === " ") window.trame.utils.skinwave.play();
       else return;
       event.preventDefault();
     });
-    const play = () => {
-      view.playing = !view.playing;
-      view.last = null;
-      draw(at);
-    };
-    document.getElementById("body-play").onclick = play;
     document.getElementById("body-time").oninput = (event) => {
-      view.playing = false;
-      view.at = event.target.value / 1000;
-      draw(at);
+      const { skinwave } = window.trame.utils;
+      skinwave.play(false);
+      skinwave.show((event.target.value / 1000) * at.motion.period);
     };
     document.getElementById("body-clip").oninput = (event) => {
       view.cut = event.target.value / 100;
@@ -202,7 +190,6 @@
   // The body as it is at a time in ms, if it is seen.
   function show(time) {
     if (!shown?.motion || !shown.canvas.isConnected) return;
-    view.playing = false;
     view.at = (time / shown.motion.period) % 1;
     draw(shown);
   }
@@ -212,7 +199,7 @@
     if (document.fullscreenElement) document.exitFullscreen(); else whole.requestFullscreen();
   }
 
-  // Begin to draw on a canvas that has just come; all ends when it goes.
+  // Begin to draw on a canvas that has just come; `end` as it goes.
   function begin(state) {
     const canvas = document.getElementById("body-view");
     const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
@@ -235,25 +222,15 @@
       state.watch(["body_motion"], (motion) => {
         if (!motion?.frames) return;
         moved(at, motion);
-        if (!view.playing) draw(at);
+        draw(at);
+        window.trame.utils.skinwave.came();
       }),
     ];
-    const next = (now) => {
-      if (!canvas.isConnected) {
-        ends.forEach((end) => end?.());
-        gl.getExtension("WEBGL_lose_context")?.loseContext();
-        return;
-      }
-      if (view.playing && !document.hidden) {
-        const lasts = Math.max(LASTS, SLOWED * (at.motion?.period ?? 0));
-        view.at = (view.at + (view.last === null ? 0 : now - view.last) / lasts) % 1;
-        draw(at);
-      }
-      view.last = now;
-      requestAnimationFrame(next);
+    at.end = () => {
+      ends.forEach((end) => end?.());
+      gl.getExtension("WEBGL_lose_context")?.loseContext();
     };
-    requestAnimationFrame(next);
   }
 
-  window.trame.utils.body = { begin, view, show, full };
+  window.trame.utils.body = { begin, view, show, full, end: () => shown?.end() };
 })();

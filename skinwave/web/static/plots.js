@@ -7,6 +7,7 @@
   const MODES = [1, 2, 3, 4, 5, 6].map((n) => `mode${n}`); // roles of dispersion curves
   const LEAST_DRAG = 6; // pixels that are no click any more
   const SNAP = 9; // pixels
+  const SEEN = 3; // pixels that a peak is high at least, and away from the one before
   const shown = {}; // by id of the canvas: { canvas, figure, zoom, drag, value }
 
   // About `count` round numbers between two others.
@@ -233,39 +234,55 @@
     return placed;
   }
 
+  // The peaks of all curves but of bands and marks: each with its value and its height in pixels,
+  // of which less is higher.
+  function* peaks({ figure }, to) {
+    for (const curve of figure.data) {
+      if (curve.low || ["threshold", "pinned"].includes(curve.role)) continue;
+      for (let k = 1; k + 1 < curve.y.length; k++)
+        if (curve.y[k] > curve.y[k - 1] && curve.y[k] >= curve.y[k + 1])
+          yield { value: xOf(curve, k), high: to[curve.axis](curve.y[k]) };
+    }
+  }
+
   // The value on the axis where the pointer is or, on a spectrum, of the peak that it is next to.
   function snapped(plot, pixel) {
     const { box, range, to } = scales(plot);
     const back = (x) => range[0] + ((x - box.x) / box.w) * (range[1] - range[0]);
     let best = null;
-    for (const curve of plot.figure.data) {
-      if (!plot.figure.names || curve.low || ["threshold", "pinned"].includes(curve.role)) continue;
-      for (let k = 1; k + 1 < curve.y.length; k++) {
-        if (!(curve.y[k] > curve.y[k - 1] && curve.y[k] >= curve.y[k + 1])) continue;
-        const away = Math.abs(to.x(xOf(curve, k)) - pixel);
-        const high = to[curve.axis](curve.y[k]); // pixels: less is higher
-        if (away <= SNAP && (!best || high < best.high)) best = { high, value: xOf(curve, k) };
-      }
-    }
+    for (const peak of plot.figure.names ? peaks(plot, to) : [])
+      if (Math.abs(to.x(peak.value) - pixel) <= SNAP && (!best || peak.high < best.high)) best = peak;
     return best ? best.value : back(pixel);
   }
 
-  // A cursor at a value of a plot, and at the same time of the other plots over time.
-  function point(plot, value) {
+  // The next peak that is seen after or before the cursor; the end of the axis where there is none.
+  function next(plot, way) {
+    const { box, range, to } = scales(plot), [low, high] = range;
+    const from = plot.value ?? (way > 0 ? low : high), step = (SEEN * (high - low)) / box.w;
+    let found = way > 0 ? high : low;
+    for (const { value, high: top } of peaks(plot, to)) {
+      const seen = top < to.y(0) - SEEN && value >= low && value <= high;
+      if (seen && way * (value - from) > step && way * (found - value) > 0) found = value;
+    }
+    return found;
+  }
+
+  // A cursor at a value of a plot, and at the same time of the other plots over time; of one that
+  // moves by itself, values are not read out.
+  function point(plot, value, moving = false) {
     for (const other of Object.values(shown)) {
       const same = other === plot || other.figure?.x.said === plot.figure.x.said;
       if (!other.figure || !same) continue;
-      other.value = value;
+      [other.value, other.moving] = [value, moving];
       draw(other);
     }
   }
 
-  // The value of each curve where the cursor is.
-  function readout(g, { box, range, to, w }, plot, ink, paper) {
-    const value = plot.value, x = to.x(value);
-    if (value < range[0] || value > range[1]) return;
+  // The place of the cursor and the value of each curve there, in words.
+  function read(plot) {
+    const { value } = plot;
     const at = (c) => value >= xOf(c, 0) && value <= xOf(c, c.y.length - 1);
-    const said = plot.figure.data.filter((c) => c.name && !c.mirrored && at(c)).map((curve) => {
+    const said = plot.figure.data.filter((c) => c.name && at(c)).map((curve) => {
       let low = 0, high = curve.y.length - 1;
       while (high - low > 1) {
         const middle = (low + high) >> 1;
@@ -275,17 +292,27 @@
       const least = curve.low ? `${curve.low[k].toPrecision(4)} .. ` : "";
       return `${curve.name} ${least}${curve.y[k].toPrecision(4)}`;
     });
+    return [`${value.toPrecision(5)}:`, ...said.map((one, k) => one + (k + 1 < said.length ? ";" : ""))];
+  }
+
+  function readout(g, { box, range, to, w }, plot, ink, paper) {
+    const value = plot.value, x = to.x(value);
+    if (value < range[0] || value > range[1]) return;
     g.fillStyle = ink;
     g.fillRect(x, box.y, 1, box.h);
-    const all = `${value.toPrecision(5)}: ${said.join("; ")}`;
+    if (plot.moving) return;
     g.font = `11px ${FONT}`;
-    const wide = g.measureText(all).width, left = Math.max(2, Math.min(x + 6, w - wide - 6));
+    const parts = read(plot), all = parts.join(" ");
+    const rows = g.measureText(all).width < w - 12 ? [all] : parts;
+    const top = box.y + box.h - 16 * rows.length;
+    const wide = Math.max(...rows.map((row) => g.measureText(row).width));
+    const left = Math.max(2, Math.min(x + 6, w - wide - 6));
     g.fillStyle = paper;
-    g.fillRect(left - 3, box.y + box.h - 18, wide + 6, 16);
+    g.fillRect(left - 3, top - 2, wide + 6, 16 * rows.length);
     g.fillStyle = ink;
     g.textAlign = "left";
     g.textBaseline = "middle";
-    g.fillText(all, left, box.y + box.h - 10);
+    rows.forEach((row, k) => g.fillText(row, left, top + 6 + 16 * k));
   }
 
   function draw(plot) {
@@ -336,10 +363,21 @@
     draw(plot);
   }
 
+  // Zoom and move, within what there is; of a figure that `asks` its session keeps within.
   function nearer(plot, factor, shift) {
     const [low, high] = plot.zoom || plot.figure.x.range;
-    const middle = (low + high) / 2 + shift * (high - low), half = ((high - low) / 2) * factor;
-    zoomed(plot, [middle - half, middle + half]);
+    let [first, last] = plot.figure.x.range;
+    if (plot.figure.asks) [first, last] = [-Infinity, Infinity];
+    const wide = Math.min((high - low) * factor, last - first);
+    const start = (low + high) / 2 + shift * (high - low) - wide / 2;
+    const begin = Math.min(Math.max(start, first), last - wide);
+    zoomed(plot, [begin, begin + wide]);
+  }
+
+  // The cursor goes to the next peak, whose values are told.
+  function tell(plot, way) {
+    point(plot, next(plot, way));
+    document.getElementById("plot-said").textContent = `${plot.figure.x.said} ${read(plot).join(" ")}`;
   }
 
   function listen(plot) {
@@ -370,7 +408,9 @@
     const keys = { "+": [0.5, 0], "-": [2, 0], ArrowLeft: [1, -0.25], ArrowRight: [1, 0.25] };
     canvas.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || !plot.figure) return;
-      if (keys[event.key]) nearer(plot, ...keys[event.key]);
+      const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (event.shiftKey && way) tell(plot, way);
+      else if (keys[event.key]) nearer(plot, ...keys[event.key]);
       else if (event.key === "Home" || event.key === "0") zoomed(plot, null);
       else return;
       event.preventDefault();
@@ -396,5 +436,9 @@
     state.watch(["dark"], () => setTimeout(() => Object.values(shown).forEach(draw), 50));
   }
 
-  window.trame.utils.plots = { begin, shown, point };
+  // What part of a figure is zoomed to, by its key.
+  const zooms = () => Object.entries(shown).filter(([, plot]) => plot.zoom)
+    .map(([key, plot]) => `${key}:${plot.zoom.join(":")}`);
+
+  window.trame.utils.plots = { begin, zooms, shown, point };
 })();

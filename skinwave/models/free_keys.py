@@ -1,0 +1,262 @@
+"""Free keys of a body: their ranges, and the bodies that values of them make."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import isfinite, log
+from typing import Any
+
+import numpy as np
+
+from fem.materials import Material
+from meshes.tetmesh import Floats
+from simple_model.choices import choose
+from skinwave.bodies import Body
+from skinwave.bodies.parts import solid_of
+from skinwave.scene_keys import MATERIAL, PRONY, SECTIONS, with_key, write_material
+
+THICKNESS = ("thickness_mm",)  # path of a key
+MOST_THICKNESSES = 2
+FIXED = ("poisson", "law", "table")  # keys of a material that are no number, or change the matrices
+MOST_CORNERS = 16
+OUTSIDE = 1e-9  # of a range: round-off by which a value may be beyond it
+Part = int | str | None  # of a body: a layer, a region by its name, or what is in neither
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeKey:
+    """A number of a body that is free from `low` to `high`: its `key` in a scene file, the `part`
+    that it is of, and the `path` in the material's table, or `THICKNESS`.
+    """
+
+    key: str
+    part: Part
+    path: tuple[str, ...]
+    low: float
+    high: float
+
+    def at(self, share: float) -> float:
+        """Value at a share 0 to 1 of the range, of its logarithm if that is finite."""
+        if self.low > 0:
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + share * (self.high - self.low))
+
+    def share(self, value: float) -> float:
+        """Share of the range at a value, the inverse of `at`."""
+        if self.low > 0:
+            return log(value / self.low) / log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    @property
+    def is_thickness(self) -> bool:
+        """Whether it changes the mesh."""
+        return self.path == THICKNESS
+
+
+def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
+    """Free keys of a body, checked.
+
+    Raises
+    ------
+    ValueError
+        If a key is none that can be free, or its range is none.
+    """
+    if not free:
+        raise ValueError("free = {} names no key; give one, such as body.material.shear_modulus_pa")
+    found = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
+    _check_thicknesses(body, [key for key in found if key.is_thickness])
+    for layers in (0.0, 1.0):  # what materials and bodies refuse, they refuse here
+        for below in (0.0, 1.0):
+            shares = [below if key.part is None else layers for key in found]
+            with_values(body, found, values_at(found, shares))
+    return found
+
+
+def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
+    """Body with values of its free keys.
+
+    Parameters
+    ----------
+    body : Body
+    keys : its free keys
+    values : by key, one for each
+
+    Returns
+    -------
+    Body
+
+    Raises
+    ------
+    ValueError
+        If a value is missing, out of its range, or not of a free key.
+    """
+    if strange := sorted(set(values) - {key.key for key in keys}):
+        raise ValueError(
+            f"'{strange[0]}' is not free; free it as well, or leave it out: free are "
+            f"{', '.join(key.key for key in keys)}"
+        )
+    thick = {key.part: _value(key, values) / 1e3 for key in keys if key.is_thickness}
+    for part in dict.fromkeys(key.part for key in keys if not key.is_thickness):
+        table = write_material(solid_at(body, part))
+        for key in (key for key in keys if key.part == part and not key.is_thickness):
+            table = _changed(table, key.path, _value(key, values))
+        solid = SECTIONS["body"]["material"].read("material", table)
+        body = _with_material(body, part, solid)
+    return _with_thicknesses(body, thick) if thick else body
+
+
+def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, float]:
+    """Values by key at shares (k,) of the ranges, 0 to 1."""
+    return {key.key: key.at(share) for key, share in zip(keys, shares, strict=True)}
+
+
+def training_shares(count: int, inside: int) -> Floats:
+    """Corners (at most `MOST_CORNERS`), the middle, and so many further points inside of a unit
+    cube of `count` dimensions: shares (t, count), the same each time.
+    """
+    corners = np.array(list(product((0.0, 1.0), repeat=count)))
+    if len(corners) > MOST_CORNERS:
+        corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
+    few = np.vstack([corners, np.full((1, count), 0.5)])
+    if not inside:
+        return few
+    from scipy.stats import qmc  # which takes long to import
+
+    return np.vstack([few, qmc.Sobol(count, rng=0).random(inside)])
+
+
+def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
+    """Shares (k,) of the ranges of the body that is meshed: the largest thicknesses, and the
+    fastest shear waves below all layers, for which an absorbing layer is widest; layers of one
+    range differ, so that their elements do.
+    """
+    fastest = {"shear_modulus_pa": 1.0, "density_kg_m3": 0.0}
+    inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
+    return tuple(
+        1.0 if key.is_thickness else fastest.get(key.path[0], x) if key.part is None else x
+        for key, x in zip(keys, inside, strict=True)
+    )
+
+
+def solid_at(body: Body, part: Part) -> Material:
+    """Material of a part of a body."""
+    if part is None:
+        return body.solid
+    if isinstance(part, str):
+        return solid_of(dict(body.regions)[part])
+    return solid_of(body.layers[part].material)
+
+
+def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
+    part, path = _part(body, key)
+    known = [name for name in MATERIAL if name not in FIXED]
+    if path[0] in FIXED:
+        raise ValueError(
+            f"'{key}' cannot be free: only moduli, losses, times and densities change none of a "
+            "body's matrices; reduce a body for each value of it"
+        )
+    if (*path,) != THICKNESS:
+        choose(f"free key '{key}'", path[0], known)
+    if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
+        raise ValueError(f"'{key}' is no number of a Prony term; name one as prony.0.modulus_pa")
+    low, high = (float(bound) for bound in bounds)
+    if not (isfinite(low) and isfinite(high) and low < high):
+        raise ValueError(
+            f"{key} is free from {low:g} to {high:g}; give a finite range, low to high"
+        )
+    return FreeKey(key=key, part=part, path=tuple(path), low=low, high=high)
+
+
+def _part(body: Body, key: str) -> tuple[Part, list[str]]:
+    """The part of a body that a key is of, and the path in it."""
+    parts = key.split(".")
+    if parts[:2] == ["body", "regions"] and len(parts) > 3:
+        if parts[2] not in dict(body.regions):
+            raise ValueError(
+                f"'{key}' is of a region whose material the scene does not give; it gives those of "
+                f"{', '.join(dict(body.regions)) or 'none'}"
+            )
+        return parts[2], parts[3:]
+    is_thickness = parts[0] == "body" and (*parts[-1:],) == THICKNESS
+    if parts[:2] == ["body", "layers"] and (
+        (len(parts) > 4 and parts[3] == "material") or (len(parts) == 4 and is_thickness)
+    ):
+        if not (parts[2].isdecimal() and int(parts[2]) < len(body.layers)):
+            raise ValueError(
+                f"'{key}' is of a layer that the body has not; it has {len(body.layers)}, counted "
+                "from 0"
+            )
+        return int(parts[2]), parts[4:] or parts[3:]
+    if len(parts) == 2 and is_thickness:
+        return None, parts[1:]
+    if parts[:2] != ["body", "material"] or len(parts) < 3:
+        raise ValueError(
+            f"'{key}' cannot be free: one reduced body serves materials and thicknesses alone; "
+            "free keys of body.material, body.layers.0.material or body.regions.bone, "
+            "body.thickness_mm or body.layers.0.thickness_mm, and reduce a body for each value of "
+            "others"
+        )
+    return None, parts[2:]
+
+
+def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
+    """Refuse thicknesses that do not move one mesh."""
+    if not keys:
+        return
+    kind = body.of_kind
+    if kind.morph is None:
+        raise ValueError(
+            f"'{keys[0].key}' cannot be free: the matrices of a {body.kind} are no sums over its "
+            "thicknesses; free those of a slab, or reduce a body for each value"
+        )
+    if len(keys) > MOST_THICKNESSES:
+        raise ValueError(
+            f"{len(keys)} thicknesses are free, the limit is {MOST_THICKNESSES}; each multiplies "
+            "the meshes that a body is interpolated between"
+        )
+    if low := [key.key for key in keys if not key.low > 0]:
+        raise ValueError(f"{low[0]} is free from 0 or below; give a least value above 0")
+
+
+def _with_thicknesses(body: Body, thick: Mapping[Part, float]) -> Body:
+    """Body with other thicknesses in metre of some layers, and of all of it."""
+    layers = tuple(
+        replace(layer, thickness=thick.get(k, layer.thickness))
+        for k, layer in enumerate(body.layers)
+    )
+    return replace(body, layers=layers, depth=thick.get(None, body.depth))
+
+
+def _value(key: FreeKey, values: Mapping[str, float]) -> float:
+    if key.key not in values:
+        raise ValueError(f"the values lack {key.key}, which is free; give it")
+    value, slack = float(values[key.key]), OUTSIDE * (key.high - key.low)
+    if not key.low - slack <= value <= key.high + slack:
+        raise ValueError(
+            f"{key.key} = {value:g} is outside its range, {key.low:g} to {key.high:g}; free it "
+            "over a wider one"
+        )
+    return value
+
+
+def _changed(table: Any, path: Sequence[str], value: float) -> Any:
+    """A copy of a table, or list, with another number where a path leads to."""
+    if not path:
+        return value
+    head, rest = path[0], path[1:]
+    if isinstance(table, list):
+        if not int(head) < len(table):
+            raise ValueError(f"there is no Prony term {head} in {len(table)}; count from 0")
+        k = int(head)
+        return [*table[:k], _changed(table[k], rest, value), *table[k + 1 :]]
+    return with_key(table, head, _changed(table.get(head, []), rest, value))
+
+
+def _with_material(body: Body, part: Part, solid: Material) -> Body:
+    if part is None:
+        return replace(body, material=solid)
+    if isinstance(part, str):
+        return replace(body, regions=(*(dict(body.regions) | {part: solid}).items(),))
+    layers = list(body.layers)
+    layers[part] = replace(layers[part], material=solid)
+    return replace(body, layers=tuple(layers))

@@ -1,0 +1,178 @@
+"""Families of bodies that differ in materials and thicknesses alone, each family reduced together.
+
+One parametric reduced-order model (`skinwave.parametric`) serves all bodies of a family, on two
+meshes, by which the error of each is estimated: some factorisations in place of two a body.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from simple_model import named_lines
+from skinwave import parametric
+from skinwave.models.affine_scenes import check_scene
+from skinwave.models.free_keys import FreeKey, free_keys, with_values
+from skinwave.parametric import ParametricBody
+from skinwave.planning.refinement import compared_with, refined
+from skinwave.scene import Body, Load, Reading, Scene
+from skinwave.sweeps.variation import DesignPoint
+
+LEAST, THICKNESS = 6, 15  # bodies of a family for each key that is free: fewer cost less alone
+PER_WORKER = 3  # bodies of a family: of fewer, workers that take one each are done sooner
+SHARE = 1 / 5  # of a tolerance: that of the reduced-order model
+AUDIBLE = 1e-2  # of the strongest line of a load: weaker ones make no scene harder
+ROUND_OFF = 1e-9  # of a length
+
+# A body, its probes, what they read, and what pushes it.
+Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
+Values = tuple[tuple[str, float], ...]  # of free keys
+Ranges = tuple[tuple[str, float, float], ...]  # key, least and largest value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """Bodies that one reduced-order model serves: the `scene` with the shortest waves, the `ranges`
+    of keys of its body, and how many `members` there are.
+    """
+
+    scene: Scene
+    ranges: Ranges
+    members: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """The element size in metre that runs share, that of the `coarser` mesh by which the error of
+    each is estimated, or the `error` why there is none; and the `family`, if its bodies are reduced
+    together, the body that is `meshed`, and the `values` of the one that runs are on.
+    """
+
+    h: float | None = None
+    coarser: float | None = None
+    error: str = ""
+    family: Family | None = None
+    meshed: Body | None = None
+    values: Values = ()
+
+
+def highest(scene: Scene) -> float:
+    """The highest line in Hz of a load that is above -40 dB of its strongest."""
+    return max(named_lines(scene.pressure, AUDIBLE).values(), default=0.0)
+
+
+def families(
+    hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1
+) -> list[tuple[Family, dict[Solid, Values]]]:
+    """Families of the bodies of a sweep.
+
+    Parameters
+    ----------
+    hardest : of each body the run with the highest line
+    tolerance : relative error of the runs
+    workers : how many bodies are reduced at a time
+
+    Returns
+    -------
+    each family with the values of its bodies
+    """
+    limits = _limits(hardest.values())
+    groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
+    for solid, case in hardest.items():
+        if keys := _free(solid[0], case, limits):
+            rest = with_values(solid[0], keys, {key.key: key.low for key in keys})
+            groups.setdefault((keys, rest, *solid[1:]), {})[solid] = case
+    return [
+        found
+        for (keys, *_), members in groups.items()
+        if len(members) >= PER_WORKER * workers and (found := _family(members, keys, tolerance))
+    ]
+
+
+def mesh_of(family: Family, tolerance: float, h: float | None, solver: str) -> Mesh:
+    """Mesh of a family: of the size that is asked for, or that its hardest scene requires.
+
+    Raises
+    ------
+    ValueError
+        If its bodies cannot be reduced together.
+    """
+    scene = family.scene
+    size = h or refined(scene, scene.body, tolerance, solver=solver).h
+    bodies = reduced(family, size, tolerance, solver).bodies
+    meshed = bodies.body(bodies.meshed)
+    coarser = compared_with(meshed, size)
+    reduced(family, coarser, tolerance, solver)
+    return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
+
+
+@lru_cache(maxsize=4)
+def reduced(family: Family, h: float, tolerance: float, solver: str) -> ParametricBody:
+    """Reduced-order model of a family, with elements of h in metre; cached on disk."""
+    free = {key: (low, high) for key, low, high in family.ranges}
+    within = min(parametric.TOLERANCE, SHARE * tolerance)
+    return parametric.prepare(family.scene, free, within, h=h, solver=solver)
+
+
+def _limits(cases: Iterable[DesignPoint]) -> dict[str, tuple[float, float]]:
+    """Least and largest values of numbers of a body that are varied."""
+    found: dict[str, set[float]] = {}
+    for case in cases:
+        for key, value in case.varied.items():
+            if key.startswith("body.") and _is_number(value):
+                found.setdefault(key, set()).add(float(value))
+    return {key: (min(each), max(each)) for key, each in found.items() if len(each) > 1}
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _free(
+    body: Body, case: DesignPoint, limits: Mapping[str, tuple[float, float]]
+) -> tuple[FreeKey, ...]:
+    """Varied keys of a body that can be free; none if it is not as they say."""
+    ranges = {key: limits[key] for key in case.varied if key in limits}
+    keys = _accepted(body, {k: r for k, r in ranges.items() if _accepted(body, {k: r})})
+    if not keys:
+        return ()
+    own = with_values(body, keys, dict(_values(case, keys)))
+    same = own.solids == body.solids and np.allclose(_depths(own), _depths(body), ROUND_OFF, 0)
+    return keys if same else ()
+
+
+def _accepted(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
+    try:
+        return free_keys(body, free)
+    except ValueError:
+        return ()
+
+
+def _depths(body: Body) -> list[float]:
+    return [*(layer.thickness for layer in body.layers), body.depth]
+
+
+def _family(
+    members: Mapping[Solid, DesignPoint], keys: Iterable[FreeKey], tolerance: float
+) -> tuple[Family, dict[Solid, Values]] | None:
+    """Family of bodies that differ in keys; None if they cannot be reduced together."""
+    limits = _limits(members.values())
+    keys = [key for key in keys if key.key in limits]
+    if len(members) < sum(THICKNESS if key.is_thickness else LEAST for key in keys):
+        return None
+    free = {key.key: limits[key.key] for key in keys}
+    scenes = [case.scene for case in members.values() if case.scene]
+    scene = max(scenes, key=lambda each: highest(each) / each.body.softest.shear_speed)
+    try:
+        check_scene(scene, free_keys(scene.body, free), tolerance)
+    except ValueError:
+        return None
+    ranges = tuple((key, *limit) for key, limit in free.items())
+    family = Family(scene=scene, ranges=ranges, members=len(members))
+    return family, {solid: _values(case, keys) for solid, case in members.items()}
+
+
+def _values(case: DesignPoint, keys: Iterable[FreeKey]) -> Values:
+    return tuple((key.key, float(case.varied[key.key])) for key in keys)
