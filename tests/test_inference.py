@@ -495,6 +495,16 @@ def test_the_nearest_sheets_are_computed_at_large_deflection_and_go_on(
     assert "--large-deflection = -1 is below 0" in capsys.readouterr().err
 
 
+def test_a_claim_that_holds_is_decided_by_all_its_tactons():
+    row = planted(1)[0] | {"M4_holds": 0, "M5_holds": 0}
+    alone = ["am80", "am140", "am210"]
+    assert set(large_deflection.deciding(row)) == {*alone, "am80-stm30", "am140-stm30"}
+    assert large_deflection.claims_of(row, "am80-stm30") == ["M4"]
+    assert large_deflection.claims_of(row, "am140-stm30") == ["M5"]
+    assert large_deflection.claims_of(row, "stm30") == []
+    assert len(large_deflection.deciding(row | {"M4_holds": 1})) == 12
+
+
 def test_sheets_that_elements_do_not_stretch_say_why():
     row = dict(planted(1)[0])
     refused = {"corners": "clips", "two_edges": "in a frame", "clamped": "fem-nonlinear takes 160"}

@@ -1,7 +1,8 @@
 """A candidate at large deflection, under the Tactons that decide M1, M4 and M5.
 
-M1 is about each Tacton without a path; M4 and M5 are decided by the one under which, of the linear
-sheet, a rival of f_AM is strongest. The sheet is computed by `fem-nonlinear` from rest under the
+M1 is about each Tacton without a path, M4 and M5 about each modulated one with a path: where the
+linear sheet shows the claim, all of them decide, where it does not, the one under which a rival of
+f_AM is strongest. The sheet is computed by `fem-nonlinear` from rest under the
 mean of the pressure, and by the modes of the same elements without stretching, in the steady state:
 what is left between the two is large deflection, and the start.
 """
@@ -32,6 +33,7 @@ HIGHEST = 420.0  # Hz: 2 f_AM, the highest of the lines that decide M4 and M5
 STEP = 1e-4  # s; the frequency of a mode at 420 Hz is 0.6 % low
 ALONE = tuple(name for name, each in tactons()
               if each.am_frequency and not each.trajectory.size)  # fmt: skip
+MOVING = tuple(name for name, each in tactons() if each.am_frequency and each.trajectory.size)
 CLAIMS = ("M1", "M4", "M5")
 
 
@@ -61,15 +63,17 @@ def stretched_sheets(rows: Sequence[Row], count: int) -> list[Row]:
 
 
 def deciding(row: Row) -> list[str]:
-    """Names of the Tactons that decide M1, M4 and M5 of a sheet."""
-    return list(dict.fromkeys((*ALONE, row["rival_tacton"], row["multiple_tacton"])))
+    """Names of the Tactons that decide M1, M4 or M5 of a sheet."""
+    return [name for name, _ in tactons() if claims_of(row, name)]
 
 
 def claims_of(row: Row, tacton: str) -> list[str]:
     """The claims that a Tacton decides."""
-    by = {"M1": tacton in ALONE, "M4": tacton == row["rival_tacton"],
-          "M5": tacton == row["multiple_tacton"]}  # fmt: skip
-    return [claim for claim in CLAIMS if by[claim]]
+    worst = {"M4": row["rival_tacton"], "M5": row["multiple_tacton"]}
+    found = ["M1"] if tacton in ALONE else []
+    if tacton in MOVING:
+        found += [claim for claim, of in worst.items() if tacton == of or row[f"{claim}_holds"]]
+    return found
 
 
 def stretched_row(sheet: Row, tacton: str) -> dict[str, Any]:

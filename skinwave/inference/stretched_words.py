@@ -15,10 +15,10 @@ NONE = (
 LARGE = (
     "By fem-nonlinear, in steps of 0.1 ms for 1 s from rest under the mean of the pressure, under "
     "the Tactons that decide: each without a path for M1, which asks for its harmonics; for M4 and "
-    "M5 the one under which the linear sheet has its strongest rival, and its strongest multiple, "
-    "of f_AM, so that a claim that fails there fails. Beside it the same modes of the same "
-    "elements without stretching, in the steady state. Elements have Rayleigh damping for the loss "
-    "factor, and curl and clips are left out."
+    "M5 each modulated one with a path if the linear sheet shows the claim, else the one under "
+    "which its strongest rival, or multiple, of f_AM is: a claim that fails there fails. Beside it "
+    "the same modes of the same elements without stretching, in the steady state. Elements have "
+    "Rayleigh damping for the loss factor, and curl and clips are left out."
 )
 
 
