@@ -50,6 +50,10 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto", memory: float | Non
     memory : bytes that a factor of PARDISO may take, which is kept in files if it takes more; what
         is free if not given
 
+    Returns
+    -------
+    Factor
+
     Raises
     ------
     ValueError
