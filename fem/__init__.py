@@ -35,7 +35,7 @@ from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.goal import GoalError, goal_error
-from fem.harmonic import harmonic
+from fem.harmonic import LineSolver, harmonic
 from fem.interior import displacement_operator, is_inside, locate
 from fem.linear_solver import Factor, available, factorise
 from fem.load_and_probe import (
@@ -83,6 +83,7 @@ __all__ = [
     "EnergyBalance",
     "Factor",
     "GoalError",
+    "LineSolver",
     "Material",
     "MaxwellBranch",
     "Membrane",

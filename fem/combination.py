@@ -76,11 +76,15 @@ class Laws:
         """Dynamic stiffness A = K + s C + s^2 M + sum_j h_j K_j of factors s in rad/s and h_j."""
         each = list(zip(factors, self.parts, strict=True))
         rests = [factor * part.rest for factor, part in each if factor and part.rest is not None]
-        return Combination(
-            stiffness=1 + sum(factor * part.stiffness for factor, part in each),
-            mass=factors[0] ** 2 + sum(factor * part.mass for factor, part in each),
-            rest=sum(rests[1:], start=rests[0]) if rests else None,
-        )
+        stiffness, mass = self.multiples(factors)
+        rest = sum(rests[1:], start=rests[0]) if rests else None
+        return Combination(stiffness=stiffness, mass=mass, rest=rest)
+
+    def multiples(self, factors: Sequence[Any]) -> tuple[Any, Any]:
+        """Multiples of K and of M in the dynamic stiffness of real or complex factors."""
+        each = list(zip(factors, self.parts, strict=True))
+        stiffness = 1 + sum(factor * part.stiffness for factor, part in each)
+        return stiffness, factors[0] ** 2 + sum(factor * part.mass for factor, part in each)
 
     def without_stiffness(
         self, factors: Sequence[float], acted_on: Sequence[Floats], z: Floats
@@ -98,9 +102,10 @@ class Laws:
         -------
         x, m and the r_j, (r, k) each
         """
-        A, each = _factors_only(self).at(factors), list(zip(self.parts, acted_on, strict=True))
-        x = sum((part.stiffness * v for part, v in each), np.zeros_like(z)) / A.stiffness
-        m = sum((part.mass * v for part, v in each), z) - A.mass * x
+        stiffness, mass = self.multiples(factors)
+        each = list(zip(self.parts, acted_on, strict=True))
+        x = sum((part.stiffness * v for part, v in each), np.zeros_like(z)) / stiffness
+        m = sum((part.mass * v for part, v in each), z) - mass * x
         return x, m, [v - factor * x for factor, v in zip(factors, acted_on, strict=True)]
 
 
@@ -119,9 +124,20 @@ def factors_at(branches: Sequence[Branch], s: float) -> tuple[float, ...]:
     return s, *(float(np.real(branch.share(s))) for branch in branches)
 
 
-def _factors_only(laws: Laws) -> Laws:
-    damping, *branches = (replace(part, rest=None) for part in laws.parts)
-    return Laws(damping=damping, branches=tuple(branches))
+def laws_of(K: Any, C: Any, M: Any, branches: Sequence[Branch], known: Laws | None) -> Laws:
+    """C and branches as the combinations of K and M that are known, if they are, else as what they
+    are.
+
+    Parameters
+    ----------
+    K, C, M, branches : of `Operators`
+    known : Laws that may be theirs, or None
+
+    Returns
+    -------
+    Laws
+    """
+    return known if known and known.hold(K, C, M, branches) else unrelated(C, branches)
 
 
 def unrelated(C: Any, branches: Sequence[Branch]) -> Laws:

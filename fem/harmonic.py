@@ -4,15 +4,17 @@ complex stiffness of the generalised Maxwell branches.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem.assembly import Operators
-from fem.linear_solver import factorise
+from fem.combination import laws_of
+from fem.linear_solver import Factor, factoriser
 from fem.maxwell import Branch, relaxing_stiffness
+from fem.sparsity import on_one_pattern
 from meshes.tetmesh import Floats
 
 
@@ -37,6 +39,48 @@ def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any
     return K + s * C + s**2 * M + relaxing_stiffness(branches, s)
 
 
+class LineSolver:
+    """Steady state of a body at one frequency after the other, by a factorisation for each.
+
+    The dynamic stiffness at all frequencies has one sparsity pattern: it is summed as values of
+    its upper triangle, and analysed once.
+    """
+
+    def __init__(self, operators: Operators, solver: str = "auto") -> None:
+        """Take `Operators`, and a solver of `linear_solver.factorise`."""
+        K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
+        self._laws = laws_of(K, C, M, branches, operators.laws)
+        self._branches, self._operators, self._solver = branches, operators, solver
+        rests = [part.rest for part in self._laws.parts if part.rest is not None]
+        self._values, self._indices, self._indptr = on_one_pattern([K, M, *rests])
+        self._factorise: Callable[[Any], Factor] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for other processes, without what a solver has analysed."""
+        return {**vars(self), "_factorise": None}
+
+    def __call__(self, frequency: float, force: Any) -> NDArray[np.complex128]:
+        """Displacement (3 n,) or (3 n, k) complex in metre at a frequency in Hz, under forces of
+        the same shape in N.
+
+        Raises
+        ------
+        ValueError
+            If an unconstrained body is asked for at 0 Hz.
+        """
+        s = 2j * np.pi * frequency
+        factors = s, *(branch.share(s) for branch in self._branches)
+        parts = zip(factors, self._laws.parts, strict=True)
+        rests = [factor for factor, part in parts if part.rest is not None]
+        weights = np.array([*self._laws.multiples(factors), *rests], np.complex128)
+        A = np.empty(self._values.shape[1], np.complex128)
+        A.real, A.imag = weights.real @ self._values, weights.imag @ self._values
+        if self._factorise is None:
+            self._factorise = factoriser(self._indices, self._indptr, backend=self._solver)
+        u = self._factorise(A).solve(force[self._operators.free].astype(np.complex128))
+        return np.asarray(self._operators.expand(u), np.complex128)
+
+
 def harmonic(
     operators: Operators, force: Floats, frequencies: ArrayLike, *, solver: str = "auto"
 ) -> NDArray[np.complex128]:
@@ -58,10 +102,5 @@ def harmonic(
     ValueError
         If an unconstrained body is asked for at 0 Hz.
     """
-    K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
-    fields = []
-    for w in 2 * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64)):
-        factor = factorise(dynamic_stiffness(K, C, M, branches, 1j * w), backend=solver)
-        u = factor.solve(force[operators.free].astype(np.complex128))
-        fields.append(operators.expand(u))
-    return np.array(fields)
+    solve = LineSolver(operators, solver)
+    return np.array([solve(f, force) for f in np.atleast_1d(np.asarray(frequencies, np.float64))])

@@ -2,9 +2,9 @@
 
 It orders blocks of rows with similar patterns, as those of a node's components, which takes 0.7 s
 instead of 2.8 for a slab of 128,000 dofs and a third of the memory. A factor in single precision
-saves nothing: for that slab, at a Poisson's ratio of 0.4999, it takes 2.2 s instead of 3.8, but a
-solution with the step of refinement that it needs 1.3 times as long; for a sheet of 0.1 mm
-refinement diverges.
+saves nothing where it is solved with often: for that slab, at a Poisson's ratio of 0.4999, it takes
+2.2 s instead of 3.8, but a solution with the step of refinement that it needs 1.3 times as long;
+for a sheet of 0.1 mm refinement diverges.
 
 A factor that is larger than the memory that is free is kept in files (out of core), which PARDISO
 itself writes and reads: its size is known after the analysis, before anything is factorised.
@@ -17,25 +17,24 @@ import shutil
 import sys
 import tempfile
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from fem.memory import free_memory
-from fem.sparsity import starts_of_kept
+from fem.sparsity import Index
 
 log = logging.getLogger(__name__)
 
 Array = NDArray[Any]  # float64 or complex128
 SPARSE = 0.1  # share of n^2 in the upper triangle; blocks of denser matrices may crash PARDISO
 BLOCKS = 80  # %: how much alike the patterns of rows are that PARDISO takes as a block
-TWO_LEVELS, BY_BLOCKS, OUT_OF_CORE = 23, 36, 59  # of its settings; the last 2 for files
+TWO_LEVELS, SINGLE, BY_BLOCKS, OUT_OF_CORE = 23, 27, 36, 59  # of its settings; 2 for files
 IN_CORE = 0.8  # of the memory that is free, at most, for a factor; vectors need the rest
 LEAST_CORE = 500  # MB that it may use beside the files: with less it fails
 PHASES = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
@@ -57,79 +56,113 @@ def mkl() -> ctypes.CDLL | None:
     return None
 
 
-def solver(A: sparse.csr_array, memory: float | None = None) -> Callable[[Array], Array]:
-    """Factorise a matrix.
+class Pardiso:
+    """PARDISO on upper triangles of one pattern, which it analyses once."""
 
-    Parameters
-    ----------
-    A : sparse (n, n), with sorted indices
-    memory : bytes that its factor may take; what is free if not given
+    def __init__(
+        self,
+        indices: Index,
+        indptr: Index,
+        kind: int,
+        *,
+        single: bool = False,
+        memory: float | None = None,
+    ) -> None:
+        """Columns and starts of rows, numbered from 1, which it keeps; kind 2 for real matrices, 6
+        for complex; bytes of memory that a factor may take, what is free if not given.
+        """
+        self._indices, self._indptr, self._kind, self._n = indices, indptr, kind, len(indptr) - 1
+        self._handle, self._settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
+        self._settings[[0, 1, 7]] = 1, 2, 0  # own settings, METIS, no refinement
+        self._settings[[9, TWO_LEVELS]] = 16, 1  # perturbation of pivots
+        self._settings[SINGLE] = single
+        if len(indices) < SPARSE * self._n**2:
+            self._settings[BY_BLOCKS] = -BLOCKS
+        self._values: Array = np.zeros(0)
+        self._scale, self._memory, self._folders = 1.0, memory, list[str]()
+        self._analysed, self._environment = False, partial(_environment, None, 0.0)
+        known = self._handle, self._settings, kind, self._n
+        weakref.finalize(self, _release, *known, self._folders)
 
-    Returns
-    -------
-    solution (n,) or (n, k) of right-hand sides
+    def factorise(self, values: Array) -> None:
+        """Factorise a matrix, whose values (nnz,) are scaled in place.
 
-    Raises
-    ------
-    MemoryError
-        If the factor fits neither in memory nor on the disk.
-    PardisoError
-        If a pivot is not positive, or another step fails.
-    """
-    n, kind = A.shape[0], 6 if np.iscomplexobj(A.data) else 2
-    values, indices, indptr = _upper(A)
-    del A
-    # PARDISO perturbs pivots below an absolute bound: entries of about 1 make it a relative one.
-    scale = 2.0 ** np.round(np.log2(np.abs(values).max(initial=1e-300)))
-    values /= scale
-    handle, settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
-    settings[0], settings[1], settings[7] = 1, 2, 0  # own settings, METIS, no refinement
-    settings[9], settings[TWO_LEVELS] = 16, 1  # perturbation of pivots
-    if len(values) < SPARSE * n * n:
-        settings[BY_BLOCKS] = -BLOCKS
+        Raises
+        ------
+        MemoryError
+            If the factor fits neither in memory nor on the disk.
+        PardisoError
+            If a pivot is not positive, or another step fails.
+        """
+        # PARDISO perturbs pivots below an absolute bound: entries of about 1 make it relative.
+        self._scale = 2.0 ** np.round(np.log2(np.abs(values).max(initial=1e-300)))
+        values /= self._scale
+        self._values = values
+        if not self._analysed:
+            self._analyse()
+        with self._environment():
+            self._run("factorise")
 
-    def call(phase: str, b: Array | None = None) -> Array:
-        right = 1 if b is None or b.ndim == 1 else b.shape[1]
-        b = np.zeros(1, values.dtype) if b is None else np.asfortranarray(b, values.dtype)
-        x = np.zeros_like(b, order="F")
-        error = ctypes.c_int32(0)
-        pointer = ctypes.c_void_p
-        mkl().pardiso(  # type: ignore[union-attr]
-            handle.ctypes.data_as(pointer), *_integers(1, 1, kind, PHASES[phase], n),
-            values.ctypes.data_as(pointer), indptr.ctypes.data_as(pointer),
-            indices.ctypes.data_as(pointer), None, *_integers(right),
-            settings.ctypes.data_as(pointer), *_integers(0),
-            b.ctypes.data_as(pointer), x.ctypes.data_as(pointer), ctypes.byref(error),
-        )  # fmt: skip
-        if error.value == -2:
-            raise MemoryError(f"not enough memory to factorise {n:,} dofs; coarsen the mesh")
-        if error.value:
-            raise PardisoError(f"PARDISO error {error.value}, {phase}")
+    def _analyse(self) -> None:
+        self._run("analyse")
+        self._analysed = True
+        size = 1024.0 * (int(self._settings[15]) + int(self._settings[16]))
+        limit = self._memory or free_memory()
+        if size <= IN_CORE * limit:
+            return
+        self._folders.append(_folder(self._n, size, limit))
+        # With blocks and two levels some solutions take 30 times as long as others then.
+        self._run("release")
+        self._settings[[TWO_LEVELS, BY_BLOCKS]], self._settings[OUT_OF_CORE] = 0, 2
+        self._environment = partial(_environment, self._folders[0], limit)
+        with self._environment():
+            self._run("analyse")
+
+    def forget(self) -> None:
+        """Free the matrix, without which a Cholesky factor, which perturbs no pivots, solves."""
+        if not self._folders:
+            self._values = self._values[:1].copy()
+            self._indices, self._indptr = self._indices[:1].copy(), self._indptr[:1].copy()
+
+    def solve(self, b: Array) -> Array:
+        """Solution (n,) or (n, k) of right-hand sides."""
+        x = self._run("solve", b)
+        x /= self._scale
         return x
 
-    call("analyse")
-    size, limit = 1024.0 * (int(settings[15]) + int(settings[16])), memory or free_memory()
-    folder = _folder(n, size, limit) if size > IN_CORE * limit else None
-    try:
-        with _environment(folder, limit):
-            if folder:  # with blocks and two levels some solutions take 30 times as long as others
-                call("release")
-                settings[[TWO_LEVELS, BY_BLOCKS]], settings[OUT_OF_CORE] = 0, 2
-                call("analyse")
-            call("factorise")
-    except (ArithmeticError, MemoryError):
-        _release(call, folder)
-        raise
-    if kind == 2 and not folder:  # a Cholesky factor perturbs no pivots, and is solved with alone
-        values, indices, indptr = values[:1].copy(), indices[:1].copy(), indptr[:1].copy()
+    def _run(self, phase: str, b: Array | None = None) -> Array:
+        matrix = self._values, self._indptr, self._indices
+        return _call(self._handle, self._settings, self._kind, phase, self._n, matrix, b)
 
-    def solve(b: Array) -> Array:
-        x = call("solve", b)
-        x /= scale
-        return x
 
-    weakref.finalize(solve, _release, call, folder)
-    return solve
+def _call(
+    handle: Array,
+    settings: Array,
+    kind: int,
+    phase: str,
+    n: int,
+    matrix: tuple[Array, Array, Array] | None = None,
+    b: Array | None = None,
+) -> Array:
+    """A phase of PARDISO; the solution (n, k) of right-hand sides b (n, k)."""
+    values, indptr, indices = matrix or (np.zeros(1),) * 3
+    right = 1 if b is None or b.ndim == 1 else b.shape[1]
+    b = np.zeros(1, values.dtype) if b is None else np.asfortranarray(b, values.dtype)
+    x = np.zeros_like(b, order="F")
+    error = ctypes.c_int32(0)
+    pointer = ctypes.c_void_p
+    mkl().pardiso(  # type: ignore[union-attr]
+        handle.ctypes.data_as(pointer), *_integers(1, 1, kind, PHASES[phase], n),
+        values.ctypes.data_as(pointer), indptr.ctypes.data_as(pointer),
+        indices.ctypes.data_as(pointer), None, *_integers(right),
+        settings.ctypes.data_as(pointer), *_integers(0),
+        b.ctypes.data_as(pointer), x.ctypes.data_as(pointer), ctypes.byref(error),
+    )  # fmt: skip
+    if error.value == -2:
+        raise MemoryError(f"not enough memory to factorise {n:,} dofs; coarsen the mesh")
+    if error.value:
+        raise PardisoError(f"PARDISO error {error.value}, {phase}")
+    return x
 
 
 def _folder(n: int, size: float, limit: float) -> str:
@@ -172,24 +205,10 @@ def _set(variables: dict[str, str | None]) -> None:
             os.environ[name] = value
 
 
-def _release(call: Callable[[str], Array], folder: str | None) -> None:
-    call("release")
-    if folder:
+def _release(handle: Array, settings: Array, kind: int, n: int, folders: list[str]) -> None:
+    _call(handle, settings, kind, "release", n)
+    for folder in folders:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def _upper(A: sparse.csr_array) -> tuple[Array, NDArray[np.int32], NDArray[np.int32]]:
-    """Values, and columns and starts of rows numbered from 1, of the upper triangle of a matrix
-    with sorted indices.
-    """
-    n = A.shape[0]
-    kept = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
-    starts = starts_of_kept(kept, A.indptr)
-    columns = A.indices[kept].astype(np.int32, copy=False)
-    columns += 1
-    starts += 1
-    complex_valued = np.iscomplexobj(A.data)
-    return A.data[kept].astype(np.complex128 if complex_valued else np.float64), columns, starts
 
 
 def _integers(*values: int) -> list[Any]:

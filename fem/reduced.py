@@ -42,7 +42,7 @@ from scipy.sparse.linalg import aslinearoperator
 
 from fem.added_mass import AddedMass
 from fem.assembly import Operators
-from fem.combination import Laws, factors_at, unrelated
+from fem.combination import Laws, factors_at, laws_of
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
 from fem.maxwell import Branch, MaxwellBranch, with_internal
@@ -139,7 +139,8 @@ def reduce(
     if not start_vectors.any():
         raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
     point, operators = _expansion(operators, added, band)
-    laws = _laws(operators)
+    full = operators.K, operators.C, operators.M, operators.branches
+    laws = laws_of(*full, operators.laws)
     factors = factors_at(operators.branches, point)
     factor = factorise(laws.at(factors).of(operators.K, operators.M), backend=solver)
     report(0.0)
@@ -405,13 +406,6 @@ def _expansion(
         return relaxing if operators.branches else EXPANSION_POINT, operators
     C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
     return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M, laws=None)
-
-
-def _laws(operators: Operators) -> Laws:
-    """C and branches as combinations of K and M if they are, else as what they are."""
-    K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
-    known = operators.laws
-    return known if known and known.hold(K, C, M, branches) else unrelated(C, branches)
 
 
 def _independent(start_vectors: Floats) -> Floats:

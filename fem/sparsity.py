@@ -1,6 +1,6 @@
 """Sparsity pattern of a mesh, and the assembly of element matrices into sparse ones."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -128,6 +128,37 @@ def selected(A: Any, rows: Ints, columns: Ints) -> Any:
     indptr = np.append(starts[rows], starts[-1])
     size = np.array([len(rows), len(columns)]) * A.shape // shape
     return type(A)((A.data[kept], places[kept], indptr), shape=tuple(size))
+
+
+def upper_triangle(A: sparse.csr_array) -> tuple[NDArray[Any], Index, Index]:
+    """Values, float64 or complex128, columns and starts of rows of the upper triangle of a matrix
+    with sorted indices.
+    """
+    n, kind = A.shape[0], np.complex128 if np.iscomplexobj(A.data) else np.float64
+    kept = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
+    columns = A.indices[kept].astype(np.int32, copy=False)
+    return A.data[kept].astype(kind, copy=False), columns, starts_of_kept(kept, A.indptr)
+
+
+def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index, Index]:
+    """Upper triangles of real matrices in the union of their sparsity patterns: values (j, nnz) of
+    each, columns and starts of rows.
+    """
+    shape, values, patterns = matrices[0].shape, [], []
+    for A in matrices:
+        A.sort_indices()
+        each, columns, indptr = upper_triangle(A)
+        values.append(each)
+        ones = np.ones(len(columns), np.int32)
+        patterns.append(sparse.csr_array((ones, columns, indptr), shape=shape))
+    union = sum(patterns[1:], start=patterns[0])
+    numbered = sparse.csr_array(
+        (np.arange(1, union.nnz + 1, dtype=np.int32), union.indices, union.indptr), shape=shape
+    )
+    found = np.zeros((len(values), union.nnz))
+    for row, each, pattern in zip(found, values, patterns, strict=True):
+        row[numbered.multiply(pattern).data - 1] = each
+    return found, union.indices, union.indptr
 
 
 def starts_of_kept(kept: NDArray[np.bool_], indptr: NDArray[np.integer[Any]]) -> Index:

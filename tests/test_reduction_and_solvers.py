@@ -2,6 +2,7 @@
 
 import gc
 import os
+import pickle
 import shutil
 import sys
 import tempfile
@@ -18,6 +19,8 @@ import fem
 import meshes
 import skinwave
 from fem import linear_solver, memory, products, reduced
+from fem.harmonic import dynamic_stiffness
+from fem.sparsity import on_one_pattern, upper_triangle
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load_spectrum import reduced_lines
 from skinwave.bodies.build import build as build_body
@@ -119,6 +122,65 @@ def test_complex_symmetric_matrices_are_solved(stiff, backend):
     A = ops.K + 1j * 900 * ops.C - 900**2 * ops.M
     x = fem.factorise(A, backend=backend).solve(b.astype(complex))
     assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+
+
+@pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+@pytest.mark.parametrize("known", [True, False])
+def test_lines_are_solved_one_after_the_other(stiff, backend, known):
+    """Also by a solver that another process is sent between two of them."""
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    b = stiff[2]
+    terms = (fem.PronyTerm(modulus=5e3, time=1e-3), fem.PronyTerm(modulus=9e3, time=1e-4))
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], prony=terms), absorbing="sides")
+    solve = fem.LineSolver(ops if known else replace(ops, laws=None), backend)
+    for hertz in (0.0, 50.0, 700.0):
+        A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, 2j * np.pi * hertz)
+        x = solve(hertz, ops.expand(b))[ops.free]
+        assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+        solve = pickle.loads(pickle.dumps(solve))
+
+
+@pytest.mark.parametrize("slowest", [0.2, 0.0])
+def test_a_factor_in_single_precision_is_refined_or_made_in_double(stiff, monkeypatch, slowest):
+    if "pardiso" not in fem.available(complex_valued=True):
+        pytest.skip("mkl is not installed")
+    monkeypatch.setattr(linear_solver, "SLOWEST", slowest)
+    ops, _, b = stiff
+    columns = b[:, 0], b.astype(complex)
+    A = [(ops.K + 1j * w * ops.C - w**2 * ops.M).tocsr() for w in (300.0, 2000.0)]
+    _, indices, indptr = upper_triangle(A[0])
+    factorised = linear_solver.factoriser(indices, indptr)
+    for each in A:
+        factor = factorised(upper_triangle(each)[0])
+        for right in columns:
+            x = factor.solve(right.astype(complex))
+            assert np.abs(each @ x - right).max() < 1e-9 * np.abs(right).max()
+    assert factorised._is_single == (slowest > 0)
+
+
+def test_lines_of_a_thin_sheet_are_solved_as_well_as_its_matrix_allows():
+    """In single precision nothing is left of its stiffness against bending."""
+    mesh = meshes.sheet(0.1, 0.1, 1e-4, 0.005)
+    ops = fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides")
+    force = fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh)))
+    S = fem.probe_operator(mesh, PROBES)
+    for hertz in (80.0, 140.0):
+        s = 2j * np.pi * hertz
+        A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, s)
+        exact = S[:, ops.free] @ fem.factorise(A).solve(force[ops.free].astype(complex))
+        np.testing.assert_allclose(S @ fem.harmonic(ops, force, hertz)[0], exact, rtol=1e-3)
+
+
+def test_patterns_that_differ_are_united():
+    rng = np.random.default_rng(3)
+    full = [sparse.random_array((9, 9), density=0.2, rng=rng, format="csr") for _ in range(3)]
+    matrices = [(A + A.T).tocsr() for A in full]
+    values, columns, starts = on_one_pattern(matrices)
+    for A, each in zip(matrices, values, strict=True):
+        found = sparse.csr_array((each, columns, starts), shape=A.shape)
+        np.testing.assert_array_equal(found.toarray(), np.triu(A.toarray()))
 
 
 def test_without_mkl_and_metis_superlu_carries_it(stiff, monkeypatch):

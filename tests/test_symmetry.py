@@ -11,6 +11,7 @@ from skinwave.bodies.supports import Sides
 from skinwave.models import prepared, symmetry
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
 from skinwave.scene import SURFACE, Scene
+from skinwave.simulation import compute
 
 CIRCLE = Tacton(
     am_frequency=140, duration=0.1, trajectory=Trajectory(shape="circle", size=0.02, speed=8)
@@ -39,6 +40,18 @@ def test_probes_on_the_plane_see_the_even_part_alone(monkeypatch, body, h):
     assert part.effort.dofs < 0.6 * whole.effort.dofs
     error = np.abs(part.displacement - whole.displacement).max()
     assert error < 1e-5 * np.abs(whole.displacement).max()
+
+
+def test_lines_are_solved_on_the_part_that_the_probes_see(monkeypatch):
+    scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=SLAB, probes=ON_X), []
+    for axes in (axes_of_probes, lambda probes, among: ""):
+        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
+        found.append(compute(scene, "fem-harmonic", h=6e-3))
+    part, whole = found
+    assert part.effort.dofs < 0.6 * whole.effort.dofs
+    error = np.abs(part.displacement - whole.displacement).max()
+    assert error < 1e-9 * np.abs(whole.displacement).max()
+    assert part.effort.energy_imbalance < 1e-9
 
 
 def test_a_probe_at_the_middle_sees_a_quarter(monkeypatch):

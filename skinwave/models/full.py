@@ -34,6 +34,7 @@ from skinwave.models.loads import (
     translation,
     with_sag,
 )
+from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene import Body, Scene
 from skinwave.support_motion import SupportMotion
 
@@ -243,16 +244,20 @@ def step_count(duration: float, dt: float) -> int:
 
 def harmonic_answer(scene: Scene, request: Request) -> Response:
     """Steady state: one factorisation for each line of the load above a threshold, but for the mean
-    if the body is unconstrained.
+    if the body is unconstrained. Of a body that is its own mirror image only one side is modelled
+    where all probes lie on the plane.
     """
     times, report, solver = request.times, request.report, request.solver
     threshold = request.tolerance / 50  # of the strongest line
     clock = Clock()
-    build = meshed(scene.body, request.h, clock, report)
+    probes, reading = scene.probe_points, scene.reading
+    axes = modelled_axes(scene.body, probes, "", reading, scene.load)
+    build = meshed(scene.body, request.h, clock, report, axes)
     ops = assembled(build, clock, report)
-    P, points = surface_load(build, scene.load)
-    S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
-    asked = scene.reading.asked
+    P, points = even_part(*surface_load(build, scene.load), axes)
+    S, solids = probe_rows(scene.body, build, images(probes, axes), reading)
+    asked = reading.asked
+    solve = fem.LineSolver(ops, solver)
     with clock("lines"):
         lines, knots = load_lines(scene.loads[0], threshold), path_samples(scene.loads[0])
         count = len(np.unique(np.round(lines.frequencies, 9)))
@@ -267,14 +272,14 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
         amplitudes = np.empty((len(frequencies), S.shape[0]), np.complex128)
         total = fem.EnergyBalance()
         report("lines", 0.0)
-        answers = request.mapped(partial(_line, ops, P, S, solver), frequencies, pressures)
+        answers = request.mapped(partial(_line, ops, P, S, solve), frequencies, pressures)
         for k, (amplitudes[k], power) in enumerate(answers):
             report("lines", (k + 1) / len(frequencies))
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
             total += power
         still = sag(build, ops, S, scene.load, solver)
         if motion := scene.load.support_motion:
-            moved, power = moved_line(build, ops, S, solver, motion)
+            moved, power = moved_line(build, ops, S, solve, motion)
             total += power
             frequencies = np.append(frequencies, motion.frequency)
             amplitudes = np.vstack([amplitudes, moved])
@@ -299,19 +304,23 @@ def _line(
     ops: fem.Operators,
     P: sparse.csr_array,
     S: sparse.csr_array,
-    solver: str,
+    solve: fem.LineSolver,
     frequency: float,
     pressure: fem.Complex,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
     """Components (p c,) at rest of the probes at one line, and its mean power balance."""
     force, free = P @ pressure, ops.free
-    u = fem.harmonic(ops, force, frequency, solver=solver)
-    line = force[None, free], u[:, free], np.array([frequency])
-    return S @ u[0], fem.mean_power(ops.C, ops.R, *line, ops.branches)
+    u = solve(frequency, force)
+    line = force[None, free], u[None, free], np.array([frequency])
+    return S @ u, fem.mean_power(ops.C, ops.R, *line, ops.branches)
 
 
 def moved_line(
-    build: Build, ops: fem.Operators, S: sparse.csr_array, solver: str, motion: SupportMotion
+    build: Build,
+    ops: fem.Operators,
+    S: sparse.csr_array,
+    solve: fem.LineSolver,
+    motion: SupportMotion,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
     """Steady state on a support that moves.
 
@@ -320,7 +329,7 @@ def moved_line(
     build : Build
     ops : operators of its mesh
     S : (p c, 3 n) sparse, what the probes read
-    solver : of `fem.linear_solver`
+    solve : fem.LineSolver of the operators
     motion : SupportMotion
 
     Returns
@@ -329,7 +338,7 @@ def moved_line(
     """
     force = sparse.csr_array(-inertia(build, motion.unit)[:, None])
     acceleration = np.array([motion.acceleration])
-    seen, power = _line(ops, force, S, solver, motion.frequency, acceleration)
+    seen, power = _line(ops, force, S, solve, motion.frequency, acceleration)
     return seen + S @ translation(build, motion.unit) * motion.line, power
 
 
