@@ -44,7 +44,7 @@ GRID, REACH = 1e-4, 0.03  # m: of the pressure that NGSolve interpolates, and ho
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What one mesh takes: `once`, and for `each` line or Tacton, in s; its displacement (f, p)."""
+    """Cost of a mesh: `once`, and for `each` line or Tacton, in s; its displacement (f, p)."""
 
     name: str
     dofs: int

@@ -409,11 +409,12 @@ def _expansion(
 
 
 def _independent(start_vectors: Floats) -> Floats:
-    """Orthonormal basis of vectors (n, p): probes on a clamped edge do not move, and those in one
-    element may be linearly dependent.
+    """Independent directions of vectors (n, p), of length 1: probes on a clamped edge do not move,
+    and those in one element may be linearly dependent. Opposite vectors have opposite directions.
     """
-    directions, strengths, _ = np.linalg.svd(start_vectors, full_matrices=False)
-    return directions[:, strengths > DISTINCT * strengths[0]]
+    squares, directions = np.linalg.eigh(start_vectors.T @ start_vectors)
+    kept = squares > DISTINCT**2 * squares[-1]
+    return start_vectors @ (directions[:, kept] / np.sqrt(squares[kept]))[:, ::-1]
 
 
 def _moments(
