@@ -391,7 +391,7 @@ def test_shares_are_told_within_bounds_of_the_deflection_too():
     assert lines[0][1:] == ["400", *(f"{(sags < bound).sum()}" for bound in (10, 2, 0.5))]
     said = conclusions(rows)[-1]
     assert f"below 2 thicknesses in {100 * (sags < 2).mean():.0f} %" in said
-    assert f"{sags.max():.3g} thicknesses at the most" in said
+    assert f"{sags.max():.1f} thicknesses at the most" in said
     of = m1[sags < 2].mean()
     assert f"Of the {(sags < 2).sum()} below 2 thicknesses none show all five; M1 in " in said
     assert f"M1 in {100 * of:.0f} % (" in said.partition("below 2 thicknesses none")[2]

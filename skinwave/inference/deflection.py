@@ -12,6 +12,7 @@ import numpy as np
 from skinwave.inference.assess import CLAIMED
 from skinwave.inference.knowledge import Mask, Row, Share, holds, in_percent, percent, share
 from skinwave.inference.ranking import PLAUSIBLE
+from skinwave.numbers import significant
 
 LINEAR = 0.5  # thicknesses: a plate that deflects further stretches
 BOUNDS = (PLAUSIBLE, 2.0, LINEAR)  # thicknesses of the linear static deflection
@@ -53,8 +54,9 @@ def deflection_words(fair: Sequence[Row]) -> str:
     vibrates = np.array([row["vibration_over_thickness"] < LINEAR for row in fair])
     return (
         f"All this is of linear sheets: the static deflection under the mean of the pressure is "
-        f"{', '.join(parts)} of them, {sags.max():,.3g} thicknesses at the most; the vibration is "
-        f"below half a thickness in {percent(share(vibrates).value)} %. {_bounded(fair)}"
+        f"{', '.join(parts)} of them, {significant(float(sags.max()))} thicknesses at the most; "
+        f"the vibration is below half a thickness in {percent(share(vibrates).value)} %. "
+        f"{_bounded(fair)}"
     )
 
 
