@@ -2,9 +2,10 @@
 
 M1 is about each Tacton without a path, M4 and M5 about each modulated one with a path: where the
 linear sheet shows the claim, all of them decide, where it does not, the one under which a rival of
-f_AM is strongest. The sheet is computed by `fem-nonlinear` from rest under the
-mean of the pressure, and by the modes of the same elements without stretching, in the steady state:
-what is left between the two is large deflection, and the start.
+f_AM is strongest; if that one shows it at large deflection, all of them do then. The sheet is
+computed by `fem-nonlinear` from rest under the mean of the pressure, and by the modes of the same
+elements without stretching, in the steady state: what is left between the two is large deflection,
+and the start.
 """
 
 import time
@@ -34,7 +35,8 @@ STEP = 1e-4  # s; the frequency of a mode at 420 Hz is 0.6 % low
 ALONE = tuple(name for name, each in tactons()
               if each.am_frequency and not each.trajectory.size)  # fmt: skip
 MOVING = tuple(name for name, each in tactons() if each.am_frequency and each.trajectory.size)
-CLAIMS = ("M1", "M4", "M5")
+ABOUT = {"M1": ALONE, "M4": MOVING, "M5": MOVING}
+CLAIMS = tuple(ABOUT)
 
 
 def candidate_of(row: Row) -> Candidate:
@@ -62,18 +64,32 @@ def stretched_sheets(rows: Sequence[Row], count: int) -> list[Row]:
     return list(islice(distinct(rows, lambda row: not refusal(row)), count))
 
 
-def deciding(row: Row) -> list[str]:
-    """Names of the Tactons that decide M1, M4 or M5 of a sheet."""
-    return [name for name, _ in tactons() if claims_of(row, name)]
+def deciding(row: Row, stretched: Sequence[Row] = ()) -> list[str]:
+    """Names of the Tactons that decide M1, M4 or M5 of a sheet, by its rows at large deflection
+    that are there.
+    """
+    wanted = {*ALONE, row["rival_tacton"], row["multiple_tacton"]}
+    own = [each for each in stretched if each["sheet"] == row["key"] and each["tacton"] in wanted]
+    there = {each["tacton"] for each in own if each["status"] == "done"}
+    is_open = there == wanted and None in (verdict(own, claim) for claim in CLAIMS)
+    if is_open or row["M4_holds"] or row["M5_holds"]:
+        wanted |= {*MOVING}
+    return [name for name, _ in tactons() if name in wanted]
 
 
-def claims_of(row: Row, tacton: str) -> list[str]:
-    """The claims that a Tacton decides."""
-    worst = {"M4": row["rival_tacton"], "M5": row["multiple_tacton"]}
-    found = ["M1"] if tacton in ALONE else []
-    if tacton in MOVING:
-        found += [claim for claim, of in worst.items() if tacton == of or row[f"{claim}_holds"]]
-    return found
+def claims_of(tacton: str) -> list[str]:
+    """The claims that are about a Tacton."""
+    return [claim for claim, about in ABOUT.items() if tacton in about]
+
+
+def verdict(stretched: Sequence[Row], claim: str, how: str = "large") -> bool | None:
+    """Whether a claim holds of a sheet, by its rows; None if it may: of some Tactons it holds, and
+    others that it is about were not computed.
+    """
+    by_tacton = {row["tacton"]: row.get(f"{claim}_{how}_holds") for row in stretched}
+    if any(held is not None and not held for held in by_tacton.values()):
+        return False
+    return all(by_tacton.get(tacton) for tacton in ABOUT[claim]) or None
 
 
 def stretched_row(sheet: Row, tacton: str) -> dict[str, Any]:
@@ -100,7 +116,7 @@ def _compared(sheet: Row, tacton: str) -> dict[str, Any]:
     runs = {"linear": as_run(candidate, tacton, f[heard], u[heard]),
             "large": _read(candidate, tacton, response)}  # fmt: skip
     for words, run in runs.items():
-        columns.update(_levels(sheet, tacton, words, run))
+        columns.update(_levels(tacton, words, run))
     return columns
 
 
@@ -108,8 +124,8 @@ def _mean(values: Floats) -> float:
     return float(np.abs(values).max())
 
 
-def _levels(sheet: Row, tacton: str, words: str, run: Run) -> Iterator[tuple[str, float | None]]:
-    for claim in claims_of(sheet, tacton):
+def _levels(tacton: str, words: str, run: Run) -> Iterator[tuple[str, float | None]]:
+    for claim in claims_of(tacton):
         holds, value = claim_of(claim, [run])
         yield f"{claim}_{words}_holds", holds
         yield f"{claim}_{words}", value

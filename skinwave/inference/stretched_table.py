@@ -5,6 +5,7 @@ one row a sheet and Tacton, so that what Ctrl-C ends goes on there.
 import hashlib
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,8 @@ def fill(
     scheduler: str = "processes",
     workers: int | None = None,
 ) -> SweepOutcome:
-    """Compute the nearest sheets at large deflection that the folder has no row of.
+    """Compute the nearest sheets at large deflection that the folder has no row of, and where that
+    leaves a claim open, under all Tactons that it is about.
 
     Parameters
     ----------
@@ -57,11 +59,31 @@ def fill(
     -------
     SweepOutcome, of sheets under Tactons
     """
+    workers, chosen = engine.workers(scheduler, workers), stretched_sheets(rows, count)
+    (out / FOLDER / dataset.ROWS).mkdir(parents=True, exist_ok=True)
+    first = _fill_once(out, rows, chosen, progress, scheduler, workers)
+    if first.interrupted:
+        return first
+    then = _fill_once(out, rows, chosen, progress, scheduler, workers)
+    return replace(
+        then, found=first.found, done=first.done + then.done, failed=first.failed + then.failed,
+        seconds=first.seconds + then.seconds,
+    )  # fmt: skip
+
+
+def _fill_once(
+    out: Path,
+    rows: Sequence[Row],
+    chosen: Sequence[Row],
+    progress: Progress,
+    scheduler: str,
+    workers: int,
+) -> SweepOutcome:
+    """Compute what decides the claims of some sheets, as far as their rows tell so far."""
     started, release, folder = time.perf_counter(), version("skinwave"), out / FOLDER
-    workers = engine.workers(scheduler, workers)
+    stretched = read(out, rows)
     wanted = {_key(sheet, tacton, release): (sheet, tacton)
-              for sheet in stretched_sheets(rows, count) for tacton in deciding(sheet)}  # fmt: skip
-    (folder / dataset.ROWS).mkdir(parents=True, exist_ok=True)
+              for sheet in chosen for tacton in deciding(sheet, stretched)}  # fmt: skip
     there = dataset.names(folder)
     index = dataset.numbered(list(wanted), there)
     left = [key for key in wanted if key not in there]

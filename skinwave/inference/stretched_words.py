@@ -1,9 +1,9 @@
 """Claims at large deflection, in words and as a table, from the rows alone."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from skinwave.inference.knowledge import Row, value_words
-from skinwave.inference.large_deflection import CLAIMS, claims_of, refusal
+from skinwave.inference.large_deflection import CLAIMS, claims_of, refusal, verdict
 from skinwave.inference.nearest_sheets import sheets
 from skinwave.inference.stretched_table import PHASE
 from skinwave.numbers import decibel, significant
@@ -16,7 +16,8 @@ LARGE = (
     "By fem-nonlinear, in steps of 0.1 ms for 1 s from rest under the mean of the pressure, under "
     "the Tactons that decide: each without a path for M1, which asks for its harmonics; for M4 and "
     "M5 each modulated one with a path if the linear sheet shows the claim, else the one under "
-    "which its strongest rival, or multiple, of f_AM is: a claim that fails there fails. Beside it "
+    "which its strongest rival, or multiple, of f_AM is: a claim that fails there fails, and one "
+    "that does not is computed under all. Beside it "
     "the same modes of the same elements without stretching, in the steady state. Elements have "
     "Rayleigh damping for the loss factor, and curl and clips are left out."
 )
@@ -24,20 +25,14 @@ LARGE = (
 
 def outcomes(
     rows: Sequence[Row], stretched: Sequence[Row]
-) -> Iterator[tuple[str, Row, bool, bool]]:
-    """Claim, sheet, and whether it holds of the linear elements and at large deflection, under all
-    Tactons that decide it and were computed.
-    """
+) -> Iterator[tuple[str, Row, bool | None, bool | None]]:
+    """Claim, sheet, and its `verdict` of the linear elements and at large deflection."""
     by_key = {row["key"]: row for row in rows}
     for claim in CLAIMS:
         for key in dict.fromkeys(row["sheet"] for row in stretched):
             own = [row for row in stretched if row["sheet"] == key and row["status"] == "done"]
-            about = [row for row in own if row[f"{claim}_large_holds"] is not None]
-            if about and key in by_key:
-                linear, large = (
-                    all(row[f"{claim}_{how}_holds"] for row in about) for how in ("linear", "large")
-                )
-                yield claim, by_key[key], linear, large
+            if any(row.get(f"{claim}_large_holds") is not None for row in own) and key in by_key:
+                yield claim, by_key[key], verdict(own, claim, "linear"), verdict(own, claim)
 
 
 def stretched_sentences(rows: Sequence[Row], stretched: Sequence[Row]) -> str:
@@ -47,17 +42,24 @@ def stretched_sentences(rows: Sequence[Row], stretched: Sequence[Row]) -> str:
         return NONE
     count = len({sheet["key"] for _, sheet, _, _ in found})
     each = [
-        f"{claim} holds in {sum(large for *_, large in own)} of {len(own)} "
-        f"({sum(linear for _, _, linear, _ in own)} if it does not stretch)"
+        f"{claim} holds in {_count(large for *_, large in own)} of {len(own)} "
+        f"({_count(linear for _, _, linear, _ in own)} if it does not stretch)"
         for claim in CLAIMS
         if (own := [each for each in found if each[0] == claim])
     ]
-    changed = sorted({claim for claim, _, linear, large in found if linear != large})
-    verdict = f"{' and '.join(changed)} changes" if changed else "no claim changes"
+    changed = sorted({c for c, _, *both in found if None not in both and both[0] != both[1]})
+    said = f"{' and '.join(changed)} changes" if changed else "no claim changes"
     return (
         f"At {PHASE} {_of_which(count)}, under the Tactons that decide, {', '.join(each)}: "
-        f"{verdict}. {_deflections(stretched)}"
+        f"{said}. {_deflections(stretched)}"
     )
+
+
+def _count(verdicts: Iterable[bool | None]) -> str:
+    """How many hold, and how many are open."""
+    each = list(verdicts)
+    still = each.count(None)
+    return f"{each.count(True)}" + (f" or up to {each.count(True) + still}" if still else "")
 
 
 def _of_which(count: int) -> str:
@@ -70,8 +72,8 @@ def _deflections(stretched: Sequence[Row]) -> str:
     """How much less the sheets deflect than linear ones, and how far levels move."""
     done = [row for row in stretched if row["status"] == "done"]
     worst = max(done, key=lambda row: row["linear_over_thickness"])
-    moved = [abs(row[f"{c}_large"] - row[f"{c}_linear"]) for row in done for c in CLAIMS
-             if row[f"{c}_large"] is not None and row[f"{c}_linear"] is not None]  # fmt: skip
+    pairs = [(row.get(f"{c}_linear"), row.get(f"{c}_large")) for row in done for c in CLAIMS]
+    moved = [abs(b - a) for a, b in pairs if a is not None and b is not None]
     said = f", and levels move by up to {decibel(max(moved))} dB" if moved else ""
     return (
         f"They deflect by up to {significant(worst['large_over_thickness'], 2)} thicknesses at the "
@@ -94,13 +96,16 @@ def stretched_table(
     """Levels that decide each claim, of plates, and of elements without and with stretching."""
     by_key = {row["key"]: row for row in rows}
     table = []
-    for row in stretched:
+    order = list(dict.fromkeys(row["sheet"] for row in stretched))
+    for row in sorted(stretched, key=lambda row: order.index(row["sheet"])):
         sheet = by_key[row["sheet"]]
         named = f"{sheet['size']}, {value_words(sheet['support'])}"
         if row["status"] != "done":
             table.append([named, row["tacton"], "-", row["error"], "-", "-"])
             continue
-        for claim in claims_of(sheet, row["tacton"]):
+        for claim in claims_of(row["tacton"]):
+            if row.get(f"{claim}_large_holds") is None:
+                continue
             table.append([
                 named, row["tacton"],
                 claim, _level(row, claim, "linear"), _level(row, claim, "large"),
