@@ -201,10 +201,6 @@ class _Stage:
             loads=spread(P, typical_spots(body, points)),
         )  # fmt: skip
 
-    def solids(self, at: Sequence[float]) -> Solids:
-        """Materials at shares of the range."""
-        return solids_of(self.reference, self.bodies.body(at))
-
 
 def _reduced(
     stage: _Stage, clock: Clock, report: Progress, build: Build, h: float
@@ -248,11 +244,12 @@ def _training(stage: _Stage) -> list[tuple[float, ...]]:
 
 def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
     """Body at shares of the range, of a geometry that is meshed already, or of one of its own."""
-    shares = geometry_shares(stage.bodies, at)
+    body = stage.bodies.body(at)
+    shares = geometry_shares(stage.bodies, body)
     nearest = list(geometries.values())[int(np.argmax(shares))]
     is_known = nearest_geometry(stage.bodies, at) == at
     return Variant(
-        solids=_relaxed(stage.solids(at)), shares=shares,
+        solids=_relaxed(solids_of(stage.reference, body)), shares=shares,
         geometry=nearest if is_known else partial(stage.geometry, at),
     )  # fmt: skip
 
@@ -271,9 +268,14 @@ def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats
     frequencies : (f,) float, Hz
     amplitudes : (f, p c) complex, of the components that the probes read, in the quantity's unit
     """
-    solids = solids_of(prepared.reference, _body(prepared, values))
+    return lines_of(prepared, _body(prepared, values))
+
+
+def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
+    """The same of a body that differs from the scene's by values of the free keys alone."""
+    solids = solids_of(prepared.reference, body)
     of_parts = weights(prepared.affine, solids, prepared.frequencies)
-    found = steady_lines(prepared.bases, of_parts, _shares(prepared, values))
+    found = steady_lines(prepared.bases, of_parts, geometry_shares(prepared.bodies, body))
     s = 2j * np.pi * prepared.frequencies
     return prepared.frequencies, found * line_factor(
         prepared.scene.reading.asked, s, (), found.shape[1]
@@ -290,7 +292,7 @@ def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
     """Reduced body of values of the free keys, for any Tacton."""
     body = relaxing(_body(prepared, values), FIT_TOLERANCE)
-    shares = _shares(prepared, values)
+    shares = geometry_shares(prepared.bodies, body)
     outputs, load, points = (
         np.tensordot(shares, each, 1) for each in (prepared.outputs, prepared.load, prepared.points)
     )
@@ -332,12 +334,6 @@ def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
     return with_values(prepared.scene.body, prepared.keys, values)
 
 
-def _shares(prepared: ParametricBody, values: Mapping[str, float]) -> Floats:
-    """Shares (g,) of the geometries that the body of some values is interpolated between."""
-    at = [key.share(values[key.key]) for key in prepared.keys]
-    return geometry_shares(prepared.bodies, at)
-
-
 def _relaxed(solids: Solids) -> Solids:
     """The materials with Prony series for modulus laws of their own."""
     return replace(solids, materials=tuple(m.relaxing() for m in solids.materials))
@@ -357,11 +353,14 @@ def _bases(
     )
     moving = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
     kept = (frequencies == 0) | (strengths > FAINTEST * moving).any(axis=0)
-    many = training_shares(len(stage.bodies.meshed), INSIDE).tolist()
+    many = [
+        stage.bodies.body(at) for at in training_shares(len(stage.bodies.meshed), INSIDE).tolist()
+    ]
     found, error = line_bases(
         model.parts, model.forces[:, kept], model.outputs,
-        np.stack([weights(model.affine, stage.solids(at), frequencies[kept]) for at in many]),
-        np.stack([geometry_shares(stage.bodies, at) for at in many]),
+        np.stack([weights(model.affine, solids_of(stage.reference, each), frequencies[kept])
+                  for each in many]),
+        np.stack([geometry_shares(stage.bodies, each) for each in many]),
         SHARE * stage.tolerance, partial(report, "lines"),
     )  # fmt: skip
     return frequencies[kept], found, error

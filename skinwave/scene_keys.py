@@ -334,6 +334,8 @@ def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
 
 
 PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
+MODULI, LOSSES = "modulus_scale", "loss_scale"  # of a material, beside its keys; 1 is as it is
+SCALES = {MODULI: "modulus", LOSSES: "loss"}  # arguments of `Material.scaled`
 MATERIAL = {
     "density_kg_m3": _scaled("density"),
     "shear_modulus_pa": _scaled("shear_modulus"),

@@ -40,11 +40,10 @@ from skinwave.bodies.parts import solid_of
 from skinwave.distributions import Distribution, known_to, parent_of
 from skinwave.scene import Body, Scene
 from skinwave.scene_file import from_table, to_table
+from skinwave.scene_keys import LOSSES, MODULI, SCALES
 
 PRESSURE, FACTOR = "focus.peak_pressure_pa", 2.0
-MODULI, LOSSES = "modulus_scale", "loss_scale"  # of a material, beside its keys; 1 is the preset
 REGION = "regions."  # of a key, before the name of a region
-SCALES = {MODULI: "modulus", LOSSES: "loss"}  # arguments of `Material.scaled`
 PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # of keys by section
 
 

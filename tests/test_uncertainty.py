@@ -33,6 +33,7 @@ from skinwave.uncertainty.propagate import (
     propagate,
 )
 from skinwave.uncertainty.sampling import samples
+from skinwave.uncertainty.shared_body import shared_body
 from skinwave.uncertainty.solutions import solve
 
 SHARES = np.array([1e-6, 0.05, 0.3, 0.5, 0.77, 0.95, 1 - 1e-6])
@@ -51,6 +52,21 @@ poisson = 0.4999
 viscosity_pa_s = 5
 [probes]
 points_mm = [[0, 0], [10, 0]]
+"""
+
+SMALL = """
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.25
+[body]
+kind = "slab"
+size_x_mm = 30
+size_y_mm = 30
+thickness_mm = { value = 12, low = 10, high = 14 }
+sides = "clamped"
+material = "palm"
+[probes]
+points_mm = [[0, 0], [6, 0]]
 """
 
 
@@ -220,6 +236,30 @@ def test_a_model_without_an_exact_map_gives_probes_alone():
     assert not found.has_map
     assert found.rms[1] == pytest.approx(2 * found.rms[0])
     assert found.lines[0, :, 0].max() == pytest.approx(25, rel=1e-3)  # half of 50 Pa, at f_AM
+
+
+def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own():
+    scene = loads(SMALL)
+    found = propagate(scene, 20, model="fem", h=0.006)
+    assert [s.key for s in found.spreads] == [
+        "body.thickness_mm", PRESSURE, "body.material.modulus_scale", "body.material.loss_scale",
+    ]  # fmt: skip
+    assert found.method.family
+    alone = replace(found.method, family=None)
+    keys = [s.key for s in found.spreads]
+    for k in (0, 7, 13):
+        own = solve(
+            with_values(scene, dict(zip(keys, found.values[k].tolist(), strict=True))), alone
+        )
+        assert np.abs(found.lines[k] - own.lines).max() < 1e-3 * own.lines.max()
+        apart = np.abs(found.waveform[k] - own.waveform).max() / np.abs(own.waveform).max()
+        assert apart < 0.02  # of which the end of the free vibration
+
+
+def test_few_samples_and_other_numbers_than_materials_have_bodies_of_their_own():
+    scene = loads(SMALL.replace("clamped", "absorbing"))
+    values = samples(spreads_of(scene), 4)
+    assert shared_body(scene, spreads_of(scene), values, method_of(scene, "fem", h=0.01)) is None
 
 
 def test_a_sample_that_makes_no_scene_is_named():

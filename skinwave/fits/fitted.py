@@ -16,8 +16,8 @@ from skinwave.fits.solve import Solution
 from skinwave.numbers import significant
 from skinwave.scene import Scene
 from skinwave.scene_file import to_table, with_distributions
-from skinwave.scene_keys import DERIVED, write_material
-from skinwave.spreads import LOSSES, MODULI, SCALES, spreads_of
+from skinwave.scene_keys import DERIVED, LOSSES, MODULI, SCALES, write_material
+from skinwave.spreads import spreads_of
 from skinwave.sweeps.variation import varied
 
 Estimates = tuple[Estimate, ...]

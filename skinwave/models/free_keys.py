@@ -13,7 +13,7 @@ from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
-from skinwave.scene_keys import MATERIAL, PRONY, SECTIONS, with_key, write_material
+from skinwave.scene_keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
 
 THICKNESS = ("thickness_mm",)  # path of a key
 MOST_THICKNESSES = 2
@@ -26,7 +26,7 @@ Part = int | str | None  # of a body: a layer, a region by its name, or what is 
 @dataclass(frozen=True, kw_only=True)
 class FreeKey:
     """A number of a body that is free from `low` to `high`: its `key` in a scene file, the `part`
-    that it is of, and the `path` in the material's table, or `THICKNESS`.
+    that it is of, and the `path` in the material's table, one of `SCALES`, or `THICKNESS`.
     """
 
     key: str
@@ -51,6 +51,11 @@ class FreeKey:
     def is_thickness(self) -> bool:
         """Whether it changes the mesh."""
         return self.path == THICKNESS
+
+    @property
+    def is_scale(self) -> bool:
+        """Whether it is a factor on all moduli, or on all losses, of a material."""
+        return self.path[0] in SCALES
 
 
 def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
@@ -97,11 +102,8 @@ def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]
         )
     thick = {key.part: _value(key, values) / 1e3 for key in keys if key.is_thickness}
     for part in dict.fromkeys(key.part for key in keys if not key.is_thickness):
-        table = write_material(solid_at(body, part))
-        for key in (key for key in keys if key.part == part and not key.is_thickness):
-            table = _changed(table, key.path, _value(key, values))
-        solid = SECTIONS["body"]["material"].read("material", table)
-        body = _with_material(body, part, solid)
+        own = [key for key in keys if key.part == part and not key.is_thickness]
+        body = _with_material(body, part, _with_numbers(solid_at(body, part), own, values))
     return _with_thicknesses(body, thick) if thick else body
 
 
@@ -130,7 +132,7 @@ def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
     fastest shear waves below all layers, for which an absorbing layer is widest; layers of one
     range differ, so that their elements do.
     """
-    fastest = {"shear_modulus_pa": 1.0, "density_kg_m3": 0.0}
+    fastest = {"shear_modulus_pa": 1.0, MODULI: 1.0, "density_kg_m3": 0.0}
     inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
     return tuple(
         1.0 if key.is_thickness else fastest.get(key.path[0], x) if key.part is None else x
@@ -149,7 +151,7 @@ def solid_at(body: Body, part: Part) -> Material:
 
 def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
     part, path = _part(body, key)
-    known = [name for name in MATERIAL if name not in FIXED]
+    known = [*(name for name in MATERIAL if name not in FIXED), *SCALES]
     if path[0] in FIXED:
         raise ValueError(
             f"'{key}' cannot be free: only moduli, losses, times and densities change none of a "
@@ -164,6 +166,8 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
         raise ValueError(
             f"{key} is free from {low:g} to {high:g}; give a finite range, low to high"
         )
+    if path[0] in SCALES and not low > 0:
+        raise ValueError(f"{key} is free from {low:g}, and must be above 0; give a least factor")
     return FreeKey(key=key, part=part, path=tuple(path), low=low, high=high)
 
 
@@ -237,6 +241,20 @@ def _value(key: FreeKey, values: Mapping[str, float]) -> float:
             "over a wider one"
         )
     return value
+
+
+def _with_numbers(
+    solid: Material, keys: Sequence[FreeKey], values: Mapping[str, float]
+) -> Material:
+    """Material with other numbers, which are scaled then."""
+    table = write_material(solid)
+    for key in keys:
+        if not key.is_scale:
+            table = _changed(table, key.path, _value(key, values))
+    if not all(key.is_scale for key in keys):
+        solid = SECTIONS["body"]["material"].read("material", table)
+    factors = {SCALES[key.path[0]]: _value(key, values) for key in keys if key.is_scale}
+    return solid.scaled(**factors) if factors else solid
 
 
 def _changed(table: Any, path: Sequence[str], value: float) -> Any:

@@ -74,11 +74,11 @@ def range_of(
     )  # fmt: skip
 
 
-def geometry_shares(bodies: Range, at: Sequence[float]) -> Floats:
-    """Shares (g,) of the known geometries in the matrices of a body at shares (k,) of its range."""
+def geometry_shares(bodies: Range, body: Body) -> Floats:
+    """Shares (g,) of the known geometries in the matrices of a body of the range."""
     if len(bodies.geometries) == 1:
         return np.ones(1)
-    values = _functions(bodies.body(at))[list(bodies.chosen)]
+    values = _functions(body)[list(bodies.chosen)]
     return np.asarray(np.linalg.solve(bodies.known.T, values))
 
 

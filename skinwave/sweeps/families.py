@@ -13,6 +13,7 @@ import numpy as np
 
 from simple_model import named_lines
 from skinwave import parametric
+from skinwave.effort import Progress
 from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.parametric import ParametricBody
@@ -111,9 +112,16 @@ def mesh_of(family: Family, tolerance: float, h: float | None, solver: str) -> M
 @lru_cache(maxsize=4)
 def reduced(family: Family, h: float, tolerance: float, solver: str) -> ParametricBody:
     """Reduced-order model of a family, with elements of h in metre; cached on disk."""
+    return reduced_anew(family, h, tolerance, solver)
+
+
+def reduced_anew(
+    family: Family, h: float, tolerance: float, solver: str, progress: Progress | None = None
+) -> ParametricBody:
+    """The same, of which this process keeps none."""
     free = {key: (low, high) for key, low, high in family.ranges}
     within = min(parametric.TOLERANCE, SHARE * tolerance)
-    return parametric.prepare(family.scene, free, within, h=h, solver=solver)
+    return parametric.prepare(family.scene, free, within, progress, h=h, solver=solver)
 
 
 def _limits(cases: Iterable[DesignPoint]) -> dict[str, tuple[float, float]]:

@@ -20,8 +20,8 @@ from skinwave.distributions import Distribution, called, without_spreads
 from skinwave.plain_text import number_in
 from skinwave.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene_file import content, dumps, from_table, loads, parsed, read, to_table
-from skinwave.scene_keys import SECTIONS, renamed, with_key, write_material
-from skinwave.spreads import SCALES, scaled
+from skinwave.scene_keys import SCALES, SECTIONS, renamed, with_key, write_material
+from skinwave.spreads import scaled
 from skinwave.sweeps.saltelli import EDGE, saltelli_shares
 
 DESIGNS = ("factorial", "zip", "lhs", "sobol")

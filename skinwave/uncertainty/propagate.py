@@ -3,7 +3,7 @@ percentiles.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,7 +16,9 @@ from skinwave.models.flat_body import HARMONIC
 from skinwave.processes import as_worker, pool
 from skinwave.scene import Scene
 from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
-from skinwave.uncertainty.sampling import samples
+from skinwave.uncertainty.indices import ENDS
+from skinwave.uncertainty.sampling import one_at_a_time, samples
+from skinwave.uncertainty.shared_body import shared_body
 from skinwave.uncertainty.solutions import Method, Solution, has_exact_map, map_axes, solve
 
 PERCENTILES = (5, 25, 50, 75, 95)
@@ -99,6 +101,9 @@ def propagate(
     spreads = spreads_of(scene)
     values = samples(spreads, n, seed)
     method = method_of(scene, model, h=h, solver=solver)
+    ends = one_at_a_time(spreads, ENDS)
+    family = shared_body(scene, spreads, np.vstack([values, ends]), method, progress)
+    method = replace(method, family=family)
     return ensemble(scene, spreads, values, method, workers=workers, progress=progress)
 
 

@@ -40,6 +40,7 @@ MAPS = (
     "Percentiles of the RMS motion at each place, and how many samples have a place above the "
     "threshold of detection; dotted: the path of the focus."
 )
+TOGETHER = ", all of one reduced-order model, in the steady state"
 TORNADO = (
     "One number at a time at the ends of the 90 % about its median, all others at their central "
     "values: the widest bar is what is worth measuring first."
@@ -129,7 +130,7 @@ def sentences(found: Ensemble) -> list[str]:
     """Number of samples and method, and the 90 % of the motion, of its level and of the area."""
     n, d = found.values.shape
     how = "by the wavenumber integral, in the steady state" if found.method.mapped else (
-        f"by {found.method.model}"
+        f"by {found.method.model}{TOGETHER if found.method.family else ''}"
     )  # fmt: skip
     p, asked = strongest(found), found.scene.reading.asked
     x, y = (1e3 * z for z in found.scene.probes[p])

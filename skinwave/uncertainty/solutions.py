@@ -1,7 +1,8 @@
 """Vibration of one sample of a scene: waveforms, lines, and RMS and sensation level on a map.
 
-Where the wavenumber integral is exact it gives all of them, in the steady state; elsewhere the
-model that the scene requires gives the probes. Motion of a linear body is in proportion to the
+Where the wavenumber integral is exact it gives all of them, in the steady state; where bodies of
+elements are reduced together, their model gives the probes, likewise; elsewhere the model that the
+scene requires does. Motion of a linear body is in proportion to the
 pressure, so that samples that differ by that alone are solved once.
 """
 
@@ -19,13 +20,16 @@ from simple_model.path_operator import PathOperator, path_operator
 from simple_model.pressure import MovingPressure
 from simple_model.response import SETTLE, phasors
 from skinwave.bodies.analytic import exact_waves
+from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.models.flat_body import HARMONIC
 from skinwave.models.prepared import sample_times
+from skinwave.parametric import lines_of
 from skinwave.pictures.styles import SHOWN
 from skinwave.scene import Scene
 from skinwave.simulation import compute
 from skinwave.surface import REACH, SILENT, grid, has_wavenumber_integral
+from skinwave.sweeps.families import Family, reduced
 
 STEP = 0.004  # m between places of a map
 FAINT = 1e-3  # of the load's strongest line: lines that no sample has
@@ -37,7 +41,8 @@ KEPT = 4  # solutions that may differ by the pressure alone
 class Method:
     """How samples are solved: names of the `lines` that are looked at, the `model` with its element
     size `h` in metre, its `solver` and its `tolerance`; whether it is `mapped`, by the wavenumber
-    integral; and whether all samples have one load, `same_load`, but for its pressure.
+    integral; whether all samples have one load, `same_load`, but for its pressure; and the `family`
+    of their bodies, if these are reduced together.
     """
 
     lines: tuple[str, ...]
@@ -47,6 +52,7 @@ class Method:
     tolerance: float = 0.05
     mapped: bool = False
     same_load: bool = False
+    family: Family | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,6 +145,8 @@ def _scaled(found: Solution, factor: float) -> Solution:
 def _solved(scene: Scene, method: Method) -> Solution:
     wanted = [line_frequency(scene.tacton, name) for name in method.lines]
     frequencies = np.array([f or 0.0 for f in wanted])
+    if method.family:
+        return _of_family(scene, method, method.family, frequencies)
     return (_mapped if method.mapped else _computed)(scene, method, frequencies)
 
 
@@ -160,6 +168,22 @@ def _mapped(scene: Scene, method: Method, frequencies: Floats) -> Solution:
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points = np.vstack([scene.probe_points, places])
     f, a = _lines(scene, points, method)
+    return _of_lines(scene, frequencies, f, a, (len(y), len(x)))
+
+
+def _of_family(scene: Scene, method: Method, family: Family, frequencies: Floats) -> Solution:
+    """Solution by the reduced-order model of all samples' bodies, at the probes."""
+    size = method.h or default_size(family.scene.body)
+    shared = reduced(family, size, method.tolerance, method.solver)
+    f, a = lines_of(shared, scene.body)
+    ratio = scene.pressure.peak_pressure / family.scene.pressure.peak_pressure
+    return _of_lines(scene, frequencies, f, ratio * a, NO_MAP.shape)
+
+
+def _of_lines(
+    scene: Scene, frequencies: Floats, f: Floats, a: Complex, of_map: tuple[int, ...]
+) -> Solution:
+    """Solution in the steady state, of lines (f, p + ny nx) at the probes and then on a map."""
     f, a = f[f > 0], a[f > 0]
     p = len(scene.probes)
     rms = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2)
@@ -168,8 +192,8 @@ def _mapped(scene: Scene, method: Method, frequencies: Floats) -> Solution:
         lines=_at(frequencies, f, np.abs(a[:, :p])),
         rms=rms[:p],
         level=_highest(f, np.abs(a[:, :p])),
-        map_rms=rms[p:].reshape(len(y), len(x)),
-        map_level=_highest(f, np.abs(a[:, p:])).reshape(len(y), len(x)),
+        map_rms=rms[p:].reshape(of_map),
+        map_level=_highest(f, np.abs(a[:, p:])).reshape(of_map),
     )
 
 

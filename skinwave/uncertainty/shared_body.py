@@ -1,0 +1,62 @@
+"""One reduced-order model for the bodies of all samples, where they differ in materials and
+thicknesses alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from meshes.tetmesh import Floats
+from skinwave.bodies.sizes import default_size
+from skinwave.effort import Progress
+from skinwave.models.affine_scenes import check_scene
+from skinwave.models.free_keys import free_keys
+from skinwave.models.linear_elements import FEM
+from skinwave.scene import Scene
+from skinwave.spreads import PRESSURE, Spread
+from skinwave.sweeps.families import LEAST, Family, reduced_anew
+from skinwave.uncertainty.solutions import Method
+
+
+def shared_body(
+    scene: Scene,
+    spreads: Sequence[Spread],
+    values: Floats,
+    method: Method,
+    progress: Progress | None = None,
+) -> Family | None:
+    """Family of the bodies of all samples, reduced and cached on disk.
+
+    Parameters
+    ----------
+    scene : Scene, with the central values
+    spreads : (d,) Spread
+    values : (n, d) float, of all samples
+    method : Method
+    progress : called with the name of the phase and the fraction done
+
+    Returns
+    -------
+    Family; None if a sample needs a body of its own, or there are so few that these cost less
+    """
+    free = {
+        spread.key: (float(column.min()), float(column.max()))
+        for spread, column in zip(spreads, values.T, strict=True)
+        if spread.key != PRESSURE
+    }
+    few = len(values) < LEAST * max(len(free), 1)
+    of_elements = method.model == FEM.name and method.same_load and not method.mapped
+    if few or not (
+        free and of_elements and scene.reading.is_plain and scene.pressure.peak_pressure
+    ):
+        return None
+    plain = replace(scene, spreads=())
+    family = Family(
+        scene=plain, ranges=tuple((key, *ends) for key, ends in free.items()), members=len(values)
+    )
+    size = method.h or default_size(scene.body)
+    try:
+        check_scene(plain, free_keys(plain.body, free), method.tolerance)
+        reduced_anew(family, size, method.tolerance, method.solver, progress)
+    except ValueError:  # wider than one reduced-order model reaches, say
+        return None
+    return family
