@@ -28,15 +28,38 @@ def shared_body(
 
     Parameters
     ----------
-    scene : Scene, with the central values
-    spreads : (d,) Spread
-    values : (n, d) float, of all samples
-    method : Method
+    scene, spreads, values, method : as for `family_of`
     progress : called with the name of the phase and the fraction done
 
     Returns
     -------
-    Family; None if a sample needs a body of its own, or there are so few that these cost less
+    Family; None if a sample needs a body of its own
+    """
+    family = family_of(scene, spreads, values, method)
+    if family:
+        size = method.h or default_size(scene.body)
+        try:
+            reduced_anew(family, size, method.tolerance, method.solver, progress)
+        except ValueError:  # wider than one reduced-order model reaches, say
+            return None
+    return family
+
+
+def family_of(
+    scene: Scene, spreads: Sequence[Spread], values: Floats, method: Method
+) -> Family | None:
+    """Family of the bodies of all samples, if one reduced-order model may serve them.
+
+    Parameters
+    ----------
+    scene : Scene, with the central values
+    spreads : (d,) Spread
+    values : (n, d) float, of all samples
+    method : Method
+
+    Returns
+    -------
+    Family; None if there is none, or so few samples that bodies of their own cost less
     """
     free = {
         spread.key: (float(column.min()), float(column.max()))
@@ -50,13 +73,9 @@ def shared_body(
     ):
         return None
     plain = replace(scene, spreads=())
-    family = Family(
-        scene=plain, ranges=tuple((key, *ends) for key, ends in free.items()), members=len(values)
-    )
-    size = method.h or default_size(scene.body)
     try:
         check_scene(plain, free_keys(plain.body, free), method.tolerance)
-        reduced_anew(family, size, method.tolerance, method.solver, progress)
-    except ValueError:  # wider than one reduced-order model reaches, say
+    except ValueError:
         return None
-    return family
+    ranges = tuple((key, *ends) for key, ends in free.items())
+    return Family(scene=plain, ranges=ranges, members=len(values))

@@ -29,6 +29,7 @@ from skinwave.simulation import compute
 from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
 from skinwave.uncertainty.propagate import method_of, percentiles
 from skinwave.uncertainty.sampling import samples
+from skinwave.uncertainty.shared_body import family_of
 from skinwave.web.model import FAINTEST_LEVEL, HIGHEST
 from skinwave.web.slabs import Table, is_tabulated, lowest, tabulate, wavenumbers
 from skinwave.web.waves import flat_motion
@@ -37,6 +38,7 @@ FIRST = 16  # samples after which there are bands to be seen, which the others r
 EXACT = 2e-3  # relative error of a waveform by a table
 NOT_SAMPLED = "since nothing that can be sampled here is uncertain"
 FIXED = ("tacton.duration_s",)  # samples have one length
+TOGETHER = 12.0  # reductions of one body that one of all samples takes, about
 NONE = partial(np.empty, 0)
 
 Respond = Callable[[Scene], Response]
@@ -88,7 +90,8 @@ class Sampler:
         spreads, left_out = _parted(spreads_of(scene), respond is not None)
         if all(spread.key == PRESSURE for spread in spreads):
             respond = None
-        said = (*_who(spreads, self.samples), *_cost(left_out, self.samples, central))
+        together = bool(left_out) and _is_together(scene, central, self.samples)
+        said = (*_who(spreads, self.samples), *_cost(left_out, self.samples, central, together))
         if not spreads:
             yield Bands(sentences=(f"Uncertainty: no bands, {NOT_SAMPLED}.", *said))
             return
@@ -206,16 +209,29 @@ def _who(spreads: Sequence[Spread], count: int) -> tuple[str, ...]:
     return (f"The bands are 5 to 95 % of {count} samples of {keys}.",)
 
 
-def _cost(left_out: Sequence[Spread], count: int, central: Response) -> tuple[str, ...]:
+def _is_together(scene: Scene, central: Response, count: int) -> bool:
+    """Whether one reduced-order model gives all samples of a body of elements."""
+    spreads = spreads_of(scene)
+    values = samples(spreads, count)
+    return bool(family_of(scene, spreads, values, method_of(scene, central.model)))
+
+
+def _cost(
+    left_out: Sequence[Spread], count: int, central: Response, together: bool
+) -> tuple[str, ...]:
     """Sentence on what is uncertain and not in the bands, and what samples of it would cost."""
     if not left_out:
         return ()
-    seconds = count * sum(central.effort.seconds.values())
+    each = sum(central.effort.seconds.values())
+    seconds = (TOGETHER if together else count) * each
     time = f", about {significant(seconds / 60, 2)} min" if seconds else ""
+    how = f"each of {count} samples would be computed anew"
+    if together:
+        how = f"the body would be reduced once for all {count} samples"
     keys = ", ".join(s.key for s in left_out)
     return (
-        f"The spread of {keys} is not in the bands: each of {count} samples would be computed "
-        f"anew{time}; skinwave run --samples {count} does.",
+        f"The spread of {keys} is not in the bands: {how}{time}; skinwave run --samples {count} "
+        "does.",
     )
 
 
