@@ -191,7 +191,7 @@ class _Stage:
         """Full body at shares of the range."""
         body, build = self.bodies.body(at), self.mesh(at)
         affine = assemble_affine(
-            build.mesh, meshed_materials(build), fixed=build.fixed, absorbing=build.absorbing,
+            build.mesh, meshed_materials(build), fixed=build.constraints, absorbing=build.absorbing,
             drag=build.drag, support=build.support, coat=build.coat,
         )  # fmt: skip
         P, points = _surface(self.scene, build)

@@ -99,7 +99,7 @@ def free_body(
     (P, points), reference = surface, reference_of(base, made, ())
     report("factorise", 0.0)
     affine = assemble_affine(
-        made.mesh, meshed_materials(made), fixed=made.fixed, absorbing=made.absorbing,
+        made.mesh, meshed_materials(made), fixed=made.constraints, absorbing=made.absorbing,
         drag=made.drag, support=made.support, coat=made.coat,
     )  # fmt: skip
     frequencies = np.geomspace(LOWEST, BAND, FREQUENCIES)
