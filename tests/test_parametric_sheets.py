@@ -30,6 +30,7 @@ from skinwave.models.prepared import prepare as own_body
 from skinwave.scene import BODIES, Placement, Scene
 from skinwave.sweeps import families
 from skinwave.sweeps.variation import DesignPoint
+from skinwave.web import waves
 from skinwave.web.free_bodies import free_body, reduced_at
 
 MODULUS, LOSS = "body.material.shear_modulus_pa", "body.material.loss_factor"
@@ -197,6 +198,22 @@ def test_a_fit_reduces_a_sheet_in_air_once(monkeypatch):
     found = predicted.with_reduction(aim, parameters, silent).reduced
     assert found
     assert {key.key for key in found.keys} == {MODULUS, THICKNESS}
+
+
+def test_ranges_too_wide_for_one_model_leave_each_sheet_its_own(monkeypatch):
+    def refusing(*given, **options):
+        raise fem.reduced.NotReduced("200 moments are not enough")
+
+    monkeypatch.setattr(predicted.parametric, "prepare", refusing)
+    aim = predicted.target(SCENE, "fem", SCENE.reading.asked, SCENE.probe_points)
+    assert predicted.with_reduction(aim, parse([f"{MODULUS}=1e8:1e10"], []), silent) is aim
+    monkeypatch.setattr(waves, "free_body", refusing)
+    base = replace(SHEET, width=0.02, height=0.02)
+    stiffer = replace(base, material=base.solid.scaled(modulus=1.5))
+    scene = replace(SCENE, body=stiffer, probes=((1e-3, 0.0),))
+    moved = waves.BodyResponses()(scene, silent, base=base).response
+    own = waves.BodyResponses()(scene, silent).response
+    np.testing.assert_allclose(moved.values, own.values, atol=1e-6 * np.abs(own.values).max())
 
 
 @pytest.mark.parametrize(

@@ -165,21 +165,27 @@ class BodyResponses:
         return replace(found, body=replace(found.body, effort=effort))
 
     def _of_materials(self, scene: Scene, base: Body, progress: Progress) -> Reduced:
-        """The body of a scene by one that is reduced for all materials of a range."""
+        """The body of a scene by one that is reduced for all materials of a range, if it is."""
         key = _reduction(replace(scene, body=base))
         found = self._keep("free", key, lambda: self._free(scene, base, progress))
-        return of_materials(found, scene.body)
+        return of_materials(found, scene.body) if found else self._reduce(scene, progress)
 
-    def _free(self, scene: Scene, base: Body, progress: Progress) -> tuple[FreeBody, Reduced]:
-        """Body for all materials of a range, and what it has with each of them."""
+    def _free(
+        self, scene: Scene, base: Body, progress: Progress
+    ) -> tuple[FreeBody, Reduced] | None:
+        """Body for all materials of a range, and what it has with each of them; None if the range
+        is too wide for one reduced-order model.
+        """
         clock = Clock()
         made, _ = self._keep("body", base, lambda: _assembled(base, progress))
         with clock("reduce"):
             P, points, spots = pushed(made, scene.pressure)
             forces = P @ spots.T
-            found = free_body(
-                base, made, (P, points), fem.load_subspace(forces, TOLERANCE / 5), forces, progress,
-            )  # fmt: skip
+            subspace = fem.load_subspace(forces, TOLERANCE / 5)
+            try:
+                found = free_body(base, made, (P, points), subspace, forces, progress)
+            except ValueError:
+                return None
         progress("read the surface", 1.0)
         found = replace(found, effort=replace(found.effort, seconds=clock.seconds))
         own = seen_of(made, base, reduced_at(found, base), found.basis)
