@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import fft, sparse
@@ -33,6 +34,9 @@ from scipy.sparse.linalg import LinearOperator
 from fem.assembly import Operators
 from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
+
+if TYPE_CHECKING:
+    from fem.affine import AffineOperators
 
 FLAT = np.eye(3)[:2]
 UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
@@ -52,7 +56,7 @@ class AddedMass:
 
 def added_mass(
     mesh: TetMesh,
-    operators: Operators,
+    operators: Operators | AffineOperators,
     density: float,
     *,
     axes: Floats = FLAT,

@@ -5,7 +5,8 @@
         + drag rho_r D_r
 
 with the Rayleigh damping (rate, lag) of a loss factor, springs S and dashpots R at surfaces, and
-the absorbing layer D. Poisson's ratios are fixed, so that the dynamic stiffness
+the absorbing layer D. The added mass F of a fluid, which can only be applied, joins M, and rate_1 F
+joins C (`added_mass`). Poisson's ratios are fixed, so that the dynamic stiffness
 
     A(s) = sum_q w_q(s) A_q
 
@@ -24,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from fem.added_mass import AddedMass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, springs
 from fem.coat import Coat
@@ -35,7 +37,7 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
 
 ABSENT = 1e-30  # of a modulus and a density beside 1: below all round-off
-KINDS = ("stiffness", "mass", "dashpots", "layer", "springs")  # of matrices
+KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", "fluid")  # of matrices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +55,9 @@ class Solids:
 class AffineOperators:
     """Matrices (n, n), sparse or projected, of each material (r,) or none of a kind that is not
     there: `stiffness` per shear modulus, `mass` per density, `dashpots` per impedance
-    sqrt(mu rho), absorbing `layer` per density; and one matrix of `springs`, or none.
+    sqrt(mu rho), absorbing `layer` per density; and one matrix or none of `springs`, and of the
+    added mass of a `fluid` in kg, a LinearOperator until it is projected, which is damped at the
+    rate of the first material.
 
     `free` (n_free,) and `n_dofs` as of `Operators`.
     """
@@ -65,11 +69,12 @@ class AffineOperators:
     springs: tuple[Any, ...]
     free: Ints
     n_dofs: int
+    fluid: tuple[Any, ...] = ()
 
     @property
     def parts(self) -> tuple[Any, ...]:
         """All matrices A_q, in the order of `weights`."""
-        return (*self.stiffness, *self.mass, *self.dashpots, *self.layer, *self.springs)
+        return tuple(part for kind in KINDS for part in getattr(self, kind))
 
 
 def assemble_affine(
@@ -118,7 +123,7 @@ def assemble_affine(
 
 
 def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
-    """Operators of materials without modulus laws of their own."""
+    """Operators of materials without modulus laws of their own; with a fluid, projected ones."""
     terms = [[term for term in m.prony if term.modulus] for m in solids.materials]
     damping = [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in solids.materials]
     mu, rho, eta = (
@@ -128,8 +133,9 @@ def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
     rate, lag = np.array(damping).T
     R = _sum(affine.dashpots, np.sqrt(mu * rho)) + _sum(affine.layer, solids.drag * rho)
     K = _sum(affine.stiffness, mu) + _sum(affine.springs, [solids.springs])
-    M = _sum(affine.mass, rho)
-    C = _sum(affine.stiffness, eta + lag * mu) + _sum(affine.mass, rate * rho) + R
+    M = _sum(affine.mass, rho) + _sum(affine.fluid, [1.0])
+    by_mass = _sum(affine.mass, rate * rho) + _sum(affine.fluid, rate)
+    C = _sum(affine.stiffness, eta + lag * mu) + by_mass + R
     branches = [
         MaxwellBranch(K=_sum(affine.stiffness, shares), time=time)
         for time in sorted({term.time for each in terms for term in each})
@@ -139,6 +145,16 @@ def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
     return Operators(
         K=K, C=C, M=M, R=R, free=affine.free, n_dofs=affine.n_dofs, branches=tuple(branches)
     )
+
+
+def in_vacuum(affine: AffineOperators) -> AffineOperators:
+    """The same without a fluid, whose added mass leaves no matrix sparse."""
+    return replace(affine, fluid=())
+
+
+def fluid_of(affine: AffineOperators, solids: Solids) -> AddedMass | None:
+    """Added mass of a fluid apart from `operators_of` the body in vacuum; None without any."""
+    return next((AddedMass(M=F, rate=_rate(solids.materials[0])) for F in affine.fluid), None)
 
 
 def weights(affine: AffineOperators, solids: Solids, frequencies: ArrayLike) -> NDArray[Any]:
@@ -162,6 +178,7 @@ def weights(affine: AffineOperators, solids: Solids, frequencies: ArrayLike) -> 
         *(s * sqrt(m.shear_modulus * m.density) for m, _ in zip(each, affine.dashpots)),  # noqa: B905
         *(s * solids.drag * m.density for m, _ in zip(each, affine.layer)),  # noqa: B905
         *(np.full_like(s, solids.springs) for _ in affine.springs),
+        *(s**2 + s * _rate(m) for m, _ in zip(each, affine.fluid)),  # noqa: B905
     ]
     return np.stack(columns, axis=-1)
 

@@ -17,18 +17,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from fem.affine import (
     AffineOperators,
     Solids,
+    fluid_of,
+    in_vacuum,
+    interpolated,
     modulus,
     operators_of,
     project,
     weights,
     with_parts,
 )
+from fem.affine_solution import line_solution
 from fem.line_basis import FAINT, Complex, line_errors
-from fem.linear_solver import available, factorise
 from fem.reduced import reduce
 from meshes.tetmesh import Floats
 
@@ -118,7 +122,7 @@ def reduce_affine(
     """
     t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
     first = training[t].geometry()
-    M = operators_of(first.affine, training[t].solids).M
+    M = _mass(first.affine, training[t].solids)
     basis, visited, checked = np.zeros((len(first.affine.free), 0)), set[int](), 0
     parts = np.zeros((len(geometries), len(first.affine.parts), 0, 0))
     errors: dict[int, float] = {}
@@ -126,8 +130,9 @@ def reduce_affine(
         visited.add(t)
         full = training[t].geometry()
         model = reduce(
-            operators_of(full.affine, training[t].solids), full.probes, band, tolerance / 2,
-            loads=full.loads, solver=solver,
+            operators_of(in_vacuum(full.affine), training[t].solids), full.probes, band,
+            tolerance / 2, loads=full.loads, added=fluid_of(full.affine, training[t].solids),
+            solver=solver,
             progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
         )  # fmt: skip
         smaller = basis.shape[1] or int(NESTED * len(model.K))
@@ -137,7 +142,7 @@ def reduce_affine(
         others = [t for t, each in enumerate(training) if t not in visited or each.is_between]
         errors = {}
         for t, k, near, least in _suspects(found, training, others, frequencies, smaller):
-            exact = _outputs(training[t], frequencies[k], k, solver)
+            exact = _outputs(found, training[t], frequencies, k, solver)
             errors[t] = _norm(near - exact) / max(_norm(exact), least)
         checked += len(errors)
         t = max(errors, key=lambda each: errors[each], default=t)
@@ -172,17 +177,22 @@ def steady(
     -------
     (k, p) complex, metre
     """
-    n = size or model.basis.shape[1]
-    chosen = list(chosen)
+    states = _states(model, variant, frequencies, list(chosen), size or model.basis.shape[1])
+    outputs = np.tensordot(variant.shares, model.outputs[..., : states.shape[1]], 1)
+    return np.asarray(states @ outputs.T, np.complex128)
+
+
+def _states(
+    model: AffineModel, variant: Variant, frequencies: Floats, chosen: list[int], n: int
+) -> Complex:
+    """Steady state (k, n) at chosen lines (k,) in the first n vectors."""
     parts = np.tensordot(variant.shares, model.parts[..., :n, :n], 1)
     forces = np.tensordot(variant.shares, model.forces[:, chosen, :n], 1)
     each = weights(model.affine, variant.solids, frequencies[chosen])
-    states = [
+    return np.stack([
         np.linalg.solve(np.tensordot(w, parts, 1), force)
         for w, force in zip(each, forces, strict=True)
-    ]
-    outputs = np.tensordot(variant.shares, model.outputs[..., :n], 1)
-    return np.asarray(np.stack(states) @ outputs.T, np.complex128)
+    ])  # fmt: skip
 
 
 def _projected(
@@ -235,22 +245,35 @@ def _suspects(
         seen.add(geometry)
 
 
-def _outputs(variant: Variant, frequency: float, line: int, solver: str) -> Complex:
+def _outputs(
+    model: AffineModel, variant: Variant, frequencies: Floats, line: int, solver: str
+) -> Complex:
     """Steady state (p,) of the full body's outputs at one line."""
     full = variant.geometry()
-    (of_line,) = weights(full.affine, variant.solids, [frequency])
-    u = _solution(full.affine, of_line, full.forces[line], solver)
+    (of_line,) = weights(full.affine, variant.solids, frequencies[[line]])
+    u = line_solution(
+        full.affine, of_line, full.forces[line], solver=solver,
+        fluid_share=_fluid_share(model, variant, frequencies, line) if full.affine.fluid else 0.0,
+    )  # fmt: skip
     return np.asarray(sparse.csr_array(full.probes[:, full.affine.free]) @ u)
 
 
-def _solution(affine: AffineOperators, of_line: Complex, force: Complex, solver: str) -> Complex:
-    """Displacement (n_free,) of the full body at one line."""
-    A = sum(w * part for w, part in zip(of_line, affine.parts, strict=True))
-    backend = solver if solver in available(complex_valued=True) else "auto"
-    return factorise(sparse.csr_array(A), backend=backend).solve(force.astype(np.complex128))
+def _fluid_share(model: AffineModel, variant: Variant, frequencies: Floats, line: int) -> float:
+    """Added mass of a fluid over the body's own, of the motion at one line by the model."""
+    (x,) = _states(model, variant, frequencies, [line], model.basis.shape[1])
+    small = interpolated(model.affine, model.parts, variant.shares)
+    own = sum(m.density * A for m, A in zip(variant.solids.materials, small.mass, strict=True))
+    (F,) = small.fluid
+    return float(np.vdot(x, F @ x).real / np.vdot(x, own @ x).real)
 
 
-def _joined(basis: Floats, more: Floats, M: sparse.csr_array) -> Floats:
+def _mass(affine: AffineOperators, solids: Solids) -> LinearOperator:
+    """Mass (n, n) of the full body, with that of a fluid."""
+    own, fluid = operators_of(in_vacuum(affine), solids).M, fluid_of(affine, solids)
+    return aslinearoperator(own) + fluid.M if fluid else aslinearoperator(own)
+
+
+def _joined(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
     """Mass-orthonormal basis (n, m) with the directions of more vectors (n, k) that are new; the
     first are orthonormal as they come.
     """

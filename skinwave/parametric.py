@@ -3,8 +3,9 @@
 `prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds:
 Galerkin's equations of each line of the scene's load in a few states. `answer` is the waveform from
 rest, by the poles of the reduced-order model; `at` is that model, for any other Tacton. Poisson's
-ratios and the elements are fixed: with a thickness the nodes of one mesh move. The absorbing layer
-of a slab with absorbing sides is as wide as the fastest shear waves need.
+ratios and the elements are fixed: with a thickness the nodes of one mesh move, or modulus and
+density of a sheet's stand for it. The absorbing layer of a slab with absorbing sides is as wide as
+the fastest shear waves need.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ import fem
 from fem.affine import (
     AffineOperators,
     Solids,
-    assemble_affine,
     interpolated,
     operators_of,
     weights,
@@ -45,7 +45,7 @@ from skinwave.models.free_keys import (
     values_at,
     with_values,
 )
-from skinwave.models.free_materials import Reference, meshed_materials, reference_of, solids_of
+from skinwave.models.free_materials import Reference, affine_operators, reference_of, solids_of
 from skinwave.models.full import spent
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import line_factor, load_lines_at, probe_rows, spread, surface_load
@@ -67,7 +67,7 @@ TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
 FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
 FAINTEST_LOAD = 1e-6  # of the strongest line of the load
-FORMAT = "parametric 2"  # of what is cached
+FORMAT = "parametric 3"  # of what is cached
 ARRAYS = ("outputs", "load", "points", "frequencies")
 BETWEEN = 0.3  # of each range: a body of no known geometry
 INSIDE = 128  # materials inside the ranges, for the lines' bases
@@ -173,7 +173,7 @@ def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
     def at(shares: Sequence[float]) -> Body:
         return relaxing(with_values(body, keys, values_at(keys, shares)), FIT_TOLERANCE)
 
-    return range_of(at, meshing_shares(keys), [key.is_thickness for key in keys], h)
+    return range_of(at, meshing_shares(keys), [key.moves for key in keys], h)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,10 +190,7 @@ class _Stage:
     def geometry(self, at: tuple[float, ...]) -> Geometry:
         """Full body at shares of the range."""
         body, build = self.bodies.body(at), self.mesh(at)
-        affine = assemble_affine(
-            build.mesh, meshed_materials(build), fixed=build.fixed, absorbing=build.absorbing,
-            drag=build.drag, support=build.support, coat=build.coat,
-        )  # fmt: skip
+        affine = affine_operators(body, build)
         P, points = _surface(self.scene, build)
         return Geometry(
             affine=affine, probes=_probes(self.scene, body, build),

@@ -17,6 +17,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave import parametric
 from skinwave.bodies import BODIES, Body, Layer, Phalanx
 from skinwave.bodies.build import build, operators
+from skinwave.models.affine_scenes import has_affine_operators
 from skinwave.models.free_keys import free_keys, values_at
 from skinwave.models.free_keys import with_values as with_free_values
 from skinwave.models.laws import check_laws, has_own_law, relaxing
@@ -25,7 +26,6 @@ from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads, read
 from skinwave.simulation import compute
 from skinwave.spreads import spreads_of, with_values
-from skinwave.web.free_bodies import can_be_free
 
 FINGER = BODIES["fingertip"]
 SHAPE = meshes.Fingertip(
@@ -180,7 +180,7 @@ DENSITY = "body.regions.bone.density_kg_m3"
 @pytest.mark.parametrize("base", ["free", "clamped"])
 def test_materials_of_tissue_and_bone_are_free(body, base):
     body = replace(body, base=base)
-    assert can_be_free(body)
+    assert has_affine_operators(body)
     tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.006, speed=3.0))
     probes = ((0.0, 0.0), (3e-3, 2e-3))
     scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=probes)

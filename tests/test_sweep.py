@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import fem.affine_solution
 import fem.reduced
-import fem.reduced_affine
 from skinwave import extensions
 from skinwave.cli import main
 from skinwave.pictures.styles import style
@@ -188,7 +188,7 @@ def counted(monkeypatch, folder):
     sweeping._prepared.cache_clear()
     families.reduced.cache_clear()
     made = []
-    for module in (fem.reduced, fem.reduced_affine):
+    for module in (fem.reduced, fem.affine_solution):
         inner = module.factorise
         counting = lambda *a, inner=inner, **k: made.append(a) or inner(*a, **k)  # noqa: E731
         monkeypatch.setattr(module, "factorise", counting)

@@ -269,6 +269,8 @@ class BodyKind:
     morph : called as `discretise`, and with a `reference`: the mesh that this has with elements of
         the size, its nodes moved in proportion to the thicknesses of the body's layers; None where
         they do not follow these
+    equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
+        density stand for it (`sheet.bending_equivalent`); None where each has its own mesh
     grid : grid of its structured mesh, whose lines may be where the error is; None without one
     check_size : raises a ValueError for an element size in metre that has too many elements
     default_size : default element size of a body, metre
@@ -299,6 +301,7 @@ class BodyKind:
     words: Callable[[Body], str] = lambda body: _size(body)
     discretise: Callable[[Body, float], Discretised] | None = None
     morph: Callable[..., Discretised] | None = None
+    equivalent: Callable[[Body], float] | None = None
     grid: Grid | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20

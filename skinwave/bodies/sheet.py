@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.added_mass import AddedMass, added_mass
+from fem.affine import AffineOperators
 from fem.assembly import Operators
 from fem.finite_strain import Membrane
 from fem.materials import Material, rayleigh_damping
@@ -50,7 +51,7 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     -------
     Discretised
     """
-    thickness = max(body.depth, thickness or _equivalent(body))
+    thickness = max(body.depth, thickness or equivalent(body))
     planes = [clip_lines(body.mounting, *each) for each in enumerate((body.width, body.height))]
     return Discretised(
         mesh=sheet(body.width, body.height, thickness, h, planes=planes),
@@ -69,8 +70,10 @@ def _held(body: Body, mesh: TetMesh) -> NDArray[np.bool_]:
     return found | (found.any(axis=1, keepdims=True) & body.placement.is_tilted)
 
 
-def _equivalent(body: Body) -> float:
-    """Thickness in metre of elements that is small beside the sheet and its clips."""
+def equivalent(body: Body) -> float:
+    """Thickness in metre of elements that is small beside the sheet and its clips, whatever its
+    own: up to it one mesh stands for sheets of all thicknesses.
+    """
     least = SHEET_THICKNESS * min(body.width, body.height)
     reach = body.mounting.clip_radius if body.mounting.clips else 0.0
     return min(least, CLIP_THICKNESS * reach) if reach else least
@@ -212,7 +215,7 @@ def refuse_open_air(body: Body) -> None:
     )
 
 
-def air(body: Body, build: Build, operators: Operators) -> AddedMass | None:
+def air(body: Body, build: Build, operators: Operators | AffineOperators) -> AddedMass | None:
     """Added mass of the air around a meshed sheet, for `fem.reduce`.
 
     Parameters
@@ -252,6 +255,7 @@ SHEET = register(
             "a6-sheet": {"width": 0.148, "height": 0.105, **OF_A_SIZE},
         },
         discretise=discretise,
+        equivalent=equivalent,
         check_size=_check_size,
         default_size=lambda body: min(body.width, body.height) / SHEET_CELLS,
         interactive_size=2.5e-3,

@@ -146,7 +146,8 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
 
 def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> Target:
     """Target whose body is reduced once, where the model reduces bodies and of its scene only
-    materials and the pressure are varied.
+    materials, thicknesses and the pressure are varied, within ranges that one reduced-order model
+    serves.
 
     Parameters
     ----------
@@ -165,9 +166,9 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     scene = aim.varied({})
     try:
         check_scene(scene, free_keys(scene.body, ranges), parametric.TOLERANCE)
-    except ValueError:  # of a key that changes more than materials, or what no affine sum gives
+        return replace(aim, reduced=parametric.prepare(scene, ranges, progress=progress))
+    except ValueError:  # of what no affine sum gives, or ranges too wide for one model
         return aim
-    return replace(aim, reduced=parametric.prepare(scene, ranges, progress=progress))
 
 
 def predicted_lines(aim: Target, frequencies: Floats) -> Predict:

@@ -7,6 +7,7 @@ import numpy as np
 from simple_model.load_spectrum import load_lines
 from simple_model.quantities import STRAIN
 from skinwave.bodies.mounting import FRAME
+from skinwave.bodies.sheet import refuse_open_air
 from skinwave.models.free_keys import FreeKey
 from skinwave.models.laws import check_laws
 from skinwave.scene import Body, Scene
@@ -69,23 +70,31 @@ def _check_body(body: Body) -> None:
             "a body with free materials is an isotropic sheet in a frame, or none: tension and "
             "other mountings do not scale with its modulus; reduce the body of each material"
         )
-    if body.air:
-        raise ValueError(
-            "a body with free materials has no air: its added mass is a dense operator; leave air "
-            "out, or reduce the body of each material"
-        )
+    refuse_open_air(body)
 
 
 def _check_reading(scene: Scene, keys: Sequence[FreeKey]) -> None:
     asked, solid = scene.reading.asked, scene.body.solid
-    if asked.field == STRAIN and any(key.is_thickness for key in keys):
-        raise ValueError(
-            f"{scene.reading.words} of elements that move with a thickness is not smooth in it; "
-            "take a displacement, velocity or acceleration"
-        )
+    if any(key.is_thickness for key in keys):
+        _check_thick(scene)
     rows, doubled = (asked.rows(each) for each in (solid, solid.scaled(modulus=2.0)))
     if asked.relaxes or not np.array_equal(rows, doubled):
         raise ValueError(
             f"{scene.reading.words} depends on the material beyond the motion, which is all that a "
             "body with free materials gives; take a displacement, velocity or strain"
+        )
+
+
+def _check_thick(scene: Scene) -> None:
+    """Refuse what depends on a free thickness beyond the motion of the mesh."""
+    asked = scene.reading.asked
+    if scene.body.of_kind.equivalent and not asked.is_normal:
+        raise ValueError(
+            f"{scene.reading.words} goes with the thickness of a sheet beyond the motion of its "
+            "middle; take the normal displacement, velocity or acceleration"
+        )
+    if asked.field == STRAIN:
+        raise ValueError(
+            f"{scene.reading.words} of elements that move with a thickness is not smooth in it; "
+            "take a displacement, velocity or acceleration"
         )

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from math import isfinite, log
+from math import inf, isfinite, log
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,8 @@ Part = int | str | None  # of a body: a layer, a region by its name, or what is 
 @dataclass(frozen=True, kw_only=True)
 class FreeKey:
     """A number of a body that is free from `low` to `high`: its `key` in a scene file, the `part`
-    that it is of, and the `path` in the material's table, one of `SCALES`, or `THICKNESS`.
+    that it is of, and the `path` in the material's table, one of `SCALES`, or `THICKNESS`; and
+    whether the mesh `moves` with it.
     """
 
     key: str
@@ -34,6 +35,7 @@ class FreeKey:
     path: tuple[str, ...]
     low: float
     high: float
+    moves: bool = False
 
     def at(self, share: float) -> float:
         """Value at a share 0 to 1 of the range, of its logarithm if that is finite."""
@@ -49,7 +51,7 @@ class FreeKey:
 
     @property
     def is_thickness(self) -> bool:
-        """Whether it changes the mesh."""
+        """Whether it is a thickness of the body or of a layer."""
         return self.path == THICKNESS
 
     @property
@@ -168,7 +170,8 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
         )
     if path[0] in SCALES and not low > 0:
         raise ValueError(f"{key} is free from {low:g}, and must be above 0; give a least factor")
-    return FreeKey(key=key, part=part, path=tuple(path), low=low, high=high)
+    moves = tuple(path) == THICKNESS and body.of_kind.morph is not None
+    return FreeKey(key=key, part=part, path=tuple(path), low=low, high=high, moves=moves)
 
 
 def _part(body: Body, key: str) -> tuple[Part, list[str]]:
@@ -204,14 +207,14 @@ def _part(body: Body, key: str) -> tuple[Part, list[str]]:
 
 
 def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
-    """Refuse thicknesses that do not move one mesh."""
+    """Refuse thicknesses that one mesh does not stand for."""
     if not keys:
         return
     kind = body.of_kind
-    if kind.morph is None:
+    if kind.morph is None and kind.equivalent is None:
         raise ValueError(
             f"'{keys[0].key}' cannot be free: the matrices of a {body.kind} are no sums over its "
-            "thicknesses; free those of a slab, or reduce a body for each value"
+            "thicknesses; free those of a slab, disc or sheet, or reduce a body for each value"
         )
     if len(keys) > MOST_THICKNESSES:
         raise ValueError(
@@ -220,6 +223,13 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
         )
     if low := [key.key for key in keys if not key.low > 0]:
         raise ValueError(f"{low[0]} is free from 0 or below; give a least value above 0")
+    most = 1e3 * kind.equivalent(body) if kind.equivalent else inf
+    if high := [key for key in keys if key.high > most * (1 + OUTSIDE)]:
+        raise ValueError(
+            f"{high[0].key} is free up to {high[0].high:g} mm, the limit is {most:g} mm for this "
+            f"{body.kind}: elements of that thickness stand for all thinner ones, and thicker ones "
+            "have a mesh each; narrow the range, or reduce a body for each value"
+        )
 
 
 def _with_thicknesses(body: Body, thick: Mapping[Part, float]) -> Body:

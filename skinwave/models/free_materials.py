@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.affine import Solids
+from fem.affine import AffineOperators, Solids, assemble_affine
 from fem.materials import Material
 from meshes.tetmesh import Floats
 from skinwave.bodies import Body
 from skinwave.bodies.build import Build
+from skinwave.bodies.sheet import air, bending_equivalent
 from skinwave.models.free_keys import FreeKey, Part, solid_at
 
 AGREES = 1e-9  # of a modulus: materials that differ by less are one
@@ -87,15 +88,37 @@ def meshed_materials(build: Build) -> tuple[Material, ...]:
     return (*coat, *(build.material[region] for region in sorted(build.material)))
 
 
+def affine_operators(body: Body, build: Build) -> AffineOperators:
+    """Matrices of a meshed body, of each of its materials, and the added mass of the air around it.
+
+    Raises
+    ------
+    ValueError
+        If a sheet has air around a free edge.
+    """
+    affine = assemble_affine(
+        build.mesh, meshed_materials(build), fixed=build.constraints, absorbing=build.absorbing,
+        drag=build.drag, support=build.support, coat=build.coat,
+    )  # fmt: skip
+    around = air(body, build, affine)
+    return replace(affine, fluid=(around.M,)) if around else affine
+
+
 def solids_of(reference: Reference, body: Body) -> Solids:
-    """Materials of a body that differs from the one that was meshed by its materials alone."""
+    """Materials of a body that differs from the one that was meshed by its materials alone, or by
+    a thickness that they stand for.
+    """
     own = [solid_at(body, part) for part in reference.parts]
     before, now = reference.body.solid, body.solid
     # A modulus law has its own in a Prony series, which takes time to fit.
     resting = (reference.body.softest, body.softest) if reference.is_sprung else ()
     held = [m.shear_modulus + m.fast_modulus for m in resting]
+    meshed = [_times(m, *f) for m, f in zip(own, reference.factors, strict=True)]
+    if body.of_kind.equivalent:
+        thinner = body.depth / reference.body.depth
+        meshed = [bending_equivalent(m, thinner) for m in meshed]
     return Solids(
-        materials=tuple(_times(m, *f) for m, f in zip(own, reference.factors, strict=True)),
+        materials=tuple(meshed),
         springs=held[1] / held[0] if held else 1.0,
         drag=now.shear_speed / before.shear_speed,
     )

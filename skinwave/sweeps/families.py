@@ -21,7 +21,9 @@ from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Load, Reading, Scene
 from skinwave.sweeps.variation import DesignPoint
 
-LEAST, THICKNESS = 6, 15  # bodies of a family for each key that is free: fewer cost less alone
+# Bodies of a family for each key that is free, and for a thickness that moves the mesh: fewer cost
+# less alone.
+LEAST, THICKNESS = 6, 15
 PER_WORKER = 3  # bodies of a family: of fewer, workers that take one each are done sooner
 SHARE = 1 / 5  # of a tolerance: that of the reduced-order model
 AUDIBLE = 1e-2  # of the strongest line of a load: weaker ones make no scene harder
@@ -168,11 +170,11 @@ def _family(
     """Family of bodies that differ in keys; None if they cannot be reduced together."""
     limits = _limits(members.values())
     keys = [key for key in keys if key.key in limits]
-    if len(members) < sum(THICKNESS if key.is_thickness else LEAST for key in keys):
+    if len(members) < sum(THICKNESS if key.moves else LEAST for key in keys):
         return None
     free = {key.key: limits[key.key] for key in keys}
     scenes = [case.scene for case in members.values() if case.scene]
-    scene = max(scenes, key=lambda each: highest(each) / each.body.softest.shear_speed)
+    scene = max(scenes, key=_per_length)
     try:
         check_scene(scene, free_keys(scene.body, free), tolerance)
     except ValueError:
@@ -180,6 +182,12 @@ def _family(
     ranges = tuple((key, *limit) for key, limit in free.items())
     family = Family(scene=scene, ranges=ranges, members=len(members))
     return family, {solid: _values(case, keys) for solid, case in members.items()}
+
+
+def _per_length(scene: Scene) -> float:
+    """Waves per metre of the highest line that counts, of the body as if it were infinite."""
+    f = highest(scene)
+    return f / scene.body.of_kind.wave_speed(scene.body, f) if f else 0.0
 
 
 def _values(case: DesignPoint, keys: Iterable[FreeKey]) -> Values:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.affine import AffineOperators, Solids, assemble_affine, interpolated, operators_of, weights
+from fem.affine import AffineOperators, Solids, interpolated, operators_of, weights
 from fem.reduced_affine import AffineModel, Geometry, Variant, reduce_affine
 from meshes.tetmesh import Floats
 from simple_model import Effort
@@ -22,9 +22,8 @@ from simple_model.material import Material
 from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.effort import Progress
-from skinwave.models.affine_scenes import has_affine_operators
 from skinwave.models.free_keys import training_shares
-from skinwave.models.free_materials import Reference, meshed_materials, reference_of, solids_of
+from skinwave.models.free_materials import Reference, affine_operators, reference_of, solids_of
 from skinwave.models.laws import relaxing
 from skinwave.models.reduction import BAND, ReducedBody, reduced_variant
 from skinwave.scene import Body, Layer, solid_of
@@ -50,11 +49,6 @@ class FreeBody:
     points: Floats
     basis: Floats
     effort: Effort
-
-
-def can_be_free(body: Body) -> bool:
-    """Whether operators of a body are sums over its materials."""
-    return has_affine_operators(body) and not body.air
 
 
 def covers(base: Body, body: Body) -> bool:
@@ -98,10 +92,7 @@ def free_body(
     """
     (P, points), reference = surface, reference_of(base, made, ())
     report("factorise", 0.0)
-    affine = assemble_affine(
-        made.mesh, meshed_materials(made), fixed=made.fixed, absorbing=made.absorbing,
-        drag=made.drag, support=made.support, coat=made.coat,
-    )  # fmt: skip
+    affine = affine_operators(base, made)
     frequencies = np.geomspace(LOWEST, BAND, FREQUENCIES)
     forces = spots[affine.free].T
     some = np.linspace(0, len(forces), FREQUENCIES, endpoint=False).astype(int)

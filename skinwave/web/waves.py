@@ -35,6 +35,7 @@ from simple_model.response import step
 from skinwave.bodies.build import Build, build, operators
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
+from skinwave.models.affine_scenes import has_affine_operators
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import probe_rows, surface_load
 from skinwave.models.prepared import in_motion, sample_times
@@ -52,7 +53,7 @@ from skinwave.planning.assessment import sentences
 from skinwave.planning.warnings import NONLINEAR
 from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
-from skinwave.web.free_bodies import FreeBody, can_be_free, covers, free_body, reduced_at
+from skinwave.web.free_bodies import FreeBody, covers, free_body, reduced_at
 from skinwave.web.levels import level_of
 from skinwave.web.model import (
     FAINTEST_LEVEL,
@@ -121,7 +122,7 @@ class BodyResponses:
             table = self._keep("table", (scene.body, height), lambda: tabulate(known, height))
             return warned_of(scene, flat_answer(table, scene, moving))
         reduce = partial(self._reduce, scene, progress)
-        if base and base != scene.body and can_be_free(base) and covers(base, scene.body):
+        if base and base != scene.body and has_affine_operators(base) and covers(base, scene.body):
             reduce = partial(self._of_materials, scene, base, progress)
         body = self._keep("reduced", _reduction(scene), reduce)
         return warned_of(scene, reduced_answer(body, scene, moving))
@@ -164,21 +165,27 @@ class BodyResponses:
         return replace(found, body=replace(found.body, effort=effort))
 
     def _of_materials(self, scene: Scene, base: Body, progress: Progress) -> Reduced:
-        """The body of a scene by one that is reduced for all materials of a range."""
+        """The body of a scene by one that is reduced for all materials of a range, if it is."""
         key = _reduction(replace(scene, body=base))
         found = self._keep("free", key, lambda: self._free(scene, base, progress))
-        return of_materials(found, scene.body)
+        return of_materials(found, scene.body) if found else self._reduce(scene, progress)
 
-    def _free(self, scene: Scene, base: Body, progress: Progress) -> tuple[FreeBody, Reduced]:
-        """Body for all materials of a range, and what it has with each of them."""
+    def _free(
+        self, scene: Scene, base: Body, progress: Progress
+    ) -> tuple[FreeBody, Reduced] | None:
+        """Body for all materials of a range, and what it has with each of them; None if the range
+        is too wide for one reduced-order model.
+        """
         clock = Clock()
         made, _ = self._keep("body", base, lambda: _assembled(base, progress))
         with clock("reduce"):
             P, points, spots = pushed(made, scene.pressure)
             forces = P @ spots.T
-            found = free_body(
-                base, made, (P, points), fem.load_subspace(forces, TOLERANCE / 5), forces, progress,
-            )  # fmt: skip
+            subspace = fem.load_subspace(forces, TOLERANCE / 5)
+            try:
+                found = free_body(base, made, (P, points), subspace, forces, progress)
+            except ValueError:
+                return None
         progress("read the surface", 1.0)
         found = replace(found, effort=replace(found.effort, seconds=clock.seconds))
         own = seen_of(made, base, reduced_at(found, base), found.basis)
