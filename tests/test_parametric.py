@@ -251,7 +251,7 @@ def test_matrices_of_a_stretched_body_are_sums_over_known_geometries(layered):
     bodies = parametric._range(layered, keys, 5e-3)
     assert len(bodies.geometries) == 5  # 1, two thicknesses and their inverses
     at = [key.share(value) for key, value in zip(keys, (2.7, 11.0), strict=True)]
-    shares = geometry_shares(bodies, at)
+    shares = geometry_shares(bodies, bodies.body(at))
     assert shares.sum() == pytest.approx(1)
     wanted = operators(build_at(bodies, at))
     known = [operators(build_at(bodies, each)) for each in bodies.geometries]
