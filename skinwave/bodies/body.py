@@ -18,7 +18,7 @@ from simple_model.dispersion import DispersionCurves
 from simple_model.material import NOT_SKIN, PRESETS
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.grid import Grid
+from skinwave.bodies.grid import Grid, Sized
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
     FLAT,
@@ -270,6 +270,7 @@ class BodyKind:
         the size, its nodes moved in proportion to the thicknesses of the body's layers; None where
         they do not follow these
     grid : grid of its structured mesh, whose lines may be where the error is; None without one
+    sized : its unstructured mesh, whose elements may have any size anywhere; None without one
     check_size : raises a ValueError for an element size in metre that has too many elements
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
@@ -300,6 +301,7 @@ class BodyKind:
     discretise: Callable[[Body, float], Discretised] | None = None
     morph: Callable[..., Discretised] | None = None
     grid: Grid | None = None
+    sized: Sized | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3
