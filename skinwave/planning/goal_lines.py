@@ -74,7 +74,18 @@ def _words(lines: Lines) -> str:
 
 
 def uniform_dofs(body: Body, size: float, axes: str) -> float:
-    """Degrees of freedom, about, of a uniform mesh of elements of a size in metre."""
+    """Degrees of freedom of a large uniform mesh, without any absorbing layer.
+
+    Parameters
+    ----------
+    body : Body, of a kind with a grid
+    size : metre, of its elements
+    axes : of "xy", of which a half is modelled
+
+    Returns
+    -------
+    float
+    """
     grid = body.of_kind.grid
     assert grid  # else not asked for
     return _dofs(halves(grid.lines(body, size), axes))
