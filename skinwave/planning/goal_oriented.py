@@ -139,7 +139,7 @@ def _goal_refined(
         return _Trial(mesh=mesh, prepared=prepared, found=found)
 
     coarse = before = tried(family.coarse)
-    frequencies, sizes = _strongest(scene, coarse.prepared)
+    frequencies, sizes = strongest(scene, coarse.prepared)
     if not len(frequencies):
         return None
     report("goal-oriented estimate", 0.0)
@@ -170,7 +170,7 @@ def _extrapolated(before: _Trial, last: _Trial) -> float:
     return change * alike / (1 - alike) if alike < 1 else 1.0
 
 
-def _strongest(scene: Scene, prepared: Prepared) -> tuple[Floats, Floats]:
+def strongest(scene: Scene, prepared: Prepared) -> tuple[Floats, Floats]:
     """Frequencies (f,) in Hz of the lines that move the probes most, each relative to its motion,
     and root mean square (p,) of that; the mean counts where the body is held.
     """

@@ -63,7 +63,7 @@ def family_of_sizes(scene: Scene, body: Body, axes: str, tolerance: float, solve
             return GoalMesh(
                 discretise=sized.by(field), follows=field, ratio=known.error(lengths) / whole,
                 words=f"{1e3 * lengths.min():.1f} to {1e3 * lengths.max():.1f} mm",
-                widest=float(lengths[passed].max()),
+                widest=float(lengths[passed].max(initial=0.0)),
             )  # fmt: skip
 
         return Estimated(error=float(found.error.max()), finer=finer)
