@@ -42,7 +42,7 @@ AIM = 0.8  # of the tolerance, so that one goal-oriented mesh is enough
 # coarse mesh are not followed further.
 MOST_ALIKE, LEAST_ALIKE = 0.5, 0.05
 SMALL = 4000  # degrees of freedom of a uniform structured mesh that is tried before
-EASY = 0.03  # tolerance that the second of the coarsest uniform meshes of a hand may meet
+EASY = 0.04  # tolerance that the second of the coarsest uniform meshes of a hand may meet
 MESHES, MOST_DOFS = 3, 250_000  # goal-oriented meshes that are tried, and the largest, about
 FAINTEST = 1e-3  # of the largest motion: that of a probe which its error counts relative to
 
