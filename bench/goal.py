@@ -20,8 +20,8 @@ from meshes.shapes.structured import with_planes
 from meshes.tetmesh import Floats
 from simple_model.load_spectrum import pressure_lines
 from skinwave.bodies import Body
+from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
-from skinwave.bodies.build import operators
 from skinwave.bodies.grid import mirrored
 from skinwave.models.goal import goal_estimate
 from skinwave.models.loads import probe_rows, surface_load
@@ -64,9 +64,15 @@ def reference(body: Body) -> Lines:
     return x, y, -1e-3 * np.array(DOWN_LAYERS if body.layers else DOWN)[::-1]
 
 
+def on_lines(body: Body, lines: Lines) -> Build:
+    """Body on grid lines."""
+    assert body.of_kind.grid  # that of all bodies here
+    return build_body(body, discretise=body.of_kind.grid.on(lines))
+
+
 def probed(scene: Scene, lines: Lines) -> tuple[fem.Complex, int, float]:
     """Probes' displacement (p,) at one line, the dofs, and the line's frequency in Hz."""
-    build = build_body(scene.body, lines=lines)
+    build = on_lines(scene.body, lines)
     made = operators(build)
     P, points = surface_load(build, scene.load)
     S, _ = probe_rows(scene.body, build, scene.probe_points, scene.reading)
@@ -100,7 +106,7 @@ def compare(name: str) -> None:
     print(f"    estimate {100 * estimate.max():.2f} %; by probe over the true error ", end="")
     print(np.round(estimate / off, 2), flush=True)
     print("    along x, y, z", np.round(known.along.sum(axis=0) / known.along.sum(), 2))
-    mesh = build_body(body, lines=equal[1]).mesh
+    mesh = on_lines(body, equal[1]).mesh
     least = ideal(corner_volumes(mesh.points, mesh.tets), known.along.sum(axis=1))
     print(f"  ideal elements of any size: {least:.2f} of the uniform dofs", flush=True)
     goal = [

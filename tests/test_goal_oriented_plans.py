@@ -13,7 +13,8 @@ from skinwave.bodies.parts import Placement
 from skinwave.bodies.supports import Sides
 from skinwave.comparison import compare
 from skinwave.models.prepared import answer, prepare
-from skinwave.planning.goal_oriented import goal_refined, has_goal_oriented, widest_on_path
+from skinwave.planning.goal_lines import widest_on_path
+from skinwave.planning.goal_oriented import goal_refined, has_goal_oriented
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import refined
 from skinwave.scene import Layer, Scene
@@ -68,13 +69,13 @@ def test_error_of_a_planned_mesh_is_that_from_the_analytic_solution(monkeypatch)
 
 def test_lines_follow_layers_symmetry_and_the_focal_spot():
     scene = scene_of(LAYERED)
-    found = goal_refined(scene, LAYERED, 0.2)
-    x, y, z = found.goal_lines
+    found = goal_refined(scene, LAYERED, 0.2).goal
+    x, y, z = found.follows
     np.testing.assert_array_equal(y, -y[::-1])  # which all probes lie on the middle of
     assert y[len(y) // 2] == 0
     assert (x[0], x[-1], z[0], z[-1]) == (-0.023, 0.023, -0.012, 0)
-    assert widest_on_path(scene, LAYERED, found.goal_lines) < 2 * 4.4e-3
-    mesh_depths = prepare_depths(LAYERED, found.goal_lines)
+    assert widest_on_path(scene, LAYERED, found.follows) == found.widest < 2 * 4.4e-3
+    mesh_depths = prepare_depths(LAYERED, found.follows)
     for plane in (-1.3e-3, -5.3e-3):
         assert np.abs(mesh_depths - plane).min() < 1e-12
 
@@ -152,7 +153,7 @@ def test_a_small_uniform_mesh_is_taken_where_it_is_accurate_enough(tolerance, ex
 def test_a_load_of_nothing_has_a_uniform_mesh():
     scene = scene_of(LAYERED)
     still = replace(scene, pressure=replace(scene.pressure, peak_pressure=0.0))
-    assert goal_refined(still, LAYERED, 0.2).goal_lines is None
+    assert goal_refined(still, LAYERED, 0.2).goal is None
 
 
 def test_a_plan_is_the_same_again_with_and_without_a_cache(monkeypatch, tmp_path):

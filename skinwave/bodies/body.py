@@ -18,7 +18,7 @@ from simple_model.dispersion import DispersionCurves
 from simple_model.material import NOT_SKIN, PRESETS
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.grid import Grid
+from skinwave.bodies.grid import Grid, Sized
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
     FLAT,
@@ -272,6 +272,7 @@ class BodyKind:
     equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
         density stand for it (`sheet.bending_equivalent`); None where each has its own mesh
     grid : grid of its structured mesh, whose lines may be where the error is; None without one
+    sized : its unstructured mesh, whose elements may have any size anywhere; None without one
     check_size : raises a ValueError for an element size in metre that has too many elements
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
@@ -303,6 +304,7 @@ class BodyKind:
     morph: Callable[..., Discretised] | None = None
     equivalent: Callable[[Body], float] | None = None
     grid: Grid | None = None
+    sized: Sized | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3

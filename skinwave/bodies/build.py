@@ -1,6 +1,5 @@
 """A body that is meshed, with its materials and boundary conditions, under the device."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,10 +12,9 @@ from fem.coat import Coat
 from fem.materials import Material
 from fem.plane_stiffness import SIDES, Tension
 from meshes import TetMesh, half
-from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.body import Body
-from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import checked, default_size
 from skinwave.bodies.supports import bed, together
 
@@ -56,8 +54,7 @@ def build(
     body: Body,
     h: float | None = None,
     symmetry: str = "",
-    discretise: Callable[[Body, float], Discretised] | None = None,
-    lines: Lines | None = None,
+    discretise: Discretise | None = None,
 ) -> Build:
     """Mesh of a body with its materials and boundary conditions.
 
@@ -67,8 +64,7 @@ def build(
     h : metre, element size; the default of the body if not given
     symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
         part with positive coordinates is meshed, with symmetry conditions on these planes
-    discretise : instead of that of its kind
-    lines : grid lines (n,) in metre along x, y and z, of a kind that has some, instead of a size
+    discretise : instead of that of its kind, such as one that follows an error estimate
 
     Returns
     -------
@@ -80,13 +76,9 @@ def build(
         If the body is "none", or would have too many degrees of freedom.
     """
     size = checked(body, h or default_size(body), COMPARED)
-    if lines:
-        assert body.of_kind.grid  # else there are none
-        made = body.of_kind.grid.discretise(body, lines)
-    else:
-        discretise = discretise or body.of_kind.discretise
-        assert discretise  # else refused
-        made = discretise(body, size)
+    discretise = discretise or body.of_kind.discretise
+    assert discretise  # else refused
+    made = discretise(body, size)
     mesh = made.mesh
     sides = {"sides": body.sides} if isinstance(body.sides, str) else body.sides.by_name
     ends = {"bottom": body.base, **sides}

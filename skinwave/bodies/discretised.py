@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,9 @@ class Discretised:
     held: Callable[[TetMesh], NDArray[np.bool_]] | None = None
     tension: Tension | None = None
     stiffener: Callable[[TetMesh], sparse.csr_array] | None = None
+
+
+Discretise = Callable[[Any, float], Discretised]  # of a body, with elements of a size in metre
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:

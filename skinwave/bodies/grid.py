@@ -1,4 +1,4 @@
-"""Grids of bodies: structured meshes whose lines may be where the error is."""
+"""Meshes whose elements may be small where the error is: on grid lines, or of any size anywhere."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ import numpy as np
 from meshes import TetMesh
 from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats, Ints
-from skinwave.bodies.discretised import Discretised
+from meshes.volume.tetrahedralise import Sizing
+from skinwave.bodies.discretised import Discretise, Discretised
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,6 +32,29 @@ class Grid:
     cells: Callable[[Lines, TetMesh], Ints]
     coarsest: Callable[[Any], float] = lambda body: np.inf
     has: Callable[[Any], bool] = lambda body: True
+
+    def on(self, lines: Lines) -> Discretise:
+        """Mesh on lines, whatever the size that is asked for."""
+        return lambda body, h: self.discretise(body, lines)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sized:
+    """Unstructured mesh of a kind of body.
+
+    Parameters
+    ----------
+    discretise : mesh of a body as it lies before it is placed, as near to its surface as elements
+        of a size in metre are, with edge lengths as a function of points
+    has : whether a body has such a mesh
+    """
+
+    discretise: Callable[[Any, float, Sizing], Discretised]
+    has: Callable[[Any], bool] = lambda body: True
+
+    def by(self, sizing: Sizing) -> Discretise:
+        """Mesh with these edge lengths."""
+        return lambda body, h: self.discretise(body, h, sizing)
 
 
 def mirrored(line: Floats) -> Floats:

@@ -11,7 +11,6 @@ from scipy import sparse
 
 import fem
 from meshes import cache
-from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, path_samples, synthesise
@@ -19,6 +18,7 @@ from simple_model.material import Material
 from simple_model.sampling import resolving_step, shown
 from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
+from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models import Request
@@ -51,13 +51,13 @@ def meshed(
     clock: Clock,
     report: Progress,
     symmetry: str = "",
-    lines: Lines | None = None,
+    discretise: Discretise | None = None,
 ) -> Build:
     """Mesh of a body with its materials and boundary conditions, timed and reported.
 
     Parameters
     ----------
-    body, h, symmetry, lines : as for `bodies.build.build`, with its errors
+    body, h, symmetry, discretise : as for `bodies.build.build`, with its errors
     clock : Clock, which takes the time
     report : called with the name of the phase and the fraction done
 
@@ -67,7 +67,7 @@ def meshed(
     """
     with clock("mesh"):
         report("mesh", 0.0)
-        return build_body(body, h, symmetry, lines=lines)
+        return build_body(body, h, symmetry, discretise)
 
 
 def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:

@@ -8,7 +8,6 @@ from scipy import sparse
 
 import fem
 from meshes import cache
-from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_width
@@ -17,6 +16,7 @@ from simple_model.material import Material
 from simple_model.quantities import Quantity
 from simple_model.sampling import shown
 from skinwave.bodies.build import Build
+from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, dense_on_one_thread, peak_memory, silent, versions
 from skinwave.load import PRESSURE, Load
@@ -98,7 +98,7 @@ def prepare(
     symmetry: str = "",
     reading: Reading = SURFACE,
     load: Load = PRESSURE,
-    lines: Lines | None = None,
+    discretise: Discretise | None = None,
 ) -> Prepared:
     """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
     cache, once per machine.
@@ -115,7 +115,7 @@ def prepare(
     symmetry : as in `bodies.build.build`: of the load of all Tactons, wherever the probes lie
     reading : what the probes read; with symmetry, of normal motion alone
     load : what pushes, with its gravity; with symmetry, a pressure
-    lines : as in `bodies.build.build`, instead of h
+    discretise : as in `bodies.build.build`, of elements of no one size
 
     Returns
     -------
@@ -124,13 +124,13 @@ def prepare(
     clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
     symmetry = modelled_axes(body, probes, symmetry, reading, load)
     (progress or silent)("mesh", 0.0)
-    build = meshed(body, h, clock, silent, symmetry, lines)
+    build = meshed(body, h, clock, silent, symmetry, discretise)
     outputs, solids = probe_rows(body, build, images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
     name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
     with clock("read from cache"):
         entry = cache.load(name)
-    size = 0.0 if lines else h or default_size(body)
+    size = 0.0 if discretise else h or default_size(body)
     report = progress or silent
     found = _from_cache(entry, size, probes, outputs.shape[0], clock) if entry else None
     if not found:

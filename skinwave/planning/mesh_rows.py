@@ -1,11 +1,10 @@
 """Rows of a plan that say which mesh it takes, and why."""
 
-import numpy as np
-
 from skinwave.models.prepared import reduction_tolerance
 from skinwave.models.reduction import BAND
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
 from skinwave.planning.extent import PlanRow, coat_rows, left_out
+from skinwave.planning.goal_meshes import GoalMesh
 from skinwave.planning.refinement import Convergence, Refined
 from skinwave.scene import Scene
 
@@ -32,7 +31,7 @@ def element_rows(
     kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
     return [
         _symmetry_row(scene, axes),
-        _uniform_row(found, tolerance, h) if found.goal_lines is None else _goal_row(found),
+        _goal_row(found, found.goal) if found.goal else _uniform_row(found, tolerance, h),
         *coat_rows(scene.body, found.h),
         PlanRow(
             what="reduction",
@@ -78,15 +77,13 @@ def _uniform_row(found: Refined, tolerance: float, h: float | None) -> PlanRow:
     )
 
 
-def _goal_row(found: Refined) -> PlanRow:
-    """Row of a goal-oriented mesh, with the range of sizes along each axis."""
-    sizes = [1e3 * np.diff(line) for line in found.goal_lines or ()]
-    x, y, z = (f"{size.min():.1f} to {size.max():.1f}" for size in sizes)
+def _goal_row(found: Refined, mesh: GoalMesh) -> PlanRow:
+    """Row of a goal-oriented mesh, with its range of sizes."""
     return PlanRow(
         what="element size",
-        value=f"{x}, {y} and {z} mm along x, y and z, {found.prepared.effort.dofs:,} dofs",
-        reason=f"goal-oriented: small where, and along the axis that, the dual solutions of the "
-        f"probes say their error comes from; a mesh of {found.compared_dofs:,} dofs differs by so "
+        value=f"{mesh.words}, {found.prepared.effort.dofs:,} dofs",
+        reason=f"goal-oriented: small where the dual solutions of the probes say their error comes "
+        f"from; a mesh of {found.compared_dofs:,} dofs differs by so "
         f"much that an error of {100 * found.error:.2g} % is left, as of equal elements of about "
         f"{1e3 * found.h:.1f} mm",
     )

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
@@ -31,6 +30,7 @@ from skinwave.models.prepared import (
     reduction_tolerance,
 )
 from skinwave.models.reduction import oscillating
+from skinwave.planning.goal_meshes import GoalMesh
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
@@ -99,9 +99,9 @@ class Refined:
     with it, the size in metre that it was `compared` with, and the reduced body, `prepared` with
     it.
 
-    Of a goal-oriented mesh its `goal_lines`, three (n,) in metre, and the degrees of freedom of the
-    one that it was compared with, `compared_dofs`; h is then the size of uniform elements that are
-    predicted to be as accurate, and `compared` that of the coarse mesh.
+    A goal-oriented mesh is the `goal`, and the one that it was compared with has `compared_dofs`
+    degrees of freedom; h is then the size of uniform elements that are predicted to be as accurate,
+    and `compared` that of the coarse mesh.
     """
 
     h: float
@@ -109,7 +109,7 @@ class Refined:
     error: float
     compared: float
     prepared: Prepared
-    goal_lines: Lines | None = None
+    goal: GoalMesh | None = None
     compared_dofs: int = 0
 
 

@@ -11,7 +11,6 @@ from skinwave.bodies.sheet import tension
 from skinwave.models import named
 from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
 from skinwave.planning.extent import mean_sag
-from skinwave.planning.goal_oriented import widest_on_path
 from skinwave.planning.refinement import Refined, enough
 from skinwave.scene import Scene
 
@@ -33,7 +32,7 @@ def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
     -------
     sentences
     """
-    if mesh.goal_lines is None:
+    if mesh.goal is None:
         return of_elements(scene, mesh.h, mesh.error, tolerance)
     size = 1e3 * enough(scene.body, mesh.h, mesh.error, tolerance)
     return (
@@ -42,9 +41,7 @@ def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
             f"the goal-oriented mesh of {mesh.prepared.effort.dofs:,} dofs", mesh.error, tolerance,
             f"an element size of about {size:.2g} mm is",
         ),
-        *under_resolved(
-            widest_on_path(scene, scene.body, mesh.goal_lines), spot_scale(scene.pressure)
-        ),
+        *under_resolved(mesh.goal.widest, spot_scale(scene.pressure)),
     )  # fmt: skip
 
 
