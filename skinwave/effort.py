@@ -48,9 +48,8 @@ class _SharedLimit:
     one of its own would set again what another had found limited.
     """
 
-    def __init__(self, **libraries: str) -> None:
+    def __init__(self) -> None:
         self._lock, self._within, self._limit = Lock(), 0, ExitStack()
-        self._libraries = libraries
 
     def enter(self) -> None:
         from threadpoolctl import ThreadpoolController
@@ -58,8 +57,8 @@ class _SharedLimit:
         with self._lock:
             self._within += 1
             if self._within == 1:
-                chosen = ThreadpoolController().select(**self._libraries)
-                self._limit.enter_context(chosen.limit(limits=1))
+                limit = ThreadpoolController().limit(limits=1, user_api="blas")
+                self._limit.enter_context(limit)
 
     def leave(self) -> None:
         with self._lock:
@@ -68,32 +67,17 @@ class _SharedLimit:
                 self._limit.close()
 
 
-_ALL, _DENSE = _SharedLimit(user_api="blas"), _SharedLimit(internal_api="openblas")
+_ONE_THREAD = _SharedLimit()
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Linear algebra on one thread: in small products several wait for each other."""
-    with _on_one_thread(_ALL):
-        yield
-
-
-@contextmanager
-def dense_on_one_thread() -> Iterator[None]:
-    """Products of dense matrices on one thread, sparse solutions by MKL on all: these take 0.6 of
-    the time on two.
-    """
-    with _on_one_thread(_DENSE):
-        yield
-
-
-@contextmanager
-def _on_one_thread(limit: _SharedLimit) -> Iterator[None]:
-    limit.enter()
+    _ONE_THREAD.enter()
     try:
         yield
     finally:
-        limit.leave()
+        _ONE_THREAD.leave()
 
 
 def versions() -> dict[str, str]:

@@ -35,7 +35,7 @@ from simple_model import Effort, Response
 from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Clock, Progress, dense_on_one_thread, peak_memory, silent
+from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent
 from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import (
     FreeKey,
@@ -211,13 +211,13 @@ def _reduced(
         for geometry in geometries.values():
             geometry()
     few = [_variant(stage, at, geometries) for at in _training(stage)]
-    with clock("factorise and reduce"), dense_on_one_thread():
+    with clock("factorise and reduce"), one_thread():
         model = reduce_affine(
             list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
             solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
     surface = [_reduced_surface(scene, stage.mesh(at), model) for at in geometries]
-    with clock("lines"), dense_on_one_thread():
+    with clock("lines"), one_thread():
         kept, bases, error = _bases(stage, model, frequencies, few, report)
     effort = Effort(
         dofs=len(model.basis), reduced_dofs=model.basis.shape[1],

@@ -12,7 +12,7 @@ from simple_model.load_spectrum import Complex
 from skinwave.bodies.build import Build, build, operators
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.grid import halves
-from skinwave.effort import dense_on_one_thread, versions
+from skinwave.effort import one_thread, versions
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import load_lines_at, probe_rows, surface_load
 from skinwave.models.symmetry import even_part, images
@@ -129,7 +129,7 @@ def element_errors(
     )  # fmt: skip
     entry = cache.load(name)
     if entry is None:
-        with dense_on_one_thread():
+        with one_thread():
             entry = _solved(made, known[chosen], forces, duals, solver)
         cache.store(name, {}, **entry)
     unplaced = TetMesh(points=body.placement.undone(mesh.points), tets=mesh.tets)

@@ -18,7 +18,7 @@ from simple_model.sampling import shown
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Clock, Progress, dense_on_one_thread, peak_memory, silent, versions
+from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.load import PRESSURE, Load
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing
@@ -134,7 +134,7 @@ def prepare(
     report = progress or silent
     found = _from_cache(entry, size, probes, outputs.shape[0], clock) if entry else None
     if not found:
-        with dense_on_one_thread():
+        with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
             found = _prepared_anew(
                 body, build, size, probes, outputs, clock, report, solver, tolerance, name, load
             )

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 
-from fem.pardiso import mkl
 from skinwave import document
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress, one_thread, peak_memory
@@ -76,7 +75,6 @@ def run_study(
         if solid.of_kind.discretise:
             check_mesh(solid, h or default_size(solid))  # before any run
     started = time.perf_counter()
-    mkl()  # what is loaded later is not limited
     with helper() as aside, one_thread():
         bodies = _begun_bodies(scenes, aside, progress, h, solver)
         maps = _begun_maps(scenes, aside, progress, h, solver)
