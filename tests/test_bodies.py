@@ -387,8 +387,8 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
     scene = replace(SKIN, body=Body(kind="palm", relief=flat, **size), probes=THREE)
     palm = compute(scene, "fem", h=0.0045)
 
-    def with_ends(body, h, symmetry, **options):
-        made = build(body, h, symmetry, **options)
+    def with_ends(body, h, symmetry, *discretise):
+        made = build(body, h, symmetry, *discretise)
         at_end = 0.999 * body.height / 2  # not the plane of symmetry, which has the same normal
         mesh = meshes.tag_boundary(
             made.mesh, ends=lambda centres, _: np.abs(centres[:, 1]) > at_end
