@@ -33,7 +33,7 @@ from skinwave.uncertainty.propagate import (
     propagate,
 )
 from skinwave.uncertainty.sampling import samples
-from skinwave.uncertainty.shared_body import shared_body
+from skinwave.uncertainty.shared_body import has, shared_body
 from skinwave.uncertainty.solutions import solve
 
 SHARES = np.array([1e-6, 0.05, 0.3, 0.5, 0.77, 0.95, 1 - 1e-6])
@@ -254,6 +254,10 @@ def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own
         assert np.abs(found.lines[k] - own.lines).max() < 1e-3 * own.lines.max()
         apart = np.abs(found.waveform[k] - own.waveform).max() / np.abs(own.waveform).max()
         assert apart < 0.02  # of which the end of the free vibration
+    outermost = np.array([[14.0, *found.values[0, 1:]]])  # of a uniform distribution from 10 to 14
+    assert not has(found.method.family, dict(zip(keys, outermost[0].tolist(), strict=True)))
+    beyond, own = (ensemble(scene, found.spreads, outermost, m) for m in (found.method, alone))
+    assert np.array_equal(beyond.lines, own.lines)
 
 
 def test_few_samples_and_other_numbers_than_materials_have_bodies_of_their_own():

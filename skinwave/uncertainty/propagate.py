@@ -18,7 +18,7 @@ from skinwave.scene import Scene
 from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
 from skinwave.uncertainty.indices import ENDS
 from skinwave.uncertainty.sampling import one_at_a_time, samples
-from skinwave.uncertainty.shared_body import shared_body
+from skinwave.uncertainty.shared_body import has, shared_body
 from skinwave.uncertainty.solutions import Method, Solution, has_exact_map, map_axes, solve
 
 PERCENTILES = (5, 25, 50, 75, 95)
@@ -191,8 +191,11 @@ def _batch(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) 
     found = []
     for row in values:
         changed = dict(zip(keys, map(float, row), strict=True))
+        own = method
+        if method.family and not has(method.family, changed):
+            own = replace(method, family=None)
         try:
-            found.append(solve(with_values(scene, changed), method))
+            found.append(solve(with_values(scene, changed), own))
         except ValueError as error:
             said = ", ".join(f"{key} = {x:.4g}" for key, x in changed.items())
             raise ValueError(

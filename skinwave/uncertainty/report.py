@@ -40,7 +40,7 @@ MAPS = (
     "Percentiles of the RMS motion at each place, and how many samples have a place above the "
     "threshold of detection; dotted: the path of the focus."
 )
-TOGETHER = ", all of one reduced-order model, in the steady state"
+TOGETHER = ", nearly all of one reduced-order model, in the steady state"
 TORNADO = (
     "One number at a time at the ends of the 90 % about its median, all others at their central "
     "values: the widest bar is what is worth measuring first."
