@@ -99,7 +99,7 @@ def test_a_plan_says_in_words_what_its_mesh_is():
 
 def test_a_plan_that_falls_short_says_so(monkeypatch):
     monkeypatch.setattr("skinwave.planning.goal_oriented.MESHES", 1)
-    monkeypatch.setattr("skinwave.planning.goal_lines.LEAST", 0.5)
+    monkeypatch.setattr("skinwave.planning.goal_oriented.LEAST_ALIKE", 0.5)
     found = plan(scene_of(LAYERED), 0.01)
     (said,) = found.warnings
     assert said.startswith("the goal-oriented mesh of ")

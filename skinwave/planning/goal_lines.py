@@ -23,9 +23,6 @@ from skinwave.scene import Body, Scene
 # Waveforms converged at an order of 2.3 to 3.4, not of 3. It is that of a grid convergence index,
 # 1.25 to 3 (Roache, Annu Rev Fluid Mech 29:123, 1997).
 SAFETY = 1.5
-LEAST = (
-    0.05  # ratio of the errors of two meshes: estimates of a coarse mesh are not followed further
-)
 GROWTH, FINER = 1.05, 0.95  # between two choices, of degrees of freedom and of element sizes
 
 
@@ -66,7 +63,7 @@ def family_of_lines(scene: Scene, body: Body, axes: str, tolerance: float, solve
 
         return Estimated(error=float(known.error.max()), finer=finer)
 
-    return Family(coarse=on(coarse), size=size, safety=SAFETY, least=LEAST, estimated=estimated)
+    return Family(coarse=on(coarse), size=size, safety=SAFETY, estimated=estimated)
 
 
 def _words(lines: Lines) -> str:

@@ -38,7 +38,9 @@ from skinwave.scene import Body, Scene
 LINES = 3  # that oscillate and move the probes most: the errors of one would not be those of all
 UNDERESTIMATED = 2.4  # true errors of coarse meshes over their estimates, measured 1.2 to 2.1
 AIM = 0.8  # of the tolerance, so that one goal-oriented mesh is enough
-MOST_ALIKE = 0.5  # ratio of the errors of two meshes: above it they change too little to tell
+# Ratio of the errors of two meshes: more alike they change too little to tell, and estimates of a
+# coarse mesh are not followed further.
+MOST_ALIKE, LEAST_ALIKE = 0.5, 0.05
 SMALL = 4000  # degrees of freedom of a uniform structured mesh that is tried before
 EASY = 0.04  # tolerance that the second of the coarsest uniform meshes of a hand may meet
 MESHES, MOST_DOFS = 3, 250_000  # goal-oriented meshes that are tried, and the largest, about
@@ -145,7 +147,7 @@ def _goal_refined(
     most = max(MOST_DOFS, 4 * coarse.dofs)
     error = UNDERESTIMATED * known.error
     for _ in range(MESHES):
-        wanted = np.clip(AIM * tolerance / max(error, 1e-300), family.least, MOST_ALIKE)
+        wanted = np.clip(AIM * tolerance / max(error, 1e-300), LEAST_ALIKE, MOST_ALIKE)
         last = tried(known.finer(before.mesh.ratio * float(wanted), before.mesh, most))
         error, compared = family.safety * _extrapolated(before, last), before
         if error <= tolerance or last.dofs >= most / 2:
