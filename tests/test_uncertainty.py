@@ -240,7 +240,7 @@ def test_a_model_without_an_exact_map_gives_probes_alone():
 
 def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own():
     scene = loads(SMALL)
-    found = propagate(scene, 20, model="fem", h=0.006)
+    found = propagate(scene, 80, model="fem", h=0.006)
     assert [s.key for s in found.spreads] == [
         "body.thickness_mm", PRESSURE, "body.material.modulus_scale", "body.material.loss_scale",
     ]  # fmt: skip

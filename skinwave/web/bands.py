@@ -38,7 +38,7 @@ FIRST = 16  # samples after which there are bands to be seen, which the others r
 EXACT = 2e-3  # relative error of a waveform by a table
 NOT_SAMPLED = "since nothing that can be sampled here is uncertain"
 FIXED = ("tacton.duration_s",)  # samples have one length
-TOGETHER = 12.0  # reductions of one body that one of all samples takes, about
+TOGETHER = 45.0  # reductions of one body that one of all samples takes, about
 NONE = partial(np.empty, 0)
 
 Respond = Callable[[Scene], Response]
