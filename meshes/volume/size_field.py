@@ -58,16 +58,11 @@ class SizeField:
 
     def __call__(self, points: Floats) -> Floats:
         """Edge lengths (n,) in metre at points (n, 3) in metre."""
-        cells, parts = np.zeros((3, len(points)), np.int64), np.zeros((3, len(points)))
-        for a, line in enumerate(self.lines):
-            cells[a] = np.clip(np.searchsorted(line, points[:, a]) - 1, 0, len(line) - 2)
-            length = line[cells[a] + 1] - line[cells[a]]
-            parts[a] = np.clip((points[:, a] - line[cells[a]]) / length, 0, 1)
-        found = np.zeros(len(points))
-        for corner in np.ndindex(2, 2, 2):
-            far = np.array(corner)[:, None]
-            found += np.where(far, parts, 1 - parts).prod(axis=0) * self.sizes[tuple(cells + far)]
-        return found
+        from scipy.interpolate import RegularGridInterpolator
+
+        low, high = ([line[end] for line in self.lines] for end in (0, -1))
+        between = RegularGridInterpolator(self.lines, self.sizes)
+        return np.asarray(between(np.clip(points, low, high)))
 
 
 def error_density(mesh: TetMesh, error: Floats, *, order: float = ORDER) -> ErrorDensity:
