@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+import fem
 from meshes.tetmesh import Floats
 from simple_model.material import Complex
 from simple_model.quantities import Quantity
@@ -167,7 +168,8 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     try:
         check_scene(scene, free_keys(scene.body, ranges), parametric.TOLERANCE)
         return replace(aim, reduced=parametric.prepare(scene, ranges, progress=progress))
-    except ValueError:  # of what no affine sum gives, or ranges too wide for one model
+    # Of what no affine sum gives, or ranges too wide for one model.
+    except (ValueError, fem.Diverged):
         return aim
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import fem
 from meshes.tetmesh import Floats
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
@@ -49,7 +50,7 @@ def shared_body(
         size = method.h or default_size(scene.body)
         try:
             reduced_anew(family, size, method.tolerance, method.solver, progress)
-        except ValueError:  # wider than one reduced-order model reaches, say
+        except (ValueError, fem.Diverged):  # wider than one reduced-order model reaches, say
             return None
     return family
 

@@ -184,7 +184,7 @@ class BodyResponses:
             subspace = fem.load_subspace(forces, TOLERANCE / 5)
             try:
                 found = free_body(base, made, (P, points), subspace, forces, progress)
-            except ValueError:
+            except (ValueError, fem.Diverged):
                 return None
         progress("read the surface", 1.0)
         found = replace(found, effort=replace(found.effort, seconds=clock.seconds))
