@@ -1193,6 +1193,24 @@ def test_pinning_keeps_and_exchanges(session):
     assert session.state.differs == []
 
 
+def test_waves_of_what_is_pinned_may_come_after_it_was(session):
+    answer = waves.BodyResponses()(session.scene, nothing)
+    with session.state:
+        moves.pin(session)
+    assert session.pinned == (session.kernel,)
+    with session.state:
+        told(session, "answer", session.number, answer)
+    assert session.pinned == (session.kernel, answer)
+    assert session.state.pinned_map["picture"]
+    with session.state:
+        moves.pin(session)
+        moves.turn(session, {"am": "90"})
+        moves.pin(session)
+        moves.turn(session, {"am": "95"})
+        told(session, "answer", session.number, answer)
+    assert len(session.pinned) == 1, "these waves are not of what is pinned"
+
+
 def test_foci_follow_paths_of_their_own(session):
     with session.state:
         moves.turn(session, {"foci": 2})

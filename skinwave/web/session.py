@@ -212,6 +212,8 @@ def told(session: Session, what: str, number: int, content: Any) -> None:
     elif what == "answer":
         session.waves = content
         state.update({"busy": "", "waves_stale": False})
+        if len(session.pinned) == 1 and state.pinned_query == state.query:
+            session.pinned = session.answers  # it was pinned before its waves were there
         draw(session)
         solid(session)  # which may have been asked for in the meantime
         if session.bands is None:
