@@ -38,6 +38,7 @@ from meshes.volume.fingertip_mesh import fingertip_mesh
 from meshes.volume.mapped_palm import mapped_palm
 from meshes.volume.palm_mesh import palm_mesh
 from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
+from meshes.volume.stretched_palm import stretched_palm
 from meshes.volume.tetrahedralise import graded, tetrahedralise
 
 __all__ = [
@@ -75,6 +76,7 @@ __all__ = [
     "repaired",
     "seen_from_above",
     "sheet",
+    "stretched_palm",
     "tag_boundary",
     "tetrahedralise",
     "write",

@@ -70,6 +70,7 @@ FAINTEST_LOAD = 1e-6  # of the strongest line of the load
 FORMAT = "parametric 3"  # of what is cached
 ARRAYS = ("outputs", "load", "points", "frequencies")
 BETWEEN = 0.3  # of each range: a body of no known geometry
+KEPT = 5  # full bodies at a time: more of them are assembled anew, for a third of the memory
 INSIDE = 128  # materials inside the ranges, for the lines' bases
 
 
@@ -138,10 +139,10 @@ def prepare(
     keys = free_keys(scene.body, free)
     check_scene(scene, keys, tolerance)
     clock, report = Clock(), progress or silent
-    bodies = _range(scene.body, keys, h)
-    body = bodies.body(bodies.meshed)
     with clock("mesh"):
         report("mesh", 0.0)
+        bodies = _range(scene.body, keys, h)
+        body = bodies.body(bodies.meshed)
         mesh = cached(partial(build_at, bodies, symmetry=_symmetry(scene)))
         build = mesh(bodies.meshed)
     reference = reference_of(body, build, keys)
@@ -204,12 +205,14 @@ def _reduced(
 ) -> dict[str, Any]:
     """Arrays and `meta`, the effort, of what is cached."""
     bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
-    geometries = {at: cached(partial(stage.geometry, at)) for at in bodies.geometries}
+    keep = cached if len(bodies.geometries) <= KEPT else _anew
+    geometries = {at: keep(partial(stage.geometry, at)) for at in bodies.geometries}
     with clock("assemble"):
         report("assemble", 0.0)
         frequencies, _ = _moving(scene, *_surface(scene, build))
-        for geometry in geometries.values():
-            geometry()
+        if keep is cached:
+            for geometry in geometries.values():
+                geometry()
     few = [_variant(stage, at, geometries) for at in _training(stage)]
     with clock("factorise and reduce"), one_thread():
         model = reduce_affine(
@@ -229,6 +232,11 @@ def _reduced(
         "meta": asdict(spent(effort, clock, build, h)), "outputs": model.outputs,
         "load": load, "points": points, "frequencies": kept, **packed(model, bases),
     }  # fmt: skip
+
+
+def _anew(geometry: Callable[[], Geometry]) -> Callable[[], Geometry]:
+    """The full body of a geometry, assembled each time."""
+    return geometry
 
 
 def _training(stage: _Stage) -> list[tuple[float, ...]]:

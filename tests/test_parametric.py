@@ -364,8 +364,8 @@ def test_keys_that_cannot_be_free_are_refused(slab, free, words):
 
 
 def test_thicknesses_that_no_mesh_follows_are_refused(slab):
-    with pytest.raises(ValueError, match="the matrices of a palm are no sums"):
-        free_keys(BODIES["palm"], {"body.thickness_mm": (15.0, 20.0)})
+    with pytest.raises(ValueError, match="the matrices of a finger are no sums"):
+        free_keys(BODIES["fingertip"], {"body.thickness_mm": (13.0, 15.0)})
     strain = replace(slab, quantity="largest_shear_strain", depth=1e-3)
     with pytest.raises(ValueError, match="is not smooth in it"):
         skinwave.prepare(strain, {"body.thickness_mm": (8.0, 12.0)})

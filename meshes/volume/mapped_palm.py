@@ -112,16 +112,19 @@ def _onto_level_set(palm: Palm, grid: Floats) -> Floats:
     """
     outer = _on_boundary(tuple(n - 1 for n in grid.shape[:3]))
     moved = np.zeros_like(grid)
-    moved[outer] = _raised(palm, grid[outer]) - grid[outer]
+    # Along the normals of the mounds nodes would gather in the dips between them.
+    normals = gradient(without_mounds(palm), grid[outer])
+    moved[outer] = along_normals(palm, grid[outer], normals) - grid[outer]
     return grid + _transfinite(moved)
 
 
-def _raised(palm: Palm, points: Floats) -> Floats:
-    """Points (n, 3) of a palm without mounds, moved onto its surface along the normals that they
-    have there: along those of the mounds they would gather in the dips between them.
-    """
-    bare = replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
-    normals = gradient(bare, points)
+def without_mounds(palm: Palm) -> Palm:
+    """The same palm with cup and rim alone."""
+    return replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
+
+
+def along_normals(palm: Palm, points: Floats, normals: Floats) -> Floats:
+    """Points (n, 3) in metre moved onto the surface of a palm, along normals (n, 3) out of it."""
     for _ in range(STEPS):
         steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
         points = (

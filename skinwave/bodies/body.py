@@ -17,7 +17,7 @@ from simple_model.compliance import Compliance
 from simple_model.dispersion import DispersionCurves
 from simple_model.material import NOT_SKIN, PRESETS
 from skinwave import extensions
-from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.discretised import Discretise, Discretised
 from skinwave.bodies.grid import Grid, Sized
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
@@ -207,6 +207,11 @@ class Body:
         return tuple(found)
 
     @property
+    def interfaces(self) -> list[float]:
+        """Depths in metre where its strata begin, and where the last one ends."""
+        return [*(start for start, _ in self.strata), self.depth]
+
+    @property
     def solids(self) -> tuple[Material, ...]:
         """All of its materials: of its strata, and of its regions."""
         strata = (solid for _, solid in self.strata)
@@ -266,9 +271,10 @@ class BodyKind:
     check : raises a ValueError for a body that cannot be
     words : kind and size of a body in a few words
     discretise : mesh of a body, with elements of a size in metre; None without anything to mesh
-    morph : called as `discretise`, and with a `reference`: the mesh that this has with elements of
-        the size, its nodes moved in proportion to the thicknesses of the body's layers; None where
-        they do not follow these
+    morph : called with the thinnest and the thickest body of a range and an element size in metre,
+        a function as `discretise` whose meshes have the same nodes, moved; None without any
+    moves_in_proportion : bool, whether these move in proportion to the thicknesses of the body's
+        layers, so that its matrices are sums over few geometries, which are else interpolated
     equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
         density stand for it (`sheet.bending_equivalent`); None where each has its own mesh
     grid : grid of its structured mesh, whose lines may be where the error is; None without one
@@ -301,7 +307,8 @@ class BodyKind:
     check: Callable[[Body], object] = lambda body: None
     words: Callable[[Body], str] = lambda body: _size(body)
     discretise: Callable[[Body, float], Discretised] | None = None
-    morph: Callable[..., Discretised] | None = None
+    morph: Callable[[Body, Body, float], Discretise] | None = None
+    moves_in_proportion: bool = True
     equivalent: Callable[[Body], float] | None = None
     grid: Grid | None = None
     sized: Sized | None = None

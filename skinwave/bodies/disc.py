@@ -7,7 +7,7 @@ import numpy as np
 from meshes import TetMesh
 from meshes.shapes.disc import disc
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.discretised import Discretise, Discretised, in_layers
 
 
 def check(body: Body) -> None:
@@ -27,31 +27,19 @@ def check(body: Body) -> None:
 
 def discretise(body: Body, h: float) -> Discretised:
     """Ten-node tetrahedra of at most h in metre, in even rings and the body's layers."""
-    return _in_strata(body, disc(body.width, body.depth, h, _interfaces(body)[1:-1]))
+    return _in_strata(body, disc(body.width, body.depth, h, body.interfaces[1:-1]))
 
 
-def morph(body: Body, h: float, *, reference: Body) -> Discretised:
-    """Mesh of a reference whose layers are stretched to those of the body.
+def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
+    """Mesh of the thickest disc, of h in metre, whose layers are stretched to those of another."""
+    mesh = discretise(thickest, h).mesh
 
-    Parameters
-    ----------
-    body : Body
-    h : metre, element size of the reference
-    reference : Body, of the same diameter and materials
+    def moved(body: Body, h: float) -> Discretised:
+        points = mesh.points.copy()
+        points[:, 2] = -np.interp(-points[:, 2], thickest.interfaces, body.interfaces)
+        return _in_strata(body, replace(mesh, points=points, unmoved=mesh.points))
 
-    Returns
-    -------
-    Discretised
-    """
-    mesh = discretise(reference, h).mesh
-    points = mesh.points.copy()
-    points[:, 2] = -np.interp(-points[:, 2], _interfaces(reference), _interfaces(body))
-    return _in_strata(body, replace(mesh, points=points, unmoved=mesh.points))
-
-
-def _interfaces(body: Body) -> list[float]:
-    """Depths in metre where its layers begin, and where the last one ends."""
-    return [*(start for start, _ in body.strata), body.depth]
+    return moved
 
 
 def _in_strata(body: Body, mesh: TetMesh) -> Discretised:

@@ -1,20 +1,31 @@
 """Parametric palm: soft tissue on bone, meshed finely under the focus."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 import fem
 from fem.load_and_probe import facet_points
-from meshes import Grading, MeshError, TetMesh, boundary_facets, graded_axis, mapped_palm, palm_mesh
+from meshes import (
+    Grading,
+    MeshError,
+    TetMesh,
+    boundary_facets,
+    graded_axis,
+    mapped_palm,
+    palm_mesh,
+    stretched_palm,
+)
 from meshes.files.import_body import GROWTH
 from meshes.shapes.equidistributed import Lines
 from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.discretised import Discretised
+from skinwave.bodies.coat import meshed_strata
+from skinwave.bodies.discretised import Discretise, Discretised
 from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
 
@@ -57,8 +68,34 @@ def on_lines(body: Body, lines: Lines) -> Discretised:
     return _supported(body, hand_size(body), mapped_palm(body.palm, *lines))
 
 
+def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
+    """Mesh of the thinnest palm, as fine as that of h in metre of the thickest, stretched to
+    another.
+
+    Raises
+    ------
+    ValueError
+        If elements would have to follow layers, or the mesh cannot be stretched so far.
+    """
+    if any(len(meshed_strata(each, h)) > 1 for each in (thinnest, thickest)):
+        raise ValueError(
+            f"the elements of {1e3 * h:g} mm of this {thinnest.kind} do not follow its layers, so "
+            "that no thickness of it can be free; leave out all but thin layers, or take a slab"
+        )
+    x, y, z = body_lines(thickest, h)
+    try:
+        mesh = mapped_palm(thinnest.palm, x, y, z * (thinnest.depth / thickest.depth))
+        stretched = stretched_palm(mesh, thinnest.palm, thickest.palm)
+    except MeshError as error:
+        raise MeshError(
+            f"no mesh stands for this palm {1e3 * thinnest.depth:g} to {1e3 * thickest.depth:g} mm "
+            f"thick; narrow the range of the thickness, or reduce a body for each value: {error}"
+        ) from None
+    return lambda body, h: _supported(body, h, stretched(body.depth))
+
+
 def _supported(body: Body, h: float, mesh: TetMesh) -> Discretised:
-    mesh = TetMesh(points=mesh.points, tets=mesh.tets, facets={"top": mesh.facets["top"]})
+    mesh = replace(mesh, facets={"top": mesh.facets["top"]})
     return in_its_layers(body, h, mesh, partial(_support, body))
 
 
@@ -119,6 +156,8 @@ PALM = register(
         presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
         discretise=discretise,
+        morph=morph,
+        moves_in_proportion=False,
         grid=Grid(
             lines=body_lines,
             discretise=on_lines,

@@ -13,7 +13,7 @@ from simple_model.compliance import layered
 from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.discretised import Discretised, in_layers
+from skinwave.bodies.discretised import Discretise, Discretised, in_layers
 from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.parts import Layer
@@ -28,24 +28,11 @@ def discretise(body: Body, h: float) -> Discretised:
     return on_lines(body, body_lines(body, h))
 
 
-def morph(body: Body, h: float, *, reference: Body) -> Discretised:
-    """Mesh of a reference whose layers are stretched to those of the body.
-
-    Parameters
-    ----------
-    body : Body
-    h : metre, element size of the reference
-    reference : Body, of the same materials
-
-    Returns
-    -------
-    Discretised
-    """
-    x, y, z = body_lines(reference, h)
-    before, now = (
-        np.array([*(start for start, _ in each.strata), each.depth]) for each in (reference, body)
-    )
-    return on_lines(body, (x, y, -np.interp(-z, before, now)))
+def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
+    """Mesh of the thickest body, of h in metre, whose layers are stretched to those of another."""
+    x, y, z = body_lines(thickest, h)
+    before = thickest.interfaces
+    return lambda body, h: on_lines(body, (x, y, -np.interp(-z, before, body.interfaces)))
 
 
 def on_lines(body: Body, lines: Lines) -> Discretised:

@@ -214,12 +214,17 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
     if kind.morph is None and kind.equivalent is None:
         raise ValueError(
             f"'{keys[0].key}' cannot be free: the matrices of a {body.kind} are no sums over its "
-            "thicknesses; free those of a slab, disc or sheet, or reduce a body for each value"
+            "thicknesses; free those of a slab, disc, palm or sheet, or reduce a body for each"
         )
     if len(keys) > MOST_THICKNESSES:
         raise ValueError(
             f"{len(keys)} thicknesses are free, the limit is {MOST_THICKNESSES}; each multiplies "
             "the meshes that a body is interpolated between"
+        )
+    if len(keys) > 1 and not kind.moves_in_proportion:
+        raise ValueError(
+            f"{len(keys)} thicknesses of a {body.kind} are free, the limit is 1; reduce a body for "
+            "each value of the others"
         )
     if low := [key.key for key in keys if not key.low > 0]:
         raise ValueError(f"{low[0]} is free from 0 or below; give a least value above 0")
