@@ -16,7 +16,8 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fem.affine import AffineOperators
-from fem.linear_solver import available, factorise
+from fem.linear_solver import available, factoriser
+from fem.sparsity import on_one_pattern
 from fem.transient import Diverged
 
 Complex = NDArray[np.complex128]
@@ -53,15 +54,16 @@ def line_solution(
         If the equations with the added mass of a fluid are not solved to a residual of `RESIDUAL`.
     """
     dry = len(affine.parts) - len(affine.fluid)
-    A = sum(w * part for w, part in zip(weights[:dry], affine.parts, strict=False))
+    values, *pattern = on_one_pattern([sparse.csr_array(part) for part in affine.parts[:dry]])
     backend = solver if solver in available(complex_valued=True) else "auto"
+    own = slice(len(affine.stiffness), len(affine.stiffness) + len(affine.mass))
+    heavier = weights[:dry].copy()
+    heavier[own] *= 1 + fluid_share
+    factor = factoriser(*pattern, backend=backend)(heavier @ values)
     force = force.astype(np.complex128)
     if not affine.fluid:
-        return factorise(sparse.csr_array(A), backend=backend).solve(force)
-    start = len(affine.stiffness)
-    own = zip(weights[start:], affine.mass, strict=False)
-    E = fluid_share * sum(w * part for w, part in own)
-    factor = factorise(sparse.csr_array(A + E), backend=backend)
+        return factor.solve(force)
+    E = fluid_share * sum(w * M for w, M in zip(weights[own], affine.mass, strict=True))
     (F,), w = affine.fluid, weights[-1]
 
     def preconditioned(u: Complex) -> Complex:

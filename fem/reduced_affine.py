@@ -204,7 +204,7 @@ def _projected(
         full = each()
         parts.append(project(full.affine, basis, known))
         outputs.append(sparse.csr_array(full.probes[:, full.affine.free]) @ basis)
-        forces.append(full.forces @ basis)
+        forces.append(full.forces.real @ basis + 1j * (full.forces.imag @ basis))
     return AffineModel(
         affine=with_parts(full.affine, parts[-1]), parts=np.stack(parts), basis=basis,
         outputs=np.stack(outputs), forces=np.stack(forces), error=0.0, factorisations=0,

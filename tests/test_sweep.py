@@ -188,10 +188,10 @@ def counted(monkeypatch, folder):
     sweeping._prepared.cache_clear()
     families.reduced.cache_clear()
     made = []
-    for module in (fem.reduced, fem.affine_solution):
-        inner = module.factorise
+    for module, name in ((fem.reduced, "factorise"), (fem.affine_solution, "factoriser")):
+        inner = getattr(module, name)
         counting = lambda *a, inner=inner, **k: made.append(a) or inner(*a, **k)  # noqa: E731
-        monkeypatch.setattr(module, "factorise", counting)
+        monkeypatch.setattr(module, name, counting)
     return made
 
 
