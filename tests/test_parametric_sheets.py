@@ -184,7 +184,7 @@ def test_thicknesses_of_a_sheet_in_air_share_a_reduction_in_a_sweep():
     for thickness in np.linspace(0.08, 0.13, 6).tolist():
         scene = replace(SCENE, body=with_values(SHEET, keys, {THICKNESS: thickness}))
         varied = {THICKNESS: thickness}
-        point = DesignPoint(varied=varied, keys={}, text="", scene=scene)
+        point = DesignPoint(varied=varied, keys={}, text="", scene=scene, before=scene)
         cases[scene.body, scene.probes, scene.reading, scene.load] = point
     ((family, members),) = families.families(cases, 0.05)
     assert family.members == len(members) == 6, "as many as for a modulus: there is one mesh"

@@ -225,6 +225,18 @@ def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_p
         assert row["expected_error"] == pytest.approx(other["expected_error"], rel=0.1)
 
 
+def test_factors_on_all_moduli_share_a_reduction(scene, monkeypatch, tmp_path):
+    counted(monkeypatch, tmp_path / "cold")
+    asked = ["--vary", "body.material.modulus_scale=0.8:2.0:6", *ON_SMALL]
+    rows = swept(*asked)
+    assert {(row["status"], row["reduced_together"]) for row in rows} == {("done", 6)}
+    Path("short-sweep").rename("together")
+    monkeypatch.setattr(families, "LEAST", 9)
+    alone = swept(*asked)
+    assert {row["reduced_together"] for row in alone} == {1}
+    assert_lines_agree(rows, alone, 0.01)
+
+
 def test_thicknesses_share_a_reduction_where_there_are_many(scene, monkeypatch):
     monkeypatch.setattr(families, "THICKNESS", 3)
     asked = ["--vary", "body.thickness_mm=10,11,12", *ON_SMALL]

@@ -37,11 +37,13 @@ Ranges = tuple[tuple[str, float, float], ...]  # key, least and largest value
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """Bodies that one reduced-order model serves: the `scene` with the shortest waves, the `ranges`
-    of keys of its body, and how many `members` there are.
+    """Bodies that one reduced-order model serves: the `scene` with the shortest waves, whose body
+    the factors are of that are free, the `ranges` of keys of that, the `hardest` body, and how many
+    `members` there are.
     """
 
     scene: Scene
+    hardest: Body
     ranges: Ranges
     members: int
 
@@ -84,8 +86,8 @@ def families(
     limits = _limits(hardest.values())
     groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
     for solid, case in hardest.items():
-        if keys := _free(solid[0], case, limits):
-            rest = with_values(solid[0], keys, {key.key: key.low for key in keys})
+        if case.before and (keys := _free(solid[0], case.before.body, case, limits)):
+            rest = with_values(case.before.body, keys, {key.key: key.low for key in keys})
             groups.setdefault((keys, rest, *solid[1:]), {})[solid] = case
     return [
         found
@@ -103,7 +105,7 @@ def mesh_of(family: Family, tolerance: float, h: float | None, solver: str) -> M
         If its bodies cannot be reduced together.
     """
     scene = family.scene
-    size = h or refined(scene, scene.body, tolerance, solver=solver).h
+    size = h or refined(scene, family.hardest, tolerance, solver=solver).h
     bodies = reduced(family, size, tolerance, solver).bodies
     meshed = bodies.body(bodies.meshed)
     coarser = compared_with(meshed, size)
@@ -141,14 +143,16 @@ def _is_number(value: object) -> bool:
 
 
 def _free(
-    body: Body, case: DesignPoint, limits: Mapping[str, tuple[float, float]]
+    body: Body, before: Body, case: DesignPoint, limits: Mapping[str, tuple[float, float]]
 ) -> tuple[FreeKey, ...]:
-    """Varied keys of a body that can be free; none if it is not as they say."""
+    """Varied keys that can be free of what a body is before factors on its materials; none if it is
+    not as they say.
+    """
     ranges = {key: limits[key] for key in case.varied if key in limits}
-    keys = _accepted(body, {k: r for k, r in ranges.items() if _accepted(body, {k: r})})
+    keys = _accepted(before, {k: r for k, r in ranges.items() if _accepted(before, {k: r})})
     if not keys:
         return ()
-    own = with_values(body, keys, dict(_values(case, keys)))
+    own = with_values(before, keys, dict(_values(case, keys)))
     same = own.solids == body.solids and np.allclose(_depths(own), _depths(body), ROUND_OFF, 0)
     return keys if same else ()
 
@@ -173,14 +177,14 @@ def _family(
     if len(members) < sum(THICKNESS if key.moves else LEAST for key in keys):
         return None
     free = {key.key: limits[key.key] for key in keys}
-    scenes = [case.scene for case in members.values() if case.scene]
-    scene = max(scenes, key=_per_length)
+    scenes = [(case.scene, case.before) for case in members.values() if case.scene and case.before]
+    hardest, scene = max(scenes, key=lambda each: _per_length(each[0]))
     try:
         check_scene(scene, free_keys(scene.body, free), tolerance)
     except ValueError:
         return None
     ranges = tuple((key, *limit) for key, limit in free.items())
-    family = Family(scene=scene, ranges=ranges, members=len(members))
+    family = Family(scene=scene, hardest=hardest.body, ranges=ranges, members=len(members))
     return family, {solid: _values(case, keys) for solid, case in members.items()}
 
 

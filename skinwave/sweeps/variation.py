@@ -56,13 +56,15 @@ class Variation:
 @dataclass(frozen=True, kw_only=True)
 class DesignPoint:
     """One run that is wanted: its `varied` keys, the scene that they make or the `error` why they
-    make none, the `keys` of that scene's file, and its `text`.
+    make none, the `keys` of that scene's file, and its `text`; and the scene that it is `before`
+    factors on all moduli or losses of a material.
     """
 
     varied: Mapping[str, Any]
     keys: Mapping[str, float | str]
     text: str
     scene: Scene | None = None
+    before: Scene | None = None
     error: str = ""
 
     def name(self, *model_options: object) -> str:
@@ -254,20 +256,23 @@ def _split(text: str) -> list[str]:
 
 
 def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
-    scene, error = None, ""
+    scene, before, error = None, None, ""
     scales = {key: x for key, x in varied.items() if key.rpartition(".")[2] in SCALES}
     plain = {key: x for key, x in varied.items() if key not in scales}
     changed = _changed(table, complete, plain)
     try:
         text = tomli_w.dumps(changed)
-        scene = scaled(loads(text), scales)
+        before = loads(text)
+        scene = scaled(before, scales)
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
     keys = _flat(without_spreads(tomllib.loads(text))[0])
     for key, value in varied.items():  # a name for a number, as of a depth, is that number
         keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
-    return DesignPoint(varied=varied, keys=keys, text=text, scene=scene, error=error)
+    return DesignPoint(
+        varied=varied, keys=keys, text=text, scene=scene, before=before, error=error
+    )  # fmt: skip
 
 
 def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:

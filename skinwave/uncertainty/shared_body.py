@@ -88,7 +88,7 @@ def family_of(
     except ValueError:
         return None
     ranges = tuple((key, *ends) for key, ends in free.items())
-    return Family(scene=plain, ranges=ranges, members=len(values))
+    return Family(scene=plain, hardest=plain.body, ranges=ranges, members=len(values))
 
 
 def has(family: Family, values: Mapping[str, float]) -> bool:
