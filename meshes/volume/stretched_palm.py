@@ -23,6 +23,7 @@ from meshes.volume.tetrahedralise import SHARPEST
 
 PLACES = 7  # of each node: palms of 12 to 20 mm are met within 1 um, with 5 of them within 14
 AT = (1 - np.cos(np.pi * np.arange(PLACES) / (PLACES - 1))) / 2  # shares of the range
+NO_WALL = 1e-9  # m: half the height of a side wall that is none
 LIES_ON, FOLLOWS = 1e-4, 5e-3  # of the thickness: nodes this close to the surface, and to others
 
 
@@ -43,21 +44,21 @@ def stretched_palm(mesh: TetMesh, thinnest: Palm, thickest: Palm) -> Callable[[f
     MeshError
         If the nodes do not follow the palm's surface, or elements get too flat.
     """
+    from scipy.interpolate import BarycentricInterpolator  # which takes long to import
+
     low, high = thinnest.thickness, thickest.thickness
     if low == high:
         return lambda thickness: mesh
-    each = [replace(thinnest, thickness=low + share * (high - low)) for share in AT[1:]]
-    ways = np.stack([np.zeros_like(mesh.points), *(_ways(mesh, thinnest, palm) for palm in each)])
+    at = low + AT * (high - low)
+    each = [_shifts(mesh, thinnest, replace(thinnest, thickness=thickness)) for thickness in at[1:]]
+    shifts = BarycentricInterpolator(at, np.stack([np.zeros_like(mesh.points), *each]))
 
     def moved(thickness: float) -> TetMesh:
-        shares = _lagrange(AT, (thickness - low) / (high - low))
-        points = mesh.points + np.tensordot(shares, ways, 1)
-        return replace(mesh, points=points, unmoved=mesh.points)
+        return replace(mesh, points=mesh.points + shifts(thickness), unmoved=mesh.points)
 
     on = _on_surface(mesh, thinnest)
-    for share in (AT[:2].mean(), 1.0):
-        palm = replace(thinnest, thickness=low + share * (high - low))
-        _check(moved(palm.thickness), palm, on)
+    for thickness in (at[:2].mean(), high):
+        _check(moved(thickness), replace(thinnest, thickness=thickness), on)
     return moved
 
 
@@ -78,36 +79,36 @@ def _on_surface(mesh: TetMesh, palm: Palm) -> Ints:
     return outer[np.abs(level_set(palm, mesh.points[outer])) < LIES_ON * palm.thickness]
 
 
-def _ways(mesh: TetMesh, palm: Palm, other: Palm) -> Floats:
-    """Ways (n, 3) in metre of the nodes of a palm's mesh to where they are on another's."""
+def _shifts(mesh: TetMesh, palm: Palm, other: Palm) -> Floats:
+    """Shifts (n, 3) in metre of the nodes of a palm's mesh to where they are on another's."""
     corners, middles = np.unique(mesh.tets[:, :4]), np.unique(mesh.tets[:, 4:])
     on = _on_surface(mesh, palm)
-    ways = np.zeros_like(mesh.points)
+    shifts = np.zeros_like(mesh.points)
     first = np.intersect1d(on, corners)
-    ways[first] = _along_rim(palm, other, mesh.points[first])
-    ways[first] += _onto(palm, other, mesh.points[first], ways[first])
-    ways = _harmonic(mesh, np.setdiff1d(corners, first), ways)
-    ways[mesh.tets[:, 4:]] = ways[mesh.tets[:, EDGES]].mean(axis=2)
+    shifts[first] = _along_rim(palm, other, mesh.points[first])
+    shifts[first] += _onto(palm, other, mesh.points[first], shifts[first])
+    shifts = _harmonic(mesh, np.setdiff1d(corners, first), shifts)
+    shifts[mesh.tets[:, 4:]] = shifts[mesh.tets[:, EDGES]].mean(axis=2)
     then = np.intersect1d(on, middles)
-    ways[then] += _onto(palm, other, mesh.points[then], ways[then])
-    return ways
+    shifts[then] += _onto(palm, other, mesh.points[then], shifts[then])
+    return shifts
 
 
 def _along_rim(palm: Palm, other: Palm, points: Floats) -> Floats:
-    """Ways (n, 3) that leave points (n, 3) where they are on the rounded edges of a palm without
+    """Shifts (n, 3) that leave points (n, 3) where they are on the rounded edges of a palm without
     mounds, and stretch its side wall.
     """
     above_middle = points[:, 2] - rise(palm, points[:, :2]) + palm.thickness / 2
-    wall = max(palm.thickness / 2 - palm.edge_radius, np.finfo(float).tiny)
+    wall = max(palm.thickness / 2 - palm.edge_radius, NO_WALL)
     thicker = (other.thickness - palm.thickness) / 2
-    ways = np.zeros_like(points)
-    ways[:, 2] = thicker * (np.clip(above_middle / wall, -1, 1) - 1)
-    return ways
+    shifts = np.zeros_like(points)
+    shifts[:, 2] = thicker * (np.clip(above_middle / wall, -1, 1) - 1)
+    return shifts
 
 
-def _onto(palm: Palm, other: Palm, points: Floats, ways: Floats) -> Floats:
-    """Further ways (n, 3) onto the surface of the other palm, along the normals without mounds."""
-    start = points + ways
+def _onto(palm: Palm, other: Palm, points: Floats, shifts: Floats) -> Floats:
+    """Further shifts (n, 3) onto the surface of the other palm, along normals without mounds."""
+    start = points + shifts
     return along_normals(other, start, gradient(without_mounds(palm), points)) - start
 
 
@@ -124,10 +125,3 @@ def _harmonic(mesh: TetMesh, inner: Ints, values: Floats) -> Floats:
     found = values.copy()
     found[inner] = sparse.linalg.spsolve(rows[:, inner].tocsc(), -(rows @ values))
     return found
-
-
-def _lagrange(nodes: Floats, x: float) -> Floats:
-    """Values (k,) at x of Lagrange's polynomials through nodes (k,)."""
-    k = len(nodes)
-    others = np.array([np.delete(nodes, j) for j in range(k)])
-    return np.asarray(((x - others) / (nodes[:, None] - others)).prod(axis=1))
