@@ -98,11 +98,11 @@ def test_matrices_between_thicknesses_converge_geometrically(monkeypatch):
 def test_lines_of_a_thickness_are_those_of_the_full_body():
     scene = scene_of(PALM)
     prepared = skinwave.prepare(scene, {KEY: (14.0, 18.0)}, 0.02, h=H)
-    for thickness in (14.0, 15.3, 17.6):
+    for thickness in (14.0, 17.6):
         body = with_values(PALM, prepared.keys, {KEY: thickness})
         made = build(body, H, "", prepared.bodies.moved)
         frequencies, found = parametric.lines(prepared, {KEY: thickness})
-        strong = np.argsort(-np.linalg.norm(found, axis=1))[:3]
+        strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
         expected = full_lines(scene, body, frequencies[strong], made=made)
         assert line_errors(found[strong], expected).max() < 0.01
     waveforms = parametric.answer(prepared, {KEY: thickness})

@@ -124,7 +124,18 @@ def without_mounds(palm: Palm) -> Palm:
 
 
 def along_normals(palm: Palm, points: Floats, normals: Floats) -> Floats:
-    """Points (n, 3) in metre moved onto the surface of a palm, along normals (n, 3) out of it."""
+    """Points moved onto the surface of a palm.
+
+    Parameters
+    ----------
+    palm : Palm
+    points : (n, 3) float, metre, near its surface
+    normals : (n, 3) float, unit vectors out of it, along which they move
+
+    Returns
+    -------
+    (n, 3) float, metre
+    """
     for _ in range(STEPS):
         steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
         points = (

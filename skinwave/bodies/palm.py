@@ -69,8 +69,16 @@ def on_lines(body: Body, lines: Lines) -> Discretised:
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thinnest palm, as fine as that of h in metre of the thickest, stretched to
-    another.
+    """Mesh of the thinnest palm, as fine as that of the thickest, stretched to another.
+
+    Parameters
+    ----------
+    thinnest, thickest : Body, between which others are; they differ by the thickness, or a coat's
+    h : metre, element size of the thickest
+
+    Returns
+    -------
+    Function as `discretise`, of a palm and an element size that it leaves as it is
 
     Raises
     ------

@@ -29,7 +29,17 @@ def discretise(body: Body, h: float) -> Discretised:
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest body, of h in metre, whose layers are stretched to those of another."""
+    """Mesh of the thickest body whose layers are stretched to those of another.
+
+    Parameters
+    ----------
+    thinnest, thickest : Body, of the same layers, between which others are
+    h : metre, element size of the thickest
+
+    Returns
+    -------
+    Function as `discretise`, of a body and an element size that it leaves as it is
+    """
     x, y, z = body_lines(thickest, h)
     before = thickest.interfaces
     return lambda body, h: on_lines(body, (x, y, -np.interp(-z, before, body.interfaces)))

@@ -8,8 +8,8 @@ Where nodes move in proportion to the thickness d_k of their layer, each matrix 
 of as many terms as there are independent functions 1, d_k and 1/d_k. It is known for all d from as
 many geometries, to round-off: an error as small as 1e-4 would already act against lam, 5,000 times
 mu in soft tissue. Where nodes move otherwise, but smoothly, it is a series of Chebyshev polynomials
-in log d, which converges geometrically: of a palm from 14 to 20 mm, stiffness is right to 4e-4 by 5
-of them, 3e-5 by 7 and 4e-7 by 9 (of its largest entry), and the springs of its rim to 2e-5.
+in log d, which converges geometrically: the stiffness of a palm from 14 to 20 mm has errors of 4e-4
+by 5 of them, 3e-5 by 7 and 4e-7 by 9 (of its largest entry), and the springs of its rim of 2e-5.
 """
 
 from collections.abc import Callable, Sequence
