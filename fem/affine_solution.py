@@ -7,7 +7,8 @@ The added mass F of a fluid can only be applied. With the weights w of a line
 where E is the equivalent added mass of the line's bending waves, 2 rho/k per area (`added_mass`),
 as so much more of the body's own mass. P is sparse and factorised. Waves of other wavenumbers than
 k have another added mass, but do not resonate at the line: P^-1 (P + w F - E) is near the identity,
-and GMRES takes some iterations with it, in the norm of the displacement.
+and GMRES takes some iterations with it, in the norm of the displacement. Factors are in single
+precision, refined in double.
 """
 
 import numpy as np

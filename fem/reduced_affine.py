@@ -152,11 +152,12 @@ def reduce_affine(
         if t in visited:
             raise ValueError(
                 f"matrices interpolated between thicknesses leave an error of {errors[t]:.2g}, "
-                f"above the tolerance {tolerance:g}; narrow the range of the thickness or raise it"
+                f"the limit is {tolerance:.2g}; narrow the range of the thickness, or raise the "
+                "tolerance"
             )
     raise ValueError(
         f"reduced bases of {step + 1} variants leave an error of {errors[t]:.2g} at another, "
-        f"above the tolerance {tolerance:g}; narrow the ranges or raise it"
+        f"the limit is {tolerance:.2g}; narrow the ranges, or raise the tolerance"
     )
 
 

@@ -205,14 +205,17 @@ def _reduced(
 ) -> dict[str, Any]:
     """Arrays and `meta`, the effort, of what is cached."""
     bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
-    keep = cached if len(bodies.geometries) <= KEPT else _anew
-    geometries = {at: keep(partial(stage.geometry, at)) for at in bodies.geometries}
+    few_geometries = len(bodies.geometries) <= KEPT
+    geometries: dict[Any, Callable[[], Geometry]] = {
+        at: partial(stage.geometry, at) for at in bodies.geometries
+    }
+    if few_geometries:
+        geometries = {at: cached(made) for at, made in geometries.items()}
     with clock("assemble"):
         report("assemble", 0.0)
         frequencies, _ = _moving(scene, *_surface(scene, build))
-        if keep is cached:
-            for geometry in geometries.values():
-                geometry()
+        for geometry in geometries.values() if few_geometries else ():
+            geometry()
     few = [_variant(stage, at, geometries) for at in _training(stage)]
     with clock("factorise and reduce"), one_thread():
         model = reduce_affine(
@@ -232,11 +235,6 @@ def _reduced(
         "meta": asdict(spent(effort, clock, build, h)), "outputs": model.outputs,
         "load": load, "points": points, "frequencies": kept, **packed(model, bases),
     }  # fmt: skip
-
-
-def _anew(geometry: Callable[[], Geometry]) -> Callable[[], Geometry]:
-    """The full body of a geometry, assembled each time."""
-    return geometry
 
 
 def _training(stage: _Stage) -> list[tuple[float, ...]]:

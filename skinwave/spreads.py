@@ -145,9 +145,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
                 raise ValueError(f"there is no number {key} in this scene; leave it out")
             parent[last] = x
         found = from_table(table)
-    for key, x in scaled.items():
-        found = _scaled(found, key, x)
-    return found
+    return _scaled(found, scaled)
 
 
 def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
@@ -165,24 +163,33 @@ def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
             raise ValueError(f"there is no material for {key} in this scene; leave it out")
         if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
             raise ValueError(f"{key} = {factor!r} must be a number above 0")
-        scene = _scaled(scene, key, float(factor))
-    return scene
+    return _scaled(scene, scales)
 
 
-def _scaled(scene: Scene, key: str, factor: float) -> Scene:
-    """The scene with all moduli, or all losses, of a material times a factor."""
+def _scaled(scene: Scene, scales: Mapping[str, float]) -> Scene:
+    """The scene with all moduli, or all losses, of materials times factors, those of a material at
+    once.
+    """
+    places: dict[str, dict[str, float]] = {}
+    for key, factor in scales.items():
+        place, _, scale = key.removeprefix("body.").rpartition(".")
+        places.setdefault(place, {})[SCALES[scale]] = float(factor)
     body = scene.body
-    place, _, scale = key.removeprefix("body.").rpartition(".")
-    argument = {SCALES[scale]: factor}
+    for place, factors in places.items():
+        body = _with_factors(body, place, factors)
+    return replace(scene, body=body)
+
+
+def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
+    """The body with another material, at the place of a key."""
     if place == "material":
-        material = solid_of(body.material).scaled(**argument)
-        return replace(scene, body=replace(body, material=material))
+        return replace(body, material=solid_of(body.material).scaled(**factors))
     if place.startswith(REGION):
-        return replace(scene, body=_with_region(body, place, argument))
+        return _with_region(body, place, factors)
     k = int(place.split(".")[1])
-    material = solid_of(body.layers[k].material).scaled(**argument)
+    material = solid_of(body.layers[k].material).scaled(**factors)
     layers = (*body.layers[:k], replace(body.layers[k], material=material), *body.layers[k + 1 :])
-    return replace(scene, body=replace(body, layers=layers))
+    return replace(body, layers=layers)
 
 
 def _with_region(body: Body, place: str, factors: dict[str, float]) -> Body:

@@ -364,7 +364,7 @@ def test_keys_that_cannot_be_free_are_refused(slab, free, words):
 
 
 def test_thicknesses_that_no_mesh_follows_are_refused(slab):
-    with pytest.raises(ValueError, match="the matrices of a finger are no sums"):
+    with pytest.raises(ValueError, match="no mesh of a finger follows its thickness"):
         free_keys(BODIES["fingertip"], {"body.thickness_mm": (13.0, 15.0)})
     strain = replace(slab, quantity="largest_shear_strain", depth=1e-3)
     with pytest.raises(ValueError, match="is not smooth in it"):

@@ -17,15 +17,17 @@ import pytest
 
 import fem.affine_solution
 import fem.reduced
+from simple_model import MovingPressure, Tacton
 from skinwave import extensions
 from skinwave.cli import main
+from skinwave.models.free_keys import free_keys, with_values
 from skinwave.pictures.styles import style
-from skinwave.scene import Body
-from skinwave.scene_file import read
+from skinwave.scene import BODIES, Body, Layer, Scene
+from skinwave.scene_file import read, to_table
 from skinwave.simulation import compute
 from skinwave.sweeps import dataset, engine, families, sweep_figures
 from skinwave.sweeps import sweep as sweeping
-from skinwave.sweeps.variation import cases, combinations, parse
+from skinwave.sweeps.variation import cases, cases_of, combinations, parse
 
 THREADS = ["--scheduler", "threads", "--quiet"]
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
@@ -98,7 +100,7 @@ def test_the_spreads_of_presets_can_be_varied(scene):
     plain = read(scene).body.solid
     for case, each in zip(found, met, strict=True):
         modulus, loss = each.values()
-        assert case.scene.body.solid == plain.scaled(modulus=modulus).scaled(loss=loss)
+        assert case.scene.body.solid == plain.scaled(modulus=modulus, loss=loss)
         assert case.keys["body.material.modulus_scale"] == modulus
     with pytest.raises(ValueError, match=r"no material for body.layers.3.material.loss_scale"):
         cases(scene, combinations(varied("body.layers.3.material.loss_scale=1,2")))
@@ -235,6 +237,44 @@ def test_factors_on_all_moduli_share_a_reduction(scene, monkeypatch, tmp_path):
     alone = swept(*asked)
     assert {row["reduced_together"] for row in alone} == {1}
     assert_lines_agree(rows, alone, 0.01)
+
+
+def families_of(body, *varied, design="factorial"):
+    """How many bodies of a sweep share a model, each of which has its own materials."""
+    table = to_table(Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=body))
+    points = cases_of(table, table, combinations([parse(each) for each in varied], design))
+    hardest = {sweeping._key(point.scene): point for point in points}
+    found = families.families(hardest, 0.05)
+    for family, members in found:
+        keys = free_keys(family.scene.body, {k: (a, b) for k, a, b in family.ranges})
+        for (body, *_), values in members.items():
+            own = with_values(family.scene.body, keys, dict(values))
+            assert own.solids == body.solids
+            assert own.depth == pytest.approx(body.depth, rel=1e-9)
+    return sorted(len(members) for _, members in found)
+
+
+SCALED, LOSSES = "body.material.modulus_scale", "body.material.loss_scale"
+
+
+def test_bodies_of_a_family_have_their_own_materials():
+    moduli = "body.material.shear_modulus_pa=20e3,22e3,24e3,26e3,28e3,30e3"
+    small = Body(width=0.04, height=0.04, depth=0.01, sides="clamped")
+    apart = "body.size_x_mm=40,40,40,40,40,40,50,50,50,50,50,50"
+    factors = f"{SCALED}=1,1,1,1,1,1,2,2,2,2,2,2"
+    twice = f"{moduli},{moduli.partition('=')[2]}"
+    assert families_of(small, apart, factors, twice, design="zip") == [6]
+    assert families_of(small, f"{SCALED}=0.7:1.6:6", f"{LOSSES}=0.5:2.1:7") == [42]
+
+
+def test_few_thicknesses_are_families_of_their_own():
+    moduli = "body.material.shear_modulus_pa=20e3:30e3:7"
+    for body in (BODIES["palm"], BODIES["skin-slab"]):
+        assert families_of(body, moduli, "body.thickness_mm=15,16") == [7, 7]
+    layered = replace(BODIES["palm"], layers=(Layer(thickness=5e-3, material="fat"),))
+    few = "body.thickness_mm=15,16,17"
+    assert families_of(layered, moduli, few) == [7, 7, 7]
+    assert families_of(BODIES["palm"], "body.thickness_mm=14:18:21") == [21]
 
 
 def test_thicknesses_share_a_reduction_where_there_are_many(scene, monkeypatch):

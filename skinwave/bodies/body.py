@@ -273,6 +273,7 @@ class BodyKind:
     discretise : mesh of a body, with elements of a size in metre; None without anything to mesh
     morph : called with the thinnest and the thickest body of a range and an element size in metre,
         a function as `discretise` whose meshes have the same nodes, moved; None without any
+    check_morph : called likewise, raises a ValueError where there is none
     moves_in_proportion : bool, whether these move in proportion to the thicknesses of the body's
         layers, so that its matrices are sums over few geometries, which are else interpolated
     equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
@@ -308,6 +309,7 @@ class BodyKind:
     words: Callable[[Body], str] = lambda body: _size(body)
     discretise: Callable[[Body, float], Discretised] | None = None
     morph: Callable[[Body, Body, float], Discretise] | None = None
+    check_morph: Callable[[Body, Body, float], None] = lambda thinnest, thickest, h: None
     moves_in_proportion: bool = True
     equivalent: Callable[[Body], float] | None = None
     grid: Grid | None = None

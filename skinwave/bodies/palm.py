@@ -24,7 +24,7 @@ from meshes.shapes.palm import gradient
 from meshes.tetmesh import Floats, Ints
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.coat import meshed_strata
+from skinwave.bodies.coat import meshed_strata, thickest_coat
 from skinwave.bodies.discretised import Discretise, Discretised
 from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
@@ -85,21 +85,42 @@ def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
     ValueError
         If elements would have to follow layers, or the mesh cannot be stretched so far.
     """
-    if any(len(meshed_strata(each, h)) > 1 for each in (thinnest, thickest)):
-        raise ValueError(
-            f"the elements of {1e3 * h:g} mm of this {thinnest.kind} do not follow its layers, so "
-            "that no thickness of it can be free; leave out all but thin layers, or take a slab"
-        )
+    check_morph(thinnest, thickest, h)
     x, y, z = body_lines(thickest, h)
     try:
         mesh = mapped_palm(thinnest.palm, x, y, z * (thinnest.depth / thickest.depth))
         stretched = stretched_palm(mesh, thinnest.palm, thickest.palm)
     except MeshError as error:
         raise MeshError(
-            f"no mesh stands for this palm {1e3 * thinnest.depth:g} to {1e3 * thickest.depth:g} mm "
-            f"thick; narrow the range of the thickness, or reduce a body for each value: {error}"
-        ) from None
+            f"no mesh of this palm can be stretched from {1e3 * thinnest.depth:g} to "
+            f"{1e3 * thickest.depth:g} mm; narrow the range of its thickness or lower its relief"
+        ) from error
     return lambda body, h: _supported(body, h, stretched(body.depth))
+
+
+def check_morph(thinnest: Body, thickest: Body, h: float) -> None:
+    """Refuse layers that elements would have to follow.
+
+    Parameters
+    ----------
+    thinnest, thickest : Body, ends of a range
+    h : metre, element size
+
+    Raises
+    ------
+    ValueError
+        If the layers of a palm are no coat.
+    """
+    for each in (thinnest, thickest):
+        if len(meshed_strata(each, h)) > 1:
+            *_, (layers, _) = strata = each.strata
+            limit = thickest_coat(strata, len(strata) - 1)
+            raise ValueError(
+                f"layers of {1e3 * layers:.3g} mm in all lie on a palm whose thickness, or theirs, "
+                f"is free, and its elements of {1e3 * h:.3g} mm cannot follow them: such layers "
+                f"are thinner than half an element, and of {1e3 * limit:.2g} mm at most; take "
+                "thinner ones, a narrower range, or a slab"
+            )
 
 
 def _supported(body: Body, h: float, mesh: TetMesh) -> Discretised:
@@ -165,6 +186,7 @@ PALM = register(
         check=lambda body: body.palm,
         discretise=discretise,
         morph=morph,
+        check_morph=check_morph,
         moves_in_proportion=False,
         grid=Grid(
             lines=body_lines,

@@ -13,6 +13,7 @@ from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
+from skinwave.bodies.sizes import default_size
 from skinwave.scene_keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
 
 THICKNESS = ("thickness_mm",)  # path of a key
@@ -75,8 +76,27 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
     for layers in (0.0, 1.0):  # what materials and bodies refuse, they refuse here
         for below in (0.0, 1.0):
             shares = [below if key.part is None else layers for key in found]
-            with_values(body, found, values_at(found, shares))
+            _check_values(body, found, values_at(found, shares))
+    _check_morph(body, found)
     return found
+
+
+def _check_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> None:
+    try:
+        with_values(body, keys, values)
+    except ValueError as error:
+        said = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+        raise ValueError(f"at {said}, ends of free ranges: {error}") from None
+
+
+def _check_morph(body: Body, keys: Sequence[FreeKey]) -> None:
+    """Refuse a thickness that no mesh of the default size follows."""
+    if any(key.moves for key in keys):
+        thinnest, thickest = (
+            with_values(body, keys, values_at(keys, [end if key.moves else 0.5 for key in keys]))
+            for end in (0.0, 1.0)
+        )
+        body.of_kind.check_morph(thinnest, thickest, default_size(thickest))
 
 
 def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
@@ -213,8 +233,8 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
     kind = body.of_kind
     if kind.morph is None and kind.equivalent is None:
         raise ValueError(
-            f"'{keys[0].key}' cannot be free: the matrices of a {body.kind} are no sums over its "
-            "thicknesses; free those of a slab, disc, palm or sheet, or reduce a body for each"
+            f"'{keys[0].key}' cannot be free: no mesh of a {body.kind} follows its thickness; free "
+            "that of a slab, disc, palm or sheet, or reduce a body for each value"
         )
     if len(keys) > MOST_THICKNESSES:
         raise ValueError(

@@ -8,8 +8,9 @@ Where nodes move in proportion to the thickness d_k of their layer, each matrix 
 of as many terms as there are independent functions 1, d_k and 1/d_k. It is known for all d from as
 many geometries, to round-off: an error as small as 1e-4 would already act against lam, 5,000 times
 mu in soft tissue. Where nodes move otherwise, but smoothly, it is a series of Chebyshev polynomials
-in log d, which converges geometrically: the stiffness of a palm from 14 to 20 mm has errors of 4e-4
-by 5 of them, 3e-5 by 7 and 4e-7 by 9 (of its largest entry), and the springs of its rim of 2e-5.
+in log d. Those of stiffness and mass converge geometrically: the stiffness of a palm from 14 to
+20 mm has errors of 4e-4 by 5 of them, 3e-5 by 7 and 4e-7 by 9 (of its largest entry). Its support
+begins less smoothly on the rim, and has 2e-4.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,9 +34,11 @@ INDEPENDENT = 1e-9  # of the largest pivot: functions whose rest is less are sum
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Range:
     """Bodies of a range: `body` at shares (k,) of it, 0 to 1, meshed at the shares `meshed` (k,)
-    with elements of `h` in metre, or its default, whose nodes are `moved` to a body's thicknesses;
-    matrices are known at those of the `geometries` (g, k), where those of the `functions` of a body
-    that `chosen` names are `known` (g, g).
+    with elements of `h` in metre, or its default, whose nodes are `moved` to a body's thicknesses.
+
+    Matrices are combinations of `functions` of a body's thicknesses. They are assembled at the
+    shares `geometries` (g, k), where the independent functions, of numbers `chosen` (g,), have the
+    values `known` (g, g).
     """
 
     body: Callable[[Sequence[float]], Body]
@@ -76,7 +79,7 @@ def range_of(
     kind, moved, count, functions = reference.of_kind, None, CANDIDATES, _terms
     if free.any() and kind.morph:
         thinnest = body(np.where(free, 0.0, meshed).tolist())
-        moved = kind.morph(thinnest, reference, h or kind.default_size(reference))
+        moved = kind.morph(thinnest, reference, h or default_size(reference))
         if not kind.moves_in_proportion:
             count, functions = SMOOTH, partial(_polynomials, thinnest, reference)
     along = ((1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2).tolist()

@@ -21,9 +21,9 @@ from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Body, Load, Reading, Scene
 from skinwave.sweeps.variation import DesignPoint
 
-# Bodies of a family for each key that is free, and for a thickness that moves the mesh: fewer cost
-# less alone.
-LEAST, THICKNESS = 6, 15
+# Bodies of a family for each key that is free, and for a thickness that moves the mesh, in
+# proportion or not: fewer cost less alone.
+LEAST, THICKNESS, SMOOTH_THICKNESS = 6, 15, 21
 PER_WORKER = 3  # bodies of a family: of fewer, workers that take one each are done sooner
 SHARE = 1 / 5  # of a tolerance: that of the reduced-order model
 AUDIBLE = 1e-2  # of the strongest line of a load: weaker ones make no scene harder
@@ -37,9 +37,9 @@ Ranges = tuple[tuple[str, float, float], ...]  # key, least and largest value
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """Bodies that one reduced-order model serves: the `scene` with the shortest waves, whose body
-    the factors are of that are free, the `ranges` of keys of that, the `hardest` body, and how many
-    `members` there are.
+    """Bodies that one reduced-order model serves: a `scene`, on whose body any free factors on all
+    moduli or losses act, the `ranges` of the free keys, the member with the shortest waves, which
+    is the `hardest` body, and how many `members` there are.
     """
 
     scene: Scene
@@ -83,10 +83,20 @@ def families(
     -------
     each family with the values of its bodies
     """
+    found = _families(hardest, tolerance, workers, moving=True)
+    shared = {solid for _, members in found for solid in members}
+    others = {solid: case for solid, case in hardest.items() if solid not in shared}
+    return found + _families(others, tolerance, workers, moving=False)
+
+
+def _families(
+    hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int, *, moving: bool
+) -> list[tuple[Family, dict[Solid, Values]]]:
+    """Families of bodies, of one thickness each unless their mesh may be `moving`."""
     limits = _limits(hardest.values())
     groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
     for solid, case in hardest.items():
-        if case.before and (keys := _free(solid[0], case.before.body, case, limits)):
+        if case.before and (keys := _free(solid[0], case.before.body, case, limits, moving)):
             rest = with_values(case.before.body, keys, {key.key: key.low for key in keys})
             groups.setdefault((keys, rest, *solid[1:]), {})[solid] = case
     return [
@@ -143,13 +153,21 @@ def _is_number(value: object) -> bool:
 
 
 def _free(
-    body: Body, before: Body, case: DesignPoint, limits: Mapping[str, tuple[float, float]]
+    body: Body,
+    before: Body,
+    case: DesignPoint,
+    limits: Mapping[str, tuple[float, float]],
+    moving: bool,
 ) -> tuple[FreeKey, ...]:
     """Varied keys that can be free of what a body is before factors on its materials; none if it is
     not as they say.
     """
     ranges = {key: limits[key] for key in case.varied if key in limits}
-    keys = _accepted(before, {k: r for k, r in ranges.items() if _accepted(before, {k: r})})
+    alone = {k: _accepted(before, {k: r}) for k, r in ranges.items()}
+    keys = _accepted(
+        before,
+        {k: ranges[k] for k, own in alone.items() if any(moving or not key.moves for key in own)},
+    )
     if not keys:
         return ()
     own = with_values(before, keys, dict(_values(case, keys)))
@@ -173,12 +191,17 @@ def _family(
 ) -> tuple[Family, dict[Solid, Values]] | None:
     """Family of bodies that differ in keys; None if they cannot be reduced together."""
     limits = _limits(members.values())
+    fixed = [key.key for key in keys if key.is_scale and key.key not in limits]
     keys = [key for key in keys if key.key in limits]
-    if len(members) < sum(THICKNESS if key.moves else LEAST for key in keys):
+    scenes = [(each, each.scene) for each in members.values() if each.scene]
+    case, hardest = max(scenes, key=lambda each: _per_length(each[1]))
+    in_proportion = hardest.body.of_kind.moves_in_proportion
+    moves = THICKNESS if in_proportion else SMOOTH_THICKNESS
+    # A factor that all share is not free, and a scene before factors lacks it.
+    scene = None if any(case.varied[key] != 1 for key in fixed) else case.before
+    if not scene or len(members) < sum(moves if key.moves else LEAST for key in keys):
         return None
     free = {key.key: limits[key.key] for key in keys}
-    scenes = [(case.scene, case.before) for case in members.values() if case.scene and case.before]
-    hardest, scene = max(scenes, key=lambda each: _per_length(each[0]))
     try:
         check_scene(scene, free_keys(scene.body, free), tolerance)
     except ValueError:

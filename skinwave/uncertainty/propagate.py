@@ -103,7 +103,7 @@ def propagate(
     method = method_of(scene, model, h=h, solver=solver)
     ends = one_at_a_time(spreads, ENDS)
     family = shared_body(scene, spreads, np.vstack([values, ends]), method, progress)
-    method = replace(method, family=family)
+    method = replace(method, family=family, steady=family is not None)
     return ensemble(scene, spreads, values, method, workers=workers, progress=progress)
 
 

@@ -23,7 +23,7 @@ from skinwave.bodies.analytic import exact_waves
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.models.flat_body import HARMONIC
-from skinwave.models.prepared import sample_times
+from skinwave.models.prepared import components, prepare, reduction_tolerance, sample_times
 from skinwave.parametric import lines_of
 from skinwave.pictures.styles import SHOWN
 from skinwave.scene import Scene
@@ -41,8 +41,8 @@ KEPT = 4  # solutions that may differ by the pressure alone
 class Method:
     """How samples are solved: names of the `lines` that are looked at, the `model` with its element
     size `h` in metre, its `solver` and its `tolerance`; whether it is `mapped`, by the wavenumber
-    integral; whether all samples have one load, `same_load`, but for its pressure; and the `family`
-    of their bodies, if these are reduced together.
+    integral; whether all samples have one load, `same_load`, but for its pressure; the `family` of
+    their bodies, if these are reduced together; and whether all are `steady`, as those then are.
     """
 
     lines: tuple[str, ...]
@@ -53,6 +53,7 @@ class Method:
     mapped: bool = False
     same_load: bool = False
     family: Family | None = None
+    steady: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,6 +148,8 @@ def _solved(scene: Scene, method: Method) -> Solution:
     frequencies = np.array([f or 0.0 for f in wanted])
     if method.family:
         return _of_family(scene, method, method.family, frequencies)
+    if method.steady:
+        return _alone(scene, method, frequencies)
     return (_mapped if method.mapped else _computed)(scene, method, frequencies)
 
 
@@ -178,6 +181,16 @@ def _of_family(scene: Scene, method: Method, family: Family, frequencies: Floats
     f, a = lines_of(shared, scene.body)
     ratio = scene.pressure.peak_pressure / family.scene.pressure.peak_pressure
     return _of_lines(scene, frequencies, f, ratio * a, NO_MAP.shape)
+
+
+def _alone(scene: Scene, method: Method, frequencies: Floats) -> Solution:
+    """Solution in the steady state by a reduced-order model of one sample's body, at the probes."""
+    prepared = prepare(
+        scene.body, scene.probe_points, h=method.h, solver=method.solver,
+        tolerance=reduction_tolerance(method.tolerance), reading=scene.reading, load=scene.load,
+    )  # fmt: skip
+    motion = components(prepared, *scene.loads)
+    return _of_lines(scene, frequencies, motion.frequencies, motion.lines, NO_MAP.shape)
 
 
 def _of_lines(
