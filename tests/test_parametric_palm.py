@@ -94,19 +94,25 @@ def test_matrices_between_thicknesses_converge_geometrically(monkeypatch):
     assert by_count[1] < 1e-4, "more would act against the bulk modulus"
 
 
+def assert_lines_are_those_of_the_full_body(scene, prepared, values, discretise=None):
+    body = with_values(scene.body, prepared.keys, values)
+    frequencies, found = parametric.lines(prepared, values)
+    strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
+    made = build(body, H, "", discretise)
+    expected = full_lines(scene, body, frequencies[strong], made=made)
+    assert line_errors(found[strong], expected).max() < 0.01
+
+
 @pytest.mark.slow
 def test_lines_of_a_thickness_are_those_of_the_full_body():
     scene = scene_of(PALM)
     prepared = skinwave.prepare(scene, {KEY: (14.0, 18.0)}, 0.02, h=H)
     for thickness in (14.0, 17.6):
-        body = with_values(PALM, prepared.keys, {KEY: thickness})
-        made = build(body, H, "", prepared.bodies.moved)
-        frequencies, found = parametric.lines(prepared, {KEY: thickness})
-        strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
-        expected = full_lines(scene, body, frequencies[strong], made=made)
-        assert line_errors(found[strong], expected).max() < 0.01
+        moved = prepared.bodies.moved
+        assert_lines_are_those_of_the_full_body(scene, prepared, {KEY: thickness}, moved)
     waveforms = parametric.answer(prepared, {KEY: thickness})
-    own = own_body(body, scene.probe_points, h=H, discretise=prepared.bodies.moved)
+    body = with_values(PALM, prepared.keys, {KEY: thickness})
+    own = own_body(body, scene.probe_points, h=H, discretise=moved)
     expected = own_answer(own, scene).displacement
     assert np.abs(waveforms.displacement - expected).max() < 0.02 * np.abs(expected).max()
 
@@ -116,11 +122,7 @@ def test_the_thickness_of_a_coat_is_free():
     scene = scene_of(COATED)
     prepared = skinwave.prepare(scene, {COAT: (0.15, 0.4)}, 0.02, h=H)
     for thickness in (0.15, 0.37):
-        body = with_values(COATED, prepared.keys, {COAT: thickness})
-        frequencies, found = parametric.lines(prepared, {COAT: thickness})
-        strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
-        expected = full_lines(scene, body, frequencies[strong], H)
-        assert line_errors(found[strong], expected).max() < 0.01
+        assert_lines_are_those_of_the_full_body(scene, prepared, {COAT: thickness})
 
 
 def test_thicknesses_that_elements_do_not_follow_are_refused():

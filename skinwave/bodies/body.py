@@ -212,6 +212,11 @@ class Body:
         return [*(start for start, _ in self.strata), self.depth]
 
     @property
+    def thicknesses(self) -> list[float]:
+        """Thickness in metre of each of its layers as they are given, and then of all of it."""
+        return [*(layer.thickness for layer in self.layers), self.depth]
+
+    @property
     def solids(self) -> tuple[Material, ...]:
         """All of its materials: of its strata, and of its regions."""
         strata = (solid for _, solid in self.strata)

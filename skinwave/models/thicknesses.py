@@ -142,12 +142,8 @@ def _terms(body: Body) -> Floats:
 
 def _polynomials(thinnest: Body, thickest: Body, body: Body) -> Floats:
     """Chebyshev polynomials of the logarithm of the one thickness that differs."""
-    ends = np.log([_thicknesses(each) for each in (thinnest, thickest)])
+    ends = np.log([each.thicknesses for each in (thinnest, thickest)])
     free = int(np.argmax(ends[1] - ends[0]))
-    (low, high), now = ends[:, free], np.log(_thicknesses(body)[free])
+    (low, high), now = ends[:, free], np.log(body.thicknesses[free])
     angle = np.arccos(np.clip((2 * now - low - high) / (high - low), -1, 1))
     return np.asarray(np.cos(np.arange(SMOOTH) * angle))
-
-
-def _thicknesses(body: Body) -> list[float]:
-    return [*(layer.thickness for layer in body.layers), body.depth]

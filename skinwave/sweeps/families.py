@@ -171,8 +171,8 @@ def _free(
     if not keys:
         return ()
     own = with_values(before, keys, dict(_values(case, keys)))
-    same = own.solids == body.solids and np.allclose(_depths(own), _depths(body), ROUND_OFF, 0)
-    return keys if same else ()
+    alike = np.allclose(own.thicknesses, body.thicknesses, ROUND_OFF, 0)
+    return keys if own.solids == body.solids and alike else ()
 
 
 def _accepted(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
@@ -180,10 +180,6 @@ def _accepted(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
         return free_keys(body, free)
     except ValueError:
         return ()
-
-
-def _depths(body: Body) -> list[float]:
-    return [*(layer.thickness for layer in body.layers), body.depth]
 
 
 def _family(
