@@ -13,9 +13,10 @@ from scipy.optimize import brentq
 import fem
 import meshes
 from fem import nonlinear
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from simple_model.focus import along_axis
-from skinwave.models.stretching import mean_pressure, membrane, meshed_sheet, stretching_body
+from skinwave.bodies.mounting import Mounting
+from skinwave.models.stretching import membrane, meshed_sheet, stretching_body
 from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Placement, Scene
 from skinwave.simulation import compute
@@ -79,25 +80,26 @@ def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(s
     assert free.energy(stretched.ravel()) == pytest.approx(exact, rel=1e-3)
 
 
-def test_mean_pressure_is_the_average_over_time():
-    points = np.array([[0.0, 0.0], [0.01, 0.0], [-0.004, 0.009]])
-    times = np.linspace(0, 0.5, 1500, endpoint=False)
-    bell = np.sin(2 * np.pi * times) ** 2  # lets no line leak into the mean
-    average = bell @ np.array([CIRCLING(points, t) for t in times]) / bell.sum()
-    np.testing.assert_allclose(mean_pressure(CIRCLING, points), average, rtol=1e-3)
-
-
-def test_the_motion_starts_from_rest_under_the_mean_pressure(sheet):
+def test_the_motion_starts_from_rest():
     response = compute(SCENE, "fem-nonlinear", h=0.01)
-    made, body = sheet
-    P, points = fem.load_operator(made.mesh), fem.facet_points(made.mesh)[:, :2]
-    rest = nonlinear.static(body, P @ mean_pressure(CIRCLING, points))
-    S = fem.probe_operator(made.mesh, SCENE.probe_points)
-    np.testing.assert_allclose(response.displacement[0], S @ rest, rtol=0.01)
+    assert np.abs(response.displacement[0]).max() == 0.0
     assert response.model == "fem-nonlinear"
     assert response.effort.reduced_dofs == 40
     assert response.effort.steps == 398
     assert 0 < response.effort.energy_imbalance < 0.01
+
+
+def test_a_sheet_that_hardly_bends_moves_from_rest_as_a_linear_plate():
+    """Under next to no pressure, by Ritz's modes of a thin plate, with the mean deflection."""
+    lossy = from_young(density=800, young=8e8, poisson=0.3, viscosity=1.2e4)
+    held = Mounting(edges=("front",))
+    body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=held)
+    weak = MovingPressure(tacton=Tacton(am_frequency=60, duration=0.02), peak_pressure=1e-3)
+    scene = Scene(pressure=weak, body=body, probes=((0.0, 0.0), (5e-3, 5e-3)))
+    linear = compute(scene, "plate-modes-transient").values
+    found = compute(scene, "fem-nonlinear", h=2e-3, dt=1e-4).values
+    error = np.linalg.norm(found - linear, axis=0) / np.linalg.norm(linear, axis=0)
+    assert error.max() < 0.03
 
 
 def test_a_step_that_fails_is_halved(sheet, monkeypatch):

@@ -3,9 +3,8 @@
 M1 is about each Tacton without a path, M4 and M5 about each modulated one with a path: where the
 linear sheet shows the claim, all of them decide, where it does not, the one under which a rival of
 f_AM is strongest; if that one shows it at large deflection, all of them do then. The sheet is
-computed by `fem-nonlinear` from rest under the mean of the pressure, and by the modes of the same
-elements without stretching, in the steady state: what is left between the two is large deflection,
-and the start.
+computed by `fem-nonlinear` from rest, and by the modes of the same elements without stretching, in
+the steady state: the two differ by large deflection, and by the start.
 """
 
 import time

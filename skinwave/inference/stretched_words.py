@@ -13,10 +13,10 @@ NONE = (
     "folder as --out, adds three."
 )
 LARGE = (
-    "By fem-nonlinear, in steps of 0.1 ms for 1 s from rest under the mean of the pressure, under "
-    "the Tactons that decide: each without a path for M1, which asks for its harmonics; for M4 and "
-    "M5 each modulated one with a path if the linear sheet shows the claim, else the one under "
-    "which its strongest rival, or multiple, of f_AM is: a claim that fails there fails, and one "
+    "By fem-nonlinear, in steps of 0.1 ms for 1 s from rest, under the Tactons that "
+    "decide: each without a path for M1, which asks for its harmonics; for M4 and M5 each "
+    "modulated one with a path if the linear sheet shows the claim, else the one under which its "
+    "strongest rival, or multiple, of f_AM is: a claim that fails there fails, and one "
     "that does not is computed under all. Beside it "
     "the same modes of the same elements without stretching, in the steady state. Elements have "
     "Rayleigh damping for the loss factor, and curl and clips are left out."

@@ -17,7 +17,7 @@ from skinwave.models.stretching import (
 )
 from skinwave.scene import Scene
 
-METHOD = "large deflection about a static preload"
+METHOD = "large deflection, step by step from rest"
 
 
 def _error(scene: Scene, h: float | None) -> float:
@@ -41,8 +41,7 @@ REDUCED = register(
     Model(
         name="fem-nonlinear",
         method=METHOD,
-        words="a sheet that stretches as it bends, in its modes, about its rest under the mean "
-        "pressure",
+        words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
         refuse=_refuse_of_reduced,
         error=_error,

@@ -1,4 +1,4 @@
-"""Nonlinear models of a sheet at large deflection, about its equilibrium under the mean pressure.
+"""Nonlinear models of a sheet at large deflection, from rest.
 
 A sheet is meshed as in the linear models, by an equivalent solid some ten times too thick with the
 bending stiffness and mass of the true one. The membrane stiffness of so thick a solid is too small
@@ -18,15 +18,8 @@ import fem
 from fem import nonlinear
 from meshes import middle_plane
 from meshes.tetmesh import Floats
-from simple_model import Effort, MovingPressure, Response
-from simple_model.load_spectrum import (
-    Complex,
-    load_lines,
-    path_fourier,
-    path_samples,
-    path_weights,
-    reduced_lines,
-)
+from simple_model import Effort, Response
+from simple_model.load_spectrum import Complex, reduced_lines
 from simple_model.sampling import resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
@@ -121,17 +114,8 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
     )
 
 
-def mean_pressure(pressure: MovingPressure, points: Floats) -> Floats:
-    """Mean pressure (n,) in Pa at surface points (n, 2 or 3), averaged over all time."""
-    lines = load_lines(pressure)
-    mean = lines.frequencies < 1e-9
-    weighted = pressure.spot(points, path_samples(pressure)) * path_weights(pressure)[:, None]
-    along = path_fourier(weighted.T)
-    return (along[:, lines.harmonics[mean]] @ lines.coefficients[mean]).real
-
-
 def full_answer(scene: Scene, request: Request) -> Response:
-    """Direct time integration of all dofs, from equilibrium under the mean pressure."""
+    """Direct time integration of all dofs, from rest."""
     clock, size = Clock(), request.h or stretching_size(scene.body, reduced=False)
     with clock("assemble"):
         request.report("assemble", 0.0)
@@ -139,10 +123,9 @@ def full_answer(scene: Scene, request: Request) -> Response:
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    return _about_rest(
+    return _marched(
         "fem-nonlinear-transient", scene, request, clock, made, size,
         body=body,
-        mean=P @ mean_pressure(scene.pressure, points),
         force=lambda t: P @ scene.pressure(points, t, over=dt),
         read=full_reader(scene.body, made, scene.probe_points, scene.reading),
         dt=dt,
@@ -162,7 +145,7 @@ class _Reduced:
 
 
 def reduced_answer(scene: Scene, request: Request) -> Response:
-    """Time integration of the sheet's bending modes, from equilibrium under the mean pressure."""
+    """Time integration of the sheet's bending modes, from rest."""
     clock, size = Clock(), request.h or stretching_size(scene.body, reduced=True)
     with clock("reduce"):
         request.report("reduce", 0.0)
@@ -177,10 +160,9 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
         return (np.exp(2j * pi * hz * t) @ forces).real
 
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    return _about_rest(
+    return _marched(
         "fem-nonlinear", scene, request, clock, sheet.made, size,
         body=sheet.modes.elastic,
-        mean=forces[hz < 1e-9].real.sum(axis=0),
         force=force,
         read=read,
         dt=dt,
@@ -239,25 +221,20 @@ def mode_count(body: Body) -> int:
     return min(max(found, FEWEST_MODES), MOST_MODES)
 
 
-def _about_rest(
+def _marched(
     model: str, scene: Scene, request: Request, clock: Clock, made: Build, h: float, *,
-    body: fem.Elastic, mean: Floats, force: Callable[[float], Floats],
-    read: Callable[[Floats], Floats], dt: float, effort: Effort,
+    body: fem.Elastic, force: Callable[[float], Floats], read: Callable[[Floats], Floats],
+    dt: float, effort: Effort,
 ) -> Response:  # fmt: skip
-    """Time integration from the static equilibrium under the mean load (preload)."""
+    """Time integration from rest."""
     times, report, solver = request.times, request.report, request.solver
     steps = step_count(float(times[-1]), dt)
     kept = lru_cache(maxsize=2)(force)
-    with clock("preload"):
-        report("preload", 0.0)
-        rest = nonlinear.static(body, mean, solver=solver)
-    start = replace(fem.at_rest(len(rest)), displacement=rest)
-    at_start = nonlinear.total_energy(body, start)
     with clock("march"):
-        states = nonlinear.dynamic(body, lambda t, u: kept(t), dt, initial=start, solver=solver)
+        states = nonlinear.dynamic(body, lambda t, u: kept(t), dt, solver=solver)
         stepped, (imbalance, _) = marched(
             nonlinear.with_energy_balance(body, islice(states, steps + 1), kept), steps, read,
-            lambda state: nonlinear.total_energy(body, state) - at_start, report,
+            lambda state: nonlinear.total_energy(body, state), report,
         )  # fmt: skip
     effort = replace(
         effort, steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
