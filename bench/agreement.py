@@ -1,0 +1,475 @@
+"""Agreement of models: random scenes, and every model that takes them.
+
+`python -m bench.agreement N SEED` draws N scenes over the keys of a scene file, computes each by
+every model that accepts it, and compares each pair of answers. A pair agrees if, at the worst
+probe, the relative L2 difference over the whole record is at most 1.2 times the sum of both
+expected errors. What disagrees is printed as a scene file, and with `--shrink` reduced first.
+
+A scene depends on the seed and its number alone: `--first K` draws from number K on.
+"""
+
+import argparse
+import copy
+import math
+import random
+import sys
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import combinations
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+import skinwave
+from fem.transient import Diverged
+from simple_model import Response
+from skinwave import models
+from skinwave.scene import Scene
+from skinwave.scene_file import from_table
+
+SLACK = 1.2  # times the sum of the stated errors
+FLOOR = 2e-3  # relative: differences below it are round-off and interpolation
+WEAKEST = 0.01  # of the largest motion: weaker probes are not compared
+SLOWEST = 30.0  # s of CPU time of one response, beyond which it is ended and counted as slow
+TOLERANCE = 0.05
+KERNELS = ("point-kernel", "point-kernel-published")  # their answer is a pressure
+Table = dict[str, Any]
+
+
+def table(number: int, seed: int) -> Table:
+    """Scene of a number and a seed, as a table by the keys of a scene file."""
+    draw = random.Random(f"{seed}-{number}")
+    body = _body(draw)
+    reach = 0.35 * min(body["size_x_mm"], body["size_y_mm"], 40)
+    found = {
+        "tacton": _tacton(draw, reach),
+        "focus": _focus(draw),
+        "body": body,
+        "probes": _probes(draw, body, reach),
+    }
+    if body["kind"] not in ("sheet", "palm") and draw.random() < 0.1:
+        found["load"] = {"kind": "shear", "direction": draw.choice(["path", [1.0, 0.0]])}
+        if found["load"]["direction"] == "path" and found["tacton"]["shape"] == "point":
+            found["load"]["direction"] = [0.0, 1.0]
+        found["probes"]["quantity"] = draw.choice(["displacement_x", "displacement_y", "velocity"])
+    elif body["kind"] not in ("sheet",) and draw.random() < 0.05:
+        found["load"] = {"kind": "point_force", "force_n": 1e-3}
+        del found["focus"]
+    return found
+
+
+def _number(draw: random.Random, low: float, high: float) -> float:
+    """Number of four digits, uniform in its logarithm."""
+    return float(f"{math.exp(draw.uniform(math.log(low), math.log(high))):.4g}")
+
+
+def _point(draw: random.Random, reach: float) -> list[float]:
+    return [round(draw.uniform(-reach, reach), 2) for _ in range(2)]
+
+
+def _tacton(draw: random.Random, reach: float) -> Table:
+    found: Table = {"duration_s": _number(draw, 0.005, draw.choice([0.1, 0.5, 2.0]))}
+    shape = draw.choice(
+        ["point", "point", "line", "circle", "circle", "triangle", "square", "polyline", "recorded"]
+    )
+    found["shape"] = shape
+    if shape in ("line", "polyline"):
+        found["sweep"] = draw.choice(["there_and_back", "one_way", "sinusoidal"])
+    if shape == "recorded":
+        gaps = [round(draw.choice([0.0, _number(draw, 0.002, 0.05)]), 5) for _ in range(4)]
+        found["times_s"] = [round(sum(gaps[:k]), 5) for k in range(4)] + [
+            round(sum(gaps) + 0.01, 5)
+        ]
+        found["points_mm"] = [_point(draw, reach) for _ in range(5)]
+        if draw.random() < 0.3:
+            found["hold"] = True
+        if draw.random() < 0.3:
+            found["levels"] = [round(draw.random(), 2) for _ in range(5)]
+    elif shape == "polyline":
+        found["points_mm"] = [_point(draw, reach) for _ in range(draw.randint(2, 5))]
+        found["speed_m_per_s"] = _number(draw, 0.02, 30)
+    elif shape != "point":
+        found["size_mm"] = _number(draw, 2, reach)
+        # At most 2 kHz drawing frequency, which no body follows.
+        found["speed_m_per_s"] = _number(draw, 0.02, min(100, 2 * found["size_mm"]))
+    if draw.random() < 0.7:
+        found["am_frequency_hz"] = _number(draw, 10, 350)
+    if draw.random() < 0.15:
+        found["second_am_frequency_hz"] = _number(draw, 10, 350)
+        found["superposition"] = draw.choice([[1.0, 0.0], [0.75, 0.25], [0.5, 0.5]])
+    if draw.random() < 0.15:
+        found["envelope_frequency_hz"] = _number(draw, 0.5, 60)
+    sampled = shape == "recorded" and "levels" in found
+    if not sampled and draw.random() < 0.15:
+        pulses = [[_number(draw, 5, 60), _number(draw, 1, 60)] for _ in range(draw.randint(1, 2))]
+        ramp = draw.choice([0.0, 0.3]) * min(on for on, _ in pulses)
+        found["rhythm"] = {"pulses_ms": pulses, "ramp_ms": round(ramp, 3)}
+    if shape != "point" and draw.random() < 0.15:
+        found["foci"] = draw.choice([[0.0, 0.5], [0.0, 0.25, 0.6]])
+    return found
+
+
+def _focus(draw: random.Random) -> Table:
+    found: Table = {"peak_pressure_pa": _number(draw, 0.001, 50)}
+    if draw.random() < 0.4:
+        found["drive"] = draw.choice(["linear", "pressure_squared", "force_corrected"])
+    if draw.random() < 0.2:
+        found["depth_of_modulation"] = round(draw.uniform(0.1, 1), 2)
+    if draw.random() < 0.2:
+        found["height_mm"] = draw.choice([150, 200, 250])
+    if draw.random() < 0.1:
+        found["profile"] = "main_lobe"
+    return found
+
+
+def _body(draw: random.Random) -> Table:
+    kind = draw.choice(["slab"] * 5 + ["sheet"] * 5 + ["palm", "disc", "finger"])
+    makers: dict[str, Callable[[random.Random], Table]] = {
+        "slab": _slab, "sheet": _sheet, "palm": _palm, "disc": _disc, "finger": _finger
+    }  # fmt: skip
+    return {"kind": kind} | makers[kind](draw)
+
+
+def _skin(draw: random.Random, softest: float = 8e3, stiffest: float = 80e3) -> Any:
+    """Material of a solid: a preset, or a table with any law."""
+    if draw.random() < 0.25:
+        return draw.choice(["palm", "palm-stiff", "palm-zener"])
+    found: Table = {
+        "density_kg_m3": round(draw.uniform(950, 1150)),
+        "shear_modulus_pa": _number(draw, softest, stiffest),
+        "poisson": draw.choice([0.3, 0.45, 0.49]),
+    }
+    _add_loss(draw, found, found["shear_modulus_pa"])
+    return found
+
+
+def _add_loss(draw: random.Random, found: Table, modulus: float) -> None:
+    law = draw.choice(["voigt", "voigt", "loss_factor", "loss_factor", "prony", "fractional"])
+    if law == "voigt":
+        found["viscosity_pa_s"] = float(f"{modulus * draw.uniform(5e-5, 5e-4):.3g}")
+    elif law == "loss_factor":
+        found["loss_factor"] = _number(draw, 0.02, 0.5)
+    elif law == "prony":
+        share, when = draw.uniform(0.1, 0.8), _number(draw, 2e-4, 1e-2)
+        found["prony"] = [{"modulus_pa": float(f"{share * modulus:.3g}"), "time_s": when}]
+    else:
+        found["law"] = draw.choice(["fractional_kelvin_voigt", "fractional_zener"])
+        found |= {
+            "exponent": round(draw.uniform(0.15, 0.9), 2),
+            "time_s": _number(draw, 1e-4, 2e-3),
+        }
+        if found["law"] == "fractional_zener":
+            found["fast_modulus_pa"] = float(f"{modulus * draw.uniform(1.5, 5):.3g}")
+
+
+def _slab(draw: random.Random) -> Table:
+    found: Table = {
+        "size_x_mm": round(draw.uniform(16, 32), 1),
+        "size_y_mm": round(draw.uniform(16, 32), 1),
+        "thickness_mm": round(draw.uniform(2, 8), 1),
+        "material": _skin(draw),
+        "sides": draw.choice(["absorbing"] * 3 + ["free", "clamped"]),
+        "base": draw.choice(["clamped"] * 4 + ["elastic", "absorbing", "free"]),
+    }
+    if draw.random() < 0.1:
+        found |= {"thickness_mm": math.inf, "base": "clamped"}
+    elif found["base"] == "elastic":
+        found["base_stiffness_n_per_m3"] = _number(draw, 5e5, 5e7)
+    if found["base"] == "free" and found["sides"] == "free":
+        found["sides"] = "clamped"
+    if draw.random() < 0.25:
+        found["layers"] = [
+            {"thickness_mm": round(draw.uniform(0.15, 0.4) * min(found["thickness_mm"], 8), 2),
+             "material": _skin(draw)} for _ in range(draw.randint(1, 2))
+        ]  # fmt: skip
+    return found
+
+
+def _sheet(draw: random.Random) -> Table:
+    young = _number(draw, 3e8, 6e9)
+    material: Table = {
+        "density_kg_m3": round(draw.uniform(600, 1000)), "young_modulus_pa": young, "poisson": 0.3
+    }  # fmt: skip
+    if draw.random() < 0.75:
+        material["loss_factor"] = _number(draw, 0.01, 0.2)
+    else:
+        _add_loss(draw, material, young / 2.6)
+    found: Table = {
+        "size_x_mm": round(draw.uniform(15, 40), 1),
+        "size_y_mm": round(draw.uniform(15, 40), 1),
+        "thickness_mm": round(draw.uniform(0.08, 0.3), 3),
+        "material": material,
+        "air": draw.random() < 0.4,
+    }
+    mounting: Table = {}
+    if draw.random() < 0.5:
+        sides = [["left", "right"], ["front", "back"], ["front"], ["left", "front"]]
+        mounting["edges"] = draw.choice(sides)
+    if draw.random() < 0.3 and len(mounting.get("edges", "four")) > 1:
+        mounting["support"] = "simply"
+    if draw.random() < 0.3:
+        for axis in "xy":
+            mounting[f"tension_{axis}_n_per_m"] = round(draw.uniform(0, 50), 1)
+    if mounting:
+        found["mounting"] = mounting
+    return found
+
+
+def _palm(draw: random.Random) -> Table:
+    return {
+        "size_x_mm": round(draw.uniform(36, 50), 1), "size_y_mm": round(draw.uniform(40, 55), 1),
+        "thickness_mm": round(draw.uniform(8, 13), 1), "material": _skin(draw, 15e3),
+    }  # fmt: skip
+
+
+def _disc(draw: random.Random) -> Table:
+    across = round(draw.uniform(20, 36), 1)
+    return {
+        "size_x_mm": across, "size_y_mm": across, "thickness_mm": round(draw.uniform(3, 8), 1),
+        "material": _skin(draw), "sides": draw.choice(["free", "clamped", "absorbing"]),
+    }  # fmt: skip
+
+
+def _finger(draw: random.Random) -> Table:
+    return {
+        "size_x_mm": 16.0, "size_y_mm": 25.0, "thickness_mm": 13.0, "base": "free",
+        "sides": "clamped", "regions": {"bone": "bone"}, "material": _skin(draw, 15e3),
+    }  # fmt: skip
+
+
+def _probes(draw: random.Random, body: Table, reach: float) -> Table:
+    near = 0.3 if body["kind"] == "finger" else 1.0
+    found: Table = {"points_mm": [_point(draw, near * reach) for _ in range(draw.randint(1, 3))]}
+    if draw.random() < 0.4:
+        found["quantity"] = draw.choice(["velocity", "acceleration"])
+    if body["kind"] == "slab" and draw.random() < 0.15:
+        found["depth_mm"] = round(draw.uniform(0.2, 0.5) * min(body["thickness_mm"], 4), 2)
+        found["quantity"] = draw.choice(["displacement_z", "strain_zz", "displacement"])
+    return found
+
+
+class TooSlow(Exception):
+    """A response that takes longer than it may."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Difference of two models' answers: at the worst probe and, relative to the peak there, at
+    the worst sample; and the sum of what they state.
+    """
+
+    models: tuple[str, str]
+    difference: float
+    sample: float
+    stated: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the difference is within what both state."""
+        return self.difference <= SLACK * self.stated + FLOOR
+
+
+@dataclass
+class Outcome:
+    """Outcome of one scene: its pairs, what is wrong, refusals by model, seconds by model."""
+
+    number: int
+    scene: Table
+    pairs: list[Pair] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    slow: list[str] = field(default_factory=list)
+    refusals: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    stated: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def disagreements(self) -> list[Pair]:
+        """Pairs that do not agree."""
+        return [pair for pair in self.pairs if not pair.agrees]
+
+
+def outcome(
+    number: int, scene: Table, only: tuple[str, ...] = (), slowest: float = SLOWEST
+) -> Outcome:
+    """Answers of every model to a scene, or of some, compared."""
+    found = Outcome(number, scene)
+    try:
+        parsed = from_table(copy.deepcopy(scene))
+    except ValueError as error:
+        found.refusals["scene"] = str(error)
+        return found
+    answers: dict[str, Response] = {}
+    for name in only or [each for each in models.names() if each not in KERNELS]:
+        started = time.process_time()
+        try:
+            answers[name] = _answer(parsed, name, started + slowest)
+        except TooSlow:
+            found.slow.append(name)
+        except (ValueError, Diverged) as error:
+            found.refusals[name] = str(error)
+        except Exception:
+            found.faults.append(f"{name}: {traceback.format_exc(limit=-2)}")
+        found.seconds[name] = time.process_time() - started
+    found.stated = {name: each.expected_error for name, each in answers.items()}
+    found.pairs = list(_pairs(answers))
+    return found
+
+
+def _answer(scene: Scene, model: str, until: float) -> Response:
+    def watch(phase: str, fraction: float) -> None:
+        if time.process_time() > until:
+            raise TooSlow
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
+        return skinwave.simulate(scene, model, TOLERANCE, watch)
+
+
+def _pairs(answers: dict[str, Response]) -> Iterator[Pair]:
+    for one, other in combinations(answers, 2):
+        a, b = answers[one], answers[other]
+        linear = {models.named(name).is_nonlinear for name in (one, other)} == {False, True}
+        if linear and _is_bent(*answers.values()):
+            continue  # each is right about its own physics, and the linear one says so
+        stated = a.expected_error + b.expected_error
+        if math.isnan(stated):
+            continue
+        yield Pair((one, other), *_difference(np.asarray(a.values), np.asarray(b.values)), stated)
+
+
+def _is_bent(*answers: Response) -> bool:
+    return any("linear" in each for answer in answers for each in answer.effort.warnings)
+
+
+def _difference(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
+    """Relative L2 difference at the worst probe, and of the worst sample relative to the peak."""
+    if a.shape != b.shape:
+        return math.inf, math.inf
+    sizes = np.maximum(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
+    seen = sizes > WEAKEST * sizes.max()
+    if not seen.any():
+        return 0.0, 0.0
+    away = (a - b)[:, seen]
+    peaks = np.maximum(abs(a), abs(b))[:, seen].max(axis=0)
+    worst = (np.linalg.norm(away, axis=0) / sizes[seen]).max()
+    return float(worst), float((abs(away).max(axis=0) / peaks).max())
+
+
+def shrunk(found: Outcome, attempts: int = 40) -> Outcome:
+    """Smaller scene with a disagreement of the same pair: keys are left out one by one."""
+    pair = found.disagreements[0].models
+    left = attempts
+    progress = True
+    while progress and left > 0:
+        progress = False
+        for section, key in [(s, k) for s in found.scene for k in found.scene[s]]:
+            if left <= 0:
+                break
+            smaller = copy.deepcopy(found.scene)
+            del smaller[section][key]
+            left -= 1
+            tried = outcome(found.number, smaller, pair)
+            if tried.disagreements:
+                found, progress = tried, True
+                break
+    return found
+
+
+def _from_number(given: tuple[int, int, tuple[str, ...], float]) -> Outcome:
+    number, seed, only, slowest = given
+    return outcome(number, table(number, seed), only, slowest)
+
+
+def main() -> int:
+    """Compare models over random scenes, and print what disagrees and a table of pairs."""
+    parser = argparse.ArgumentParser(prog="python -m bench.agreement", description=__doc__)
+    parser.add_argument("count", type=int, help="number of scenes")
+    parser.add_argument("seed", type=int)
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--shrink", action="store_true", help="reduce scenes that disagree")
+    parser.add_argument("--kind", help="only scenes with this kind of body")
+    parser.add_argument("--models", nargs="+", default=(), help="only these, in place of all")
+    parser.add_argument(
+        "--slowest", type=float, default=SLOWEST, help="s of CPU time of a response"
+    )
+    parser.add_argument("--verbose", action="store_true", help="every pair and refusal")
+    given = parser.parse_args()
+    numbers = (
+        k
+        for k in range(given.first, given.first + given.count)
+        if given.kind in (None, table(k, given.seed)["body"]["kind"])
+    )
+    work = [(k, given.seed, tuple(given.models), given.slowest) for k in numbers]
+    found = []
+    with get_context("spawn").Pool(given.workers, maxtasksperchild=20) as pool:
+        for each in pool.imap(_from_number, work):
+            found.append(each)
+            _show(each, given.shrink, given.verbose)
+    _summary(found)
+    return int(any(each.disagreements or each.faults for each in found))
+
+
+def _show(found: Outcome, shrink: bool, verbose: bool) -> None:
+    bad = found.disagreements
+    seconds = sum(found.seconds.values())
+    verdict = "scene refused" if "scene" in found.refusals else f"{len(found.pairs)} pairs"
+    if bad or found.faults:
+        verdict = f"{len(bad)} of {verdict} disagree, {len(found.faults)} faults"
+    slow = f", slow: {', '.join(found.slow)}" if found.slow else ""
+    print(f"scene {found.number}: {found.scene['body']['kind']}, {verdict}, {seconds:.1f} s{slow}")
+    if verbose or bad:
+        for pair in found.pairs if verbose else bad:
+            one, other = pair.models
+            print(
+                f"  {one} ({found.stated[one]:.2%}) and {other} ({found.stated[other]:.2%}): "
+                f"{pair.difference:.2%}, at the worst sample {pair.sample:.2%}"
+            )
+    for fault in found.faults:
+        print(f"  fault: {fault}")
+    if verbose:
+        for name, words in found.refusals.items():
+            print(f"  {name} refuses: {words}")
+    if bad or found.faults:
+        small = shrunk(found) if shrink and bad else found
+        print("    " + tomli_w.dumps(small.scene).replace("\n", "\n    "))
+    sys.stdout.flush()
+
+
+def _summary(found: list[Outcome]) -> None:
+    pairs = [(each.number, pair) for each in found for pair in each.pairs]
+    shared = Counter(pair.models for _, pair in pairs)
+    tight = Counter(pair.models for _, pair in pairs if pair.stated < 0.2)
+    bad = Counter(pair.models for _, pair in pairs if not pair.agrees)
+    print(f"\n{'pair':<50} {'scenes':>7} {'stated < 20 %':>14} {'disagree':>9}")
+    for one, other in sorted(shared):
+        of = (one, other)
+        print(f"{one + ', ' + other:<50} {shared[of]:>7} {tight[of]:>14} {bad[of]:>9}")
+    took: dict[str, list[float]] = {}
+    for each in found:
+        for name, seconds in each.seconds.items():
+            if name in each.stated:
+                took.setdefault(name, []).append(seconds)
+    slow = Counter(name for each in found for name in each.slow)
+    for name in sorted(took | slow):
+        median = f"{np.median(took[name]):.2f} s" if name in took else "-"
+        print(f"{name}: {len(took.get(name, []))} answers, median {median}, {slow[name]} too slow")
+    faults = sum(len(each.faults) for each in found)
+    refused = sum("scene" in each.refusals for each in found)
+    alone = sum(len(each.stated) == 1 for each in found)
+    none = sum(not each.stated and "scene" not in each.refusals for each in found)
+    print(
+        f"{len(found)} scenes ({refused} refused, {none} without a model, {alone} with one): "
+        f"{len(pairs)} pairs, {sum(bad.values())} disagree in "
+        f"{len([each for each in found if each.disagreements])} scenes; {faults} faults"
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
