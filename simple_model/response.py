@@ -444,22 +444,53 @@ def fit_lines(
     ValueError
         If a frequency is not below half the sampling rate.
     """
-    frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
-    nyquist = 0.5 / step(response.times)
-    if not ((frequencies >= 0) & (frequencies < nyquist)).all():
-        raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
     t, x = response.times, response.values
-    first = int(np.argmax(t >= t[0] + settle * np.ptp(t)))
-    span = float(np.ptp(t[first:]))
-    distinct, which = _distinct(frequencies, 1 / span)
-    basis = _waves(distinct, t)
-    kept = basis[:, first:]
-    weighted = kept * kaiser(kept.shape[1], _beta(_closest(distinct, span)))
-    normal = weighted @ kept.T, weighted @ x[first:]
-    fitted = np.linalg.lstsq(*normal, rcond=1e-13)[0]
+    basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
+    fitted = inverse @ (weighted @ x[-weighted.shape[1] :])
     cosine, sine = np.split(fitted[1:], 2)
     amplitudes = np.vstack([fitted[:1], cosine - 1j * sine])[which]
     return amplitudes, x - basis.T @ fitted
+
+
+def line_rows(
+    times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
+) -> tuple[Floats, Floats, NDArray[np.intp]]:
+    """Rows of the least squares of `fit_lines`, from which the errors of lines follow.
+
+    Parameters
+    ----------
+    times : (t,) float, s, equally spaced
+    frequencies, settle : as for `phasors`
+
+    Returns
+    -------
+    waves (m, k) and rows (m, k) at the k samples that are fitted, so that coefficients (m,) are
+    rows @ x and the fit is waves.T @ coefficients; and the indices (2, f) of the coefficients of
+    the cosine and the sine of each line
+    """
+    basis, weighted, inverse, which = _weighted_waves(times, frequencies, settle)
+    sines = which + np.where(which > 0, (len(basis) - 1) // 2, 0)
+    return basis[:, -weighted.shape[1] :], inverse @ weighted, np.array([which, sines])
+
+
+def _weighted_waves(
+    times: Floats, frequencies: ArrayLike, settle: float
+) -> tuple[Floats, Floats, Floats, NDArray[np.intp]]:
+    """Waves (m, t), the same under the window (m, k) at the last k samples, which are fitted, the
+    inverse (m, m) of their products, and the index (f,) of each line's wave.
+    """
+    frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
+    nyquist = 0.5 / step(times)
+    if not ((frequencies >= 0) & (frequencies < nyquist)).all():
+        raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
+    first = int(np.argmax(times >= times[0] + settle * np.ptp(times)))
+    span = float(np.ptp(times[first:]))
+    distinct, which = _distinct(frequencies, 1 / span)
+    basis = _waves(distinct, times)
+    kept = basis[:, first:]
+    weighted = kept * kaiser(kept.shape[1], _beta(_closest(distinct, span)))
+    inverse = np.linalg.pinv(weighted @ kept.T, rcond=1e-13, hermitian=True)
+    return basis, weighted, np.asarray(inverse, np.float64), which
 
 
 def _waves(frequencies: Floats, times: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from simple_model.flat_body import flat_body, steady_lines
 from simple_model.load_spectrum import synthesise
 from skinwave import cli
 from skinwave.bodies.analytic import compliance
+from skinwave.fits import measured_lines, observed
 from skinwave.fits.findings import cautions, shown
 from skinwave.fits.fit import fit, sampled
 from skinwave.fits.identify import correlations, estimates, whiteness, width
@@ -152,6 +154,44 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
         (estimate,) = estimates(solve(problem, 1, 0, quiet))
         inside += estimate.low <= 1.0 <= estimate.high
     assert 0.91 <= inside / 300 <= 0.99
+
+
+@pytest.mark.parametrize("kind", ["lines", "amplitudes"])
+@pytest.mark.parametrize("repetitions", [1, 2, 3])
+@pytest.mark.parametrize("colour", ["white", "1/f2"])
+def test_gains_of_close_lines_hold_the_truth(monkeypatch, colour, repetitions, kind):
+    """Intervals of least squares of 200 draws, one a place, by the data's own errors: of lines 1.2
+    to 5 resolutions apart and of lines at all frequencies.
+    """
+    samples, draws, rate = 1000, 200, 2000.0
+    f0 = 1 / (0.75 * samples / rate)
+    times = np.arange(samples) / rate
+    rng = np.random.default_rng(repetitions)
+    inside = []
+    for f in (*(150 + x * f0 * np.arange(5) for x in (1.2, 2.0, 5.0)), f0 * np.r_[4, 9, 80, 250]):
+        model = rng.standard_normal((len(f), 1)) + 1j * rng.standard_normal((len(f), 1))
+        model = np.repeat(30 * model, draws, axis=1)
+        noise = rng.standard_normal((repetitions, samples, draws))
+        noise = noise.cumsum(axis=1) if colour == "1/f2" else noise
+        clean = (np.exp(2j * np.pi * np.multiply.outer(times, f)) @ model).real
+        measured = Measurement(quantity="velocity", places=np.zeros((draws, 2)), times=times,
+                               values=clean + noise)  # fmt: skip
+        lines = {f"line {k}": each for k, each in enumerate(f)}
+        monkeypatch.setattr(measured_lines, "resolved_lines", lambda *_, lines=lines: (lines, {}))
+        monkeypatch.setattr(observed, "predicted_lines", lambda *_, a=model: lambda values: a)
+        aim = SimpleNamespace(scene=loads(TEXT), predicts=lambda f: np.full(len(f), True))
+        data = observed.data_of(kind, measured, aim)
+        assert data.is_known
+        slope, y = (data.weighted(x).reshape(len(f), -1, draws)
+                    for x in (data.predict({}), data.values))  # fmt: skip
+        power = (slope**2).sum(axis=(0, 1))
+        gain = (slope * y).sum(axis=(0, 1)) / power
+        dof = slope[..., 0].size - 1
+        scale = np.maximum(((y - gain * slope) ** 2).sum(axis=(0, 1)) / dof, 1)
+        half = 1.96 * np.sqrt(scale / power)
+        inside.append((np.abs(gain - 1) < half).mean())
+    print(inside)
+    assert 0.92 < np.mean(inside) < 0.98
 
 
 def test_a_material_is_recovered_from_every_start(scene, lines):

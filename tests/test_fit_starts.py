@@ -131,7 +131,7 @@ def test_lines_that_a_reduced_body_does_not_have_are_told(lines):
     assert every.left_out == ()
     small = replace(aim, reduced=SimpleNamespace(frequencies=every.frequencies[:1]))
     (left,) = predicted_part(measured, small).left_out
-    power = (np.abs(every.amplitudes) ** 2 - every.floor).sum(axis=1)
+    power = (np.abs(every.amplitudes) ** 2 - 2 * every.error**2).sum(axis=1)
     assert (left.frequency, left.why) == (280.0, FAINT)
     assert left.share == pytest.approx(power[1] / power.sum())
     found = fit(scene, measured, ["gain=0.2:5"], starts=1)

@@ -4,6 +4,8 @@ Measurements are sums of sinusoids of known phasors, with normal noise of known 
 stated of them is counted over many draws.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -222,18 +224,64 @@ def test_a_hum_beside_a_line_does_not_move_its_noise():
     assert np.median(loud.variance[0] / calm.variance[0]) < 3
 
 
-def test_lines_that_leave_no_bins_between_take_the_noise_of_their_neighbours():
+def test_lines_that_leave_no_bins_between_have_a_noise_of_their_own():
     """Nine lines 4.8 bins apart, whose middle ones have neighbours wherever noise is looked for."""
     rng = np.random.default_rng(14)
     times, f = np.arange(2000) / 4000, 300 + 12.68 * np.arange(9)
     record = Measurement(quantity="velocity", places=np.zeros((300, 2)), times=times,
                          values=rng.normal(size=(1, 2000, 300)))  # fmt: skip
     found = lines_of(record, f)
-    assert found.borrowed == 5
     true = (np.abs(found.mean) ** 2).mean(axis=1)
-    ratio = found.variance.mean(axis=1) / true
-    assert ratio.min() > 0.8
-    assert ratio.max() < 2.5
+    assert found.variance.mean(axis=1) / true == pytest.approx(np.ones(9), abs=0.25)
+
+
+BIN = 1 / (0.75 * SAMPLES / RATE)
+SPACED = {apart: 150 + apart * BIN * np.arange(5) for apart in (1.2, 2.0, 3.0, 5.0)}
+SPACED["low"] = np.array([3.75, 12.0, 40.0]) * BIN
+
+
+def noisy(rng, frequencies, colour, repetitions, draws=200):
+    """Lines of amplitude 3 in white noise or a random walk, a draw at each place."""
+    noise = rng.normal(size=(repetitions, SAMPLES, draws))
+    if colour == "1/f2":
+        noise = noise.cumsum(axis=1)
+    return Measurement(
+        quantity="velocity", places=np.zeros((draws, 2)), times=TIMES,
+        values=waveforms(np.full((len(frequencies), draws), 3.0), frequencies) + noise,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("repetitions", [1, 2, 3])
+@pytest.mark.parametrize("colour", ["white", "1/f2"])
+def test_intervals_hold_the_truth_however_close_the_lines_and_steep_the_noise(colour, repetitions):
+    """95 % circles and intervals of a sum of all lines and of a difference of two, in 200 draws of
+    each spacing.
+    """
+    rng, inside, ratios = np.random.default_rng(repetitions), [], []
+    for f in SPACED.values():
+        found = lines_of(noisy(rng, f, colour, repetitions), f)
+        off = found.mean - 3.0
+        inside.append((np.abs(off) < radius(found, 0.95)).mean(axis=1).mean())
+        one = replace(found, each=found.each[:, :, :1], variance=found.variance[:, :1])
+        for factors in (np.ones(len(f)), np.r_[1.0, -1.0, np.zeros(len(f) - 2)]):
+            own = np.sqrt(found.variance / found.variance[:, :1])  # of each draw, over the first's
+            true = np.var((factors @ (off / own)).real)
+            ratios.append(one.variance_of(factors[:, None]) / true)
+    assert 0.93 < np.mean(inside) < 0.98
+    assert min(inside) > 0.92
+    assert max(inside) < 0.985
+    assert np.mean(ratios) == pytest.approx(1, abs=0.1)
+    assert 0.6 < min(ratios) < max(ratios) < 1.5
+
+
+def test_a_gain_that_changes_between_repetitions_is_in_the_errors():
+    rng = np.random.default_rng(15)
+    record = noisy(rng, SPACED[5.0], "white", 3)
+    gain = 1 + 0.5 * rng.normal(size=(3, 1, 200))
+    record = replace(record, values=gain * waveforms(np.full((5, 200), 3.0), SPACED[5.0])
+                     + 0.1 * rng.normal(size=(3, SAMPLES, 200)))  # fmt: skip
+    found = lines_of(record, SPACED[5.0])
+    assert 0.91 < (np.abs(found.mean - 3.0) < radius(found, 0.95)).mean() < 0.98
 
 
 def test_coherence_of_noise_is_its_bias_and_of_lines_is_one():

@@ -79,8 +79,11 @@ def covariance(solution: Solution) -> Floats:
 
 
 def width(solution: Solution) -> float:
-    """Half of a 95 % interval, in standard errors: Student's t of the residual's dof."""
-    return float(t.ppf((1 + LEVEL) / 2, solution.dof))
+    """Half of a 95 % interval, in standard errors: normal where the errors are known, else
+    Student's t of the residual's degrees of freedom.
+    """
+    dof = np.inf if solution.problem.data.is_known else solution.dof
+    return float(t.ppf((1 + LEVEL) / 2, dof))
 
 
 def half_widths(solution: Solution) -> Floats:

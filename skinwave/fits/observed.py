@@ -1,8 +1,8 @@
 """Data of a fit: waveforms, complex amplitudes of lines, or their moduli, with standard errors.
 
 Errors are those of the mean over repetitions. Where there is one repetition, those of lines are as
-`measured_lines` has them, and those of waveforms the remainder itself; the residuals of the fit
-then set their common scale.
+`measured_lines` has them, and those of waveforms the remainder itself, whose common scale the
+residuals of the fit then set.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,14 +20,15 @@ from skinwave.fits.measured_lines import (
     above_none,
     measured_lines,
     predicted_part,
-    response_of,
     some,
 )
 from skinwave.fits.predicted import Predict, Target, predicted_lines, predicted_waveforms
 from skinwave.measurements import Measurement
+from skinwave.measurements.lines import as_response
 
 STEADY = 1.5  # times the remainder of the rest: that of the start of a steady record, at most
 FAINT = 1e-3  # of the largest motion: a transient below it is none
+SINGULAR = 1e-3  # of the largest variance: the least that a combination of lines is given
 MOST = 20_000_000  # values of waveforms
 FOURTH = 70.0  # sum of squares of the coefficients of a fourth difference
 
@@ -43,6 +44,8 @@ class Data:
     labels : names (s,) of the series
     values : (n, s) float, SI, what was measured; complex ones as real and imaginary parts
     error : (n, s) float, their standard errors
+    whitening : (1 or p, m, m) float, by which the values of a place over their errors, of m = n s/p
+        and the s/p series of it one after the other, become independent; None if they are
     is_known : bool, whether the errors are known; else up to a common factor
     predict : values of the parameters -> (n, s)
     lines : names (f,) of the lines that are fitted, if it is to lines
@@ -60,10 +63,21 @@ class Data:
     error: Floats
     is_known: bool
     predict: Callable[[Mapping[str, float]], Floats]
+    whitening: Floats | None = None
     lines: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     has_sign: bool = True
     rough: "Data | None" = None
+
+    def weighted(self, values: Floats) -> Floats:
+        """Values (n, s) in units of their errors, made independent."""
+        over = values / self.error
+        if self.whitening is None:
+            return np.asarray(over)
+        parts = self.whitening.shape[1] // len(over)
+        each = over.reshape(len(over), parts, -1).transpose(2, 1, 0)
+        white = self.whitening @ each.reshape(len(each), -1, 1)
+        return np.asarray(white.reshape(each.shape).transpose(2, 1, 0).reshape(over.shape))
 
 
 def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
@@ -89,7 +103,7 @@ def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
 
 def _lines(measured: Measurement, aim: Target) -> Data:
     found = measured_lines(measured, aim)
-    predict = predicted_lines(aim, found.frequencies)
+    predict, both = predicted_lines(aim, found.frequencies), found.found.correlation
     places = place_names(measured.places)
     return Data(
         kind="lines", words=f"complex amplitudes of {_counted(found)}, {found.noise}",
@@ -97,7 +111,8 @@ def _lines(measured: Measurement, aim: Target) -> Data:
         labels=tuple(f"{name}, {part}" for part in ("real", "imaginary") for name in places),
         values=_parts(found.amplitudes), error=np.hstack([found.error, found.error]),
         is_known=found.is_known, predict=lambda values: _parts(predict(values)),
-        lines=found.names, left_out=found.left_out,
+        whitening=None if both is None else _whitening(both[None]), lines=found.names,
+        left_out=found.left_out,
     )  # fmt: skip
 
 
@@ -111,8 +126,27 @@ def _amplitudes(measured: Measurement, aim: Target) -> Data:
         axis=found.frequencies, unit="Hz", labels=place_names(measured.places),
         values=np.abs(found.amplitudes), error=found.error, is_known=found.is_known,
         predict=lambda values: np.sqrt(np.abs(predict(values)) ** 2 + noise), lines=found.names,
-        left_out=found.left_out, has_sign=False,
+        whitening=_of_moduli(found), left_out=found.left_out, has_sign=False,
     )  # fmt: skip
+
+
+def _of_moduli(found: Lines) -> Floats | None:
+    """Whitening of moduli, whose errors are the parts along the amplitudes."""
+    both = found.found.correlation
+    if both is None:
+        return None
+    f = len(found.frequencies)
+    turn = np.exp(1j * np.angle(found.amplitudes.T))
+    along = np.concatenate([turn.real, turn.imag], axis=1)
+    shared = along[:, :, None] * both * along[:, None, :]
+    return _whitening(shared.reshape(-1, 2, f, 2, f).sum(axis=(1, 3)))
+
+
+def _whitening(correlation: Floats) -> Floats:
+    """Matrices (p, m, m) that make errors of such correlations (p, m, m) independent."""
+    values, vectors = np.linalg.eigh(correlation)
+    least = SINGULAR * values.max(axis=-1, keepdims=True, initial=0.0)
+    return np.asarray(vectors.swapaxes(-1, -2) / np.sqrt(np.maximum(values, least))[..., None])
 
 
 def _waveforms(measured: Measurement, aim: Target) -> Data:
@@ -131,7 +165,7 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
 
 def is_steady(measured: Measurement, frequencies: Floats) -> bool:
     """Whether lines, fitted to the later part of waveforms, are all of their start, too."""
-    rest = fit_lines(response_of(measured, measured.mean), frequencies)[1]
+    rest = fit_lines(as_response(measured, measured.mean), frequencies)[1]
     n = int(SETTLE * len(rest))
     start, later = (np.sqrt((part**2).mean()) for part in (rest[:n], rest[n:]))
     return bool(start <= max(STEADY * later, FAINT * np.abs(measured.mean).max()))
@@ -146,7 +180,7 @@ def _steady(measured: Measurement, aim: Target, lines: Lines) -> Data:
         x = (waves @ predict(values)).real
         return np.asarray(x - x.mean(axis=0))
 
-    rest = fit_lines(response_of(measured, measured.mean), lines.frequencies)[1]
+    rest = fit_lines(as_response(measured, measured.mean), lines.frequencies)[1]
     error, noise = _noise(measured, rest.std(axis=0))
     return replace(
         _of_time(measured, synthesised, error),

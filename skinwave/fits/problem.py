@@ -21,7 +21,7 @@ class Problem:
 
     def residual(self, u: Floats) -> Floats:
         """Weighted residual (n s,) at a point u (k,) of the unit cube."""
-        return self._weighted(self.predicted(u) - self.data.values)
+        return self.data.weighted(self.predicted(u) - self.data.values).ravel()
 
     def predicted(self, u: Floats) -> Floats:
         """Prediction (n, s)."""
@@ -42,9 +42,6 @@ class Problem:
         steps = np.where(u < 0.5, FORWARD, -FORWARD)
         each = (self.residual(u + moved) for moved in np.diag(steps))
         return np.array([(moved - at) / step for moved, step in zip(each, steps, strict=True)]).T
-
-    def _weighted(self, difference: Floats) -> Floats:
-        return np.asarray((difference / self.data.error).ravel())
 
     @property
     def turned(self) -> "Problem":

@@ -171,7 +171,7 @@ def _turned(problem: Problem, best: Start, candidates: Floats, progress: Progres
     linear = (each for each in problem.parameters.free if each.key in problem.linear)
     if not problem.data.has_sign or any(each.low < 0 for each in linear):
         return None
-    power = float(((problem.data.values / problem.data.error) ** 2).sum())
+    power = float((problem.data.weighted(problem.data.values) ** 2).sum())
     if best.cost <= CLOSE_FIT * power:
         return refine(problem.turned, best_placed(problem.turned, best.ended[None]))
     return search(problem.turned, [candidates], progress)[0]

@@ -177,7 +177,7 @@ def _delays(problem: Problem, at: int) -> Floats:
 def _in_proportion(problem: Problem, u: Floats, at: int | None) -> tuple[float, Floats]:
     """Chi squared and the point with the linear parameter, if any is free, of least squares."""
     data = problem.data
-    predicted, values = problem.predicted(u) / data.error, data.values / data.error
+    predicted, values = data.weighted(problem.predicted(u)), data.weighted(data.values)
     factor = 1.0
     if at is not None:
         linear = problem.parameters.free[at]

@@ -84,7 +84,7 @@ def align(
         if given is not None and not np.isfinite(given):
             raise ValueError(f"{name} = {given} must be a finite number; leave it out to fit it")
     omega = 2 * np.pi * lines.frequencies[:, None]
-    weights, variance = _weights(lines), np.nan_to_num(lines.variance)
+    weights = _weights(lines)
     size = float((weights * np.abs(model) ** 2).sum())
     if not size > 0:
         raise ValueError("the model has none of the measured lines; compare one that moves")
@@ -95,12 +95,12 @@ def align(
     height = float(correlation(lines.frequencies, products, np.array([found]))[0])
     fitted = height / size if gain is None else float(gain)
     bend = float(-correlation(lines.frequencies, products, np.array([found]), 2)[0]) * fitted
-    noise = weights**2 * np.abs(model) ** 2 * variance / 2
+    turned = weights * (model * np.exp(-1j * omega * found)).conj()
     scale = abs(fitted) / bend if bend > 0 else np.inf
-    of_delay = np.hypot(_error(noise * omega**2, lines.freedom) * scale, lines.shift_error)
+    of_delay = np.hypot(_error(1j * omega * turned, lines) * scale, lines.shift_error)
     result = Alignment(
         delay=found, delay_error=float(of_delay) if delay is None else 0.0, gain=fitted,
-        gain_error=_error(noise, lines.freedom) / size if gain is None else 0.0, repeats=repeats,
+        gain_error=_error(turned, lines) / size if gain is None else 0.0, repeats=repeats,
     )  # fmt: skip
     away = lines.mean - result.applied(lines.frequencies, model)
     free = (delay is None) + (gain is None)
@@ -172,15 +172,17 @@ def _left(lines: MeasuredLines, heights: Floats, size: float, gain: float) -> Fl
     return np.asarray(2 * (whole - fitted))
 
 
-def _error(terms: Floats, freedom: float) -> float:
-    """Standard error of a sum of independent contributions of variances (f, p), each known to so
-    many degrees of freedom: widened so that 1.96 of it are Student's 95 % (Satterthwaite 1946).
+def _error(factors: np.ndarray, lines: MeasuredLines) -> float:
+    """Standard error of the real part of the sum of lines times factors (f, p), by variances each
+    known to some degrees of freedom: widened so that 1.96 of it are Student's 95 % (Satterthwaite
+    1946).
     """
-    squares = float((terms**2).sum())
+    terms = np.nan_to_num(np.abs(factors) ** 2 * lines.variance / 2)
+    squares = float((terms**2 / lines.freedom).sum())
     if not squares > 0:
         return 0.0
-    known = float(terms.sum()) ** 2 / squares * freedom
-    return float(np.sqrt(terms.sum()) * stdtrit(known, 0.975) / 1.96)
+    known = float(terms.sum()) ** 2 / squares
+    return float(np.sqrt(lines.variance_of(factors)) * stdtrit(known, 0.975) / 1.96)
 
 
 def _chi_square(away: np.ndarray, lines: MeasuredLines, fitted: int) -> float:

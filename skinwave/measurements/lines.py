@@ -1,23 +1,34 @@
-"""Spectral lines of a measurement: complex amplitudes of each repetition, their mean and noise."""
+"""Spectral lines of a measurement: complex amplitudes, their mean and its covariance.
+
+Lines are linear combinations a = P x of the samples x, the weighted least squares of
+`simple_model.response.fit_lines`. In stationary noise of the one-sided density S at a sampling rate
+r their covariance is that of a sandwich,
+
+    cov a = r/2 1/n sum over k of S(k) F P(k) F P(k)^*,     F the transform of n samples,
+
+with all that a window, close lines and steep noise do (White, Econometrica 48:817 (1980)). S is the
+floor under the residuals of the same fit, divided by the share of white noise that the fit has left
+at each bin.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import fdtrc
 
 from meshes.tetmesh import Floats
 from simple_model import Response
-from simple_model.response import SETTLE, fit_lines
+from simple_model.response import SETTLE, line_rows
+from simple_model.windows import cosines
 from skinwave.measurements.measurement import Measurement
+from skinwave.measurements.noise_floor import floor_of, freedom
 from skinwave.measurements.repetitions import in_step
 
 Complex = np.ndarray
 
-# Bins beside a line at which its noise is looked for: clear of the line, and of each other.
-BESIDE = np.array([3.0, 5.5, 8.0, 10.5, 13.0, 15.5])
-CLEAR = 2.5  # bins from any line, within which there is no noise alone
-FEWEST_BESIDE = 4  # bins, of which a noise is told
-MEDIAN_LOSS = 2.08  # 1 / ln(2)^2, variance of an exponential's median over that of its mean
-OCTAVE = 2.0  # in frequency, within which a line without a noise of its own takes a neighbour's
+DISAGREES = 1e-3  # chance below which repetitions of a line vary by other than the noise floor
+BESIDE = 2  # bins of a spectrum beside a line, which may have some of it
+POOLED = 4.0  # degrees of freedom that the mean over places counts as where there is no floor
 FEWEST_BINS = 16  # of a spectrum, fewer are single lines
 NEAREST = 1.0  # Hz, within which a spectrum must have a line
 
@@ -31,18 +42,19 @@ class MeasuredLines:
     frequencies : (f,) float, Hz
     each : (r, f, p) complex, of every repetition, in step, in the unit of the measurement
     variance : (f, p) float, of the mean: E |mean - true|^2, both its parts together; nan if unknown
-    freedom : float, degrees of freedom of the variance, of real numbers
+    freedom : float or (f, 1), degrees of freedom of the variance, of real numbers
     shifts : (r,) float, s, by which repetitions came later than their mean and were shifted; zeros
         where they are in step within their noise
-    borrowed : int, how many lines have the variance of their neighbours, for want of bins beside
+    correlation : (2 f, 2 f) float, covariance of the real parts and then the imaginary ones where
+        every variance is 2; None of parts that are independent
     """
 
     frequencies: Floats
     each: Complex
     variance: Floats
-    freedom: float
+    freedom: float | Floats
     shifts: Floats
-    borrowed: int = 0
+    correlation: Floats | None = None
 
     @property
     def mean(self) -> Complex:
@@ -53,6 +65,16 @@ class MeasuredLines:
     def amplitude_error(self) -> Floats:
         """Standard errors (f, p) of amplitudes, of circular noise."""
         return np.sqrt(self.variance / 2)
+
+    def variance_of(self, factors: Complex) -> float:
+        """Variance of the real part of the sum of the means times factors (f, p); lines of unknown
+        noise count as if they had none.
+        """
+        parts = np.nan_to_num(self.amplitude_error) * factors.conj()
+        parts = np.vstack([parts.real, parts.imag])
+        if self.correlation is None:
+            return float((parts**2).sum())
+        return float((parts * (self.correlation @ parts)).sum())
 
     @property
     def phase_error(self) -> Floats:
@@ -68,9 +90,13 @@ class MeasuredLines:
 
     def taken(self, chosen: np.ndarray) -> "MeasuredLines":
         """The lines of a mask or of indices."""
+        at = np.arange(len(self.frequencies))[chosen]
+        both = np.append(at, at + len(self.frequencies))
         return replace(
-            self, frequencies=self.frequencies[chosen], each=self.each[:, chosen],
-            variance=self.variance[chosen],
+            self, frequencies=self.frequencies[at], each=self.each[:, at],
+            variance=self.variance[at], freedom=np.broadcast_to(
+                self.freedom, (len(self.frequencies), 1))[at],
+            correlation=None if self.correlation is None else self.correlation[np.ix_(both, both)],
         )  # fmt: skip
 
 
@@ -96,10 +122,11 @@ def lines_of(
 ) -> MeasuredLines:
     """Lines of a measurement by weighted least squares, as `simple_model.response.fit_lines`.
 
-    Repetitions give the noise: the variance of their mean. Of a single one it is that in the bins
-    beside each line, by their median, and where lines leave too few of these the larger of that of
-    the next lines on both sides, at the same place. Repetitions that are out of step (F test at
-    0.1 %, as of a trigger that jitters) are shifted by the delay that fits each best.
+    Their noise is that of the floor under them. Where repetitions vary, it is drawn to the variance
+    of their mean, by the degrees of freedom of both; of a line whose repetitions vary by other than
+    the floor (F test at 0.1 %), as of a gain that changes, it is this variance alone. Repetitions
+    that are out of step (F test at 0.1 %, as of a trigger that jitters) are shifted by the delay
+    that fits each best.
 
     Parameters
     ----------
@@ -124,24 +151,43 @@ def lines_of(
         raise ValueError(
             f"the measurement has no line at {lost:g} Hz: it reaches {reach}; leave that line out"
         )
-    if measurement.is_spectrum:
-        each, beside = _of_spectra(measurement, frequencies)
-    else:
-        each, beside = _of_waveforms(measurement, frequencies, settle)
-    borrowed = 0
+    read = _of_spectra if measurement.is_spectrum else _of_waveforms
+    each, floor, freedom, correlation = read(measurement, frequencies, settle)
+    shifts = np.zeros(len(each))
     if len(each) > 1:
         each, shifts = in_step(each, frequencies)
-        variance = each.var(axis=0, ddof=1) / len(each)
-        freedom = 2.0 * (len(each) - 1)
-    else:
-        shifts = np.zeros(1)
-        own, freedom = _noise_beside(beside)
-        variance = _borrowed(frequencies, own)
-        borrowed = int((np.isnan(own) & np.isfinite(variance)).any(axis=1).sum())
+        floor, freedom = _drawn(each, floor, freedom)
     return MeasuredLines(
-        frequencies=frequencies, each=each, variance=np.asarray(variance), freedom=freedom,
-        shifts=shifts, borrowed=borrowed,
+        frequencies=frequencies, each=each, variance=floor, freedom=freedom[:, None],
+        shifts=shifts, correlation=correlation,
     )  # fmt: skip
+
+
+def _drawn(each: Complex, floor: Floats, freedom: Floats) -> tuple[Floats, Floats]:
+    """Variances (f, p) of the mean of amplitudes (r, f, p), and their degrees of freedom (f,), by a
+    floor (f, p) of so many degrees (f,) and by the repetitions.
+    """
+    runs, lines, places = each.shape
+    variance, own = each.var(axis=0, ddof=1) / runs, 2.0 * (runs - 1)
+    if np.isnan(floor).all():
+        mean = np.broadcast_to(variance.mean(axis=1, keepdims=True), variance.shape)
+        drawn = np.full(lines, min(POOLED, own * (places - 1)))
+    else:
+        mean = floor
+        agree = _agree(variance, floor, own, freedom)
+        drawn = np.where(agree, freedom, 0.0)
+        own = np.where(agree, own, own / 2)[:, None]  # a gain that changes has one part alone
+    weight = drawn[:, None]
+    return (weight * mean + own * variance) / (weight + own), (weight + own)[:, 0]
+
+
+def _agree(variance: Floats, floor: Floats, own: float, freedom: Floats) -> np.ndarray:
+    """Mask (f,) of lines whose variance over repetitions is that of the floor, at all places."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = (variance / floor).mean(axis=1)
+    degrees = own * floor.shape[1], freedom * floor.shape[1]
+    chance = fdtrc(*degrees, ratio)
+    return np.asarray(np.minimum(chance, 1 - chance) > DISAGREES / 2)
 
 
 def evenly(measurement: Measurement) -> Floats:
@@ -159,68 +205,58 @@ def as_response(measurement: Measurement, values: Floats) -> Response:
 
 def _of_waveforms(
     measurement: Measurement, frequencies: Floats, settle: float
-) -> tuple[Complex, Complex]:
-    """Amplitudes (r, f, p), and those (k, f, p) beside lines of the first repetition."""
-    r, t, p = measurement.values.shape
-    together = measurement.values.transpose(1, 0, 2).reshape(t, r * p)
-    found, rest = fit_lines(as_response(measurement, together), frequencies, settle=settle)
-    each = found.reshape(len(frequencies), r, p).transpose(1, 0, 2)
-    if r > 1 or not len(frequencies):
-        return each, np.empty((0, len(frequencies), p))
-    remainder, bin_width = as_response(measurement, rest), 1 / (
-        (1 - settle) * np.ptp(measurement.times))  # fmt: skip
-    beside = []
-    for shift in (*BESIDE, *-BESIDE):
-        at = frequencies + shift * bin_width
-        clear = (at > CLEAR * bin_width) & (at < 0.5 * measurement.rate)
-        clear &= (np.abs(at[:, None] - frequencies) > CLEAR * bin_width).all(axis=1)
-        noise = np.full((len(at), p), np.nan + 0j)
-        # All are fitted at once, as the lines are: what close lines do to noise is in it, too.
-        inside = np.where((at > 0) & (at < 0.5 * measurement.rate), at, frequencies)
-        noise[clear] = fit_lines(remainder, inside, settle=settle)[0][clear]
-        beside.append(noise)
-    return each, np.array(beside)
-
-
-def _of_spectra(measurement: Measurement, frequencies: Floats) -> tuple[Complex, Complex]:
-    """Amplitudes (r, f, p) in the nearest bins, and those (k, f, p) of the first repetition beside
-    lines where bins are equally spaced.
+) -> tuple[Complex, Floats, Floats, Floats]:
+    """Amplitudes (r, f, p), the variance (f, p) of their mean, its degrees of freedom (f,), and the
+    correlation (2 f, 2 f).
     """
+    runs = len(measurement.values)
+    waves, rows, index = line_rows(evenly(measurement), frequencies, settle=settle)
+    n = rows.shape[1]
+    x = measurement.values[:, -n:]
+    found = rows @ x
+    cosine, sine = index
+    window = cosines("hann", n)
+    rest = window[:, None] * (x - waves.T @ found)
+    density = (np.abs(np.fft.rfft(rest, axis=1)) ** 2).mean(axis=0) / (window**2).sum()
+    kept = _kept(window, waves, rows)
+    floor = floor_of(density, runs, kept)  # S r / 2, of white noise its variance
+    spectra = np.fft.rfft(rows[np.append(cosine, sine)])
+    sides = np.full(len(floor), 2.0)
+    sides[0] = 1.0
+    sides[-1] = 2.0 - (n % 2 == 0)
+    power = (np.abs(spectra) ** 2).reshape(2, len(frequencies), len(floor)).sum(axis=0)
+    variance = (power * sides) @ floor / n / runs
+    shape = floor.mean(axis=1)
+    parts = (spectra * (sides * shape)) @ spectra.conj().T
+    parts = parts.real * np.outer(*[np.repeat([1.0, -1.0], len(frequencies))] * 2)
+    size = np.tile(np.sqrt((power * sides) @ shape / 2), 2)
+    nearest = np.round(frequencies * n / measurement.rate).astype(int)
+    each = found[:, cosine] - 1j * found[:, sine]
+    return each, variance, freedom(runs, kept)[nearest], parts / np.outer(size, size)
+
+
+def _kept(window: Floats, waves: Floats, rows: Floats) -> Floats:
+    """Share (k,) of white noise that is left at each bin, under a window, by a fit whose waves
+    (m, n) have coefficients rows (m, n) @ x.
+    """
+    moved, made = np.fft.rfft(window * rows), np.fft.rfft(window * waves)
+    taken = 2 * (made.conj() * moved).real.sum(axis=0)
+    given = (made.conj() * ((rows @ rows.T) @ made)).real.sum(axis=0)
+    return np.maximum(1 - (taken - given) / (window**2).sum(), 0.0)
+
+
+def _of_spectra(
+    measurement: Measurement, frequencies: Floats, settle: float
+) -> tuple[Complex, Floats, Floats, None]:
+    """The same of the nearest bins of spectra, with a floor where they are equally spaced."""
     axis, values = measurement.frequencies, measurement.values
     nearest = np.abs(frequencies[:, None] - axis).argmin(axis=1)
-    away = np.unique(np.round((*BESIDE, *-BESIDE)).astype(int))
-    beside = np.full((len(away), len(nearest), values.shape[2]), np.nan + 0j)
-    for k, shift in enumerate(away if bin_width(measurement) else ()):
-        at = nearest + shift
-        clear = (at > 0) & (at < len(axis)) & (np.abs(at[:, None] - nearest) > CLEAR).all(axis=1)
-        beside[k, clear] = values[0, at[clear]]
-    return values[:, nearest], beside
-
-
-def _noise_beside(beside: Complex) -> tuple[Floats, float]:
-    """Variance (f, p) of amplitudes by the median power of those (k, f, p) beside, which a hum
-    there does not move, and its degrees of freedom; nan where there are too few.
-    """
-    power = np.abs(beside) ** 2
-    counts = np.isfinite(power).sum(axis=0)
-    enough = counts >= FEWEST_BESIDE
-    variance = np.full(power.shape[1:], np.nan)
-    if enough.any():
-        variance[enough] = np.nanmedian(power[:, enough], axis=0) / np.log(2)
-    fewest = int(counts[enough].min(initial=len(power)))
-    return variance, 2 * fewest / MEDIAN_LOSS
-
-
-def _borrowed(frequencies: Floats, variance: Floats) -> Floats:
-    """Variance (f, p) with that of the nearest lines that have one, within an octave on either
-    side, the larger of both, where there is none.
-    """
-    known = np.isfinite(variance).all(axis=1)
-    found, f = variance.copy(), frequencies
-    for k in np.flatnonzero(~known):
-        near = known & (f < OCTAVE * f[k]) & (f > f[k] / OCTAVE)
-        sides = [np.flatnonzero(near & beyond) for beyond in (f < f[k], f > f[k])]
-        beside = [side[np.argmin(np.abs(f[side] - f[k]))] for side in sides if len(side)]
-        if beside:
-            found[k] = variance[beside].max(axis=0)
-    return found
+    shape = len(frequencies), values.shape[2]
+    if not bin_width(measurement):
+        return values[:, nearest], np.full(shape, np.nan), np.ones(shape[0]), None
+    kept = np.ones(len(axis))
+    kept[np.abs(np.arange(len(axis))[:, None] - nearest).min(axis=1) <= BESIDE] = 0.0
+    floor = floor_of((np.abs(values) ** 2).mean(axis=0), len(values), kept)
+    return (
+        values[:, nearest], floor[nearest] / len(values), freedom(len(values), kept)[nearest], None
+    )  # fmt: skip

@@ -9,28 +9,62 @@ from simple_model.trajectory import Floats
 
 SHARE = 0.25  # of its frequency: the half-width of the band of the median,
 FEWEST, WIDEST = 10, 400  # bins, at least and at most
-CORRELATED = 1 + 2 * (4 / 9 + 1 / 36)  # bins of a Hann window that stand for one
+LEAST_KEPT = 0.5  # share of the noise that a bin beside lines must have to tell the floor
+CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins of a Hann window that stand for one in a median
 
 
-def floor_of(density: Floats, runs: int) -> Floats:
+def floor_of(density: Floats, runs: int, kept: Floats | None = None) -> Floats:
     """Noise floor (f, p) of densities (f, p) that are means of so many repetitions.
 
     A parabola through medians of half octaves in logarithms is taken out before, so that noise that
     falls with frequency has no bias at the ends.
+
+    Parameters
+    ----------
+    density : (f, p) float
+    runs : repetitions
+    kept : (f,) float, shares of the noise that bins have where lines have been fitted and taken
+        out; all of it if not given
+
+    Returns
+    -------
+    (f, p) float
     """
-    positive = np.maximum(density, np.finfo(float).tiny)
-    level = _trend(positive)
-    flat = positive / level
+    kept = np.ones(len(density)) if kept is None else kept
+    bins = _telling(kept)
+    positive = np.maximum(density[bins] / kept[bins, None], np.finfo(float).tiny)
+    level = _trend(bins, positive, len(density))
+    flat = positive / level[bins]
     knots = _knots(len(density))
-    widths = _half_width(knots)
-    medians = np.array(
-        [np.median(flat[max(k - h, 1) : k + h + 1], axis=0)
-         for k, h in zip(knots, widths, strict=True)]
-    )  # fmt: skip
-    bins = np.arange(len(density))
-    local = np.column_stack([np.interp(bins, knots, column) for column in medians.T])
+    medians = np.array([np.median(flat[low:high], axis=0) for low, high in _bands(knots, bins)])
+    local = np.column_stack(
+        [np.interp(np.arange(len(density)), knots, column) for column in medians.T]
+    )
     floor: Floats = level * local / _median_over_mean(runs)
     return floor
+
+
+def freedom(runs: int, kept: Floats) -> Floats:
+    """Degrees of freedom (f,) of a floor, by the variance of the median of independent bins."""
+    bins, knots = _telling(kept), _knots(len(kept))
+    counted = [kept[bins[low:high]].sum() for low, high in _bands(knots, bins)]
+    found: Floats = np.interp(np.arange(len(kept)), knots, counted)
+    return np.maximum(8 * found / CORRELATED * _median_density(runs) ** 2, 2.0)
+
+
+def _telling(kept: Floats) -> np.ndarray:
+    """Bins with enough of the noise, of which there are at least half of all."""
+    return 1 + np.flatnonzero(kept[1:] >= min(LEAST_KEPT, float(np.median(kept[1:]))))
+
+
+def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
+    """First and last plus one (k, 2) of the bins about each knot, `FEWEST` or more on both sides
+    together.
+    """
+    h = _half_width(knots)
+    low, high = (np.searchsorted(bins, edge) for edge in (knots - h, knots + h + 1))
+    lacking = np.maximum(FEWEST - (high - low), 0)
+    return np.column_stack([np.maximum(low - lacking, 0), np.minimum(high + lacking, len(bins))])
 
 
 def tail(ratio: Floats, runs: int, bins: int) -> Floats:
@@ -56,19 +90,21 @@ def _knots(bins: int) -> np.ndarray:
     return np.array(found)
 
 
-def _trend(density: Floats) -> Floats:
-    """Parabola in log frequency through the logarithm of medians of half octaves (f, p)."""
-    bins = len(density)
-    edges = np.unique(np.geomspace(2, bins, max(int(2 * np.log2(bins)), 4)).astype(int))
+def _trend(bins: np.ndarray, density: Floats, count: int) -> Floats:
+    """Parabola in log frequency (count, p) through the logarithm of medians of half octaves of
+    densities (b, p) at bins (b,).
+    """
+    edges = np.unique(np.geomspace(2, count, max(int(2 * np.log2(count)), 4)).astype(int))
     centres, heights, counts = [], [], []
-    for low, high in pairwise(edges):
-        centres.append(np.log((low + high - 1) / 2))
-        heights.append(np.log(np.median(density[low:high], axis=0)))
-        counts.append(high - low)
-    x, weight = np.array(centres), np.sqrt(counts)[:, None]
+    for low, high in pairwise(np.searchsorted(bins, edges).tolist()):
+        if high > low:
+            centres.append(np.log(bins[low:high].mean()))
+            heights.append(np.log(np.median(density[low:high], axis=0)))
+            counts.append(high - low)
+    x, weight = np.array(centres), np.sqrt(np.minimum(counts, FEWEST))[:, None]
     basis = np.vander(x, min(3, len(x)), increasing=True)
     found = np.linalg.lstsq(basis * weight, np.array(heights) * weight, rcond=None)[0]
-    k = np.log(np.maximum(np.arange(bins), 2.0))
+    k = np.log(np.maximum(np.arange(count), 2.0))
     level: Floats = np.exp(np.vander(k, basis.shape[1], increasing=True) @ found)
     return level
 

@@ -191,14 +191,8 @@ def _noise_of_one(found: MeasuredComparison) -> str:
     unknown = int(np.isnan(lines.variance).any(axis=1).sum())
     if unknown == len(lines.frequencies):
         return "is unknown"
-    said = "is that in the bins beside each line"
-    if lines.borrowed:
-        said += f", of {_count(lines.borrowed)} too close to others that of the next ones"
-    return said + (f", and unknown for {_count(unknown)}" if unknown else "")
-
-
-def _count(lines: int) -> str:
-    return f"{lines} line{'s' * (lines > 1)}"
+    others = f", and unknown for {unknown} line{'s' * (unknown > 1)}" * (unknown > 0)
+    return f"is that of the noise floor under each line{others}"
 
 
 def _opposite(column: Column) -> list[str]:
