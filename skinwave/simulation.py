@@ -105,7 +105,9 @@ def answered(
     Response
     """
     sample_grid(scene, times)  # which refuses times before any work
-    required = required_plan(scene, model, tolerance, progress, h=h, dt=dt, solver=solver)
+    required = required_plan(
+        scene, model, tolerance, progress, h=h, dt=dt, solver=solver, times=times
+    )
     return follow(
         scene, required, tolerance, progress,
         times=times, h=h, dt=dt, solver=solver, mapped=mapped,
@@ -121,12 +123,13 @@ def required_plan(
     h: float | None = None,
     dt: float | None = None,
     solver: str = "auto",
+    times: ArrayLike | None = None,
 ) -> Plan:
     """Plan of a request.
 
     Parameters
     ----------
-    scene, model, tolerance, progress, h, dt, solver : as for `simulate`
+    scene, model, tolerance, progress, h, dt, solver, times : as for `simulate`
 
     Returns
     -------
@@ -139,7 +142,9 @@ def required_plan(
     """
     asked = None if model == "auto" else named(model).name
     check_options(solver, h=h, dt=dt)
-    return plan(scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress)
+    return plan(
+        scene, tolerance, model=asked, h=h, dt=dt, solver=solver, progress=progress, times=times
+    )
 
 
 def follow(

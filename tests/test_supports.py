@@ -24,7 +24,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.hands import support
 from skinwave.models.free_keys import FreeKey, with_values
 from skinwave.models.loads import surface_load
-from skinwave.planning.estimates import reflection_and_transient
+from skinwave.planning.estimates import side_reflections
 from skinwave.planning.extent import symmetry
 from skinwave.sweeps.variation import varied
 
@@ -156,7 +156,7 @@ def test_only_sides_that_reflect_count_as_reflecting():
     text = "[tacton]\nam_frequency_hz = 200\nduration_s = 0.03\n[probes]\npoints_mm = [[15, 0]]\n"
     text += "[body]\nsize_x_mm = 50\nsize_y_mm = 50\nthickness_mm = 8\n"
     all_free, near, far = (
-        reflection_and_transient(loads(text + sides))[0]
+        side_reflections(loads(text + sides))
         for sides in ('sides = "free"', 'sides = {right = "free"}', 'sides = {left = "free"}')
     )
     assert far < 0.3 * near < near < all_free

@@ -74,7 +74,7 @@ class Model:
     needs_body : bool
     is_reduced : bool, whether bodies are reduced once for all Tactons
     is_infinite : bool, whether it leaves out reflections from the sides
-    is_steady : bool, whether it leaves out the initial transient
+    from_rest : name of the model that adds the start to it, of a model of the steady state; or ""
     is_stepped : bool, whether its error depends on a time step
     is_nonlinear : bool, whether it has large deflections
     fits_damping : bool, whether a loss factor becomes Rayleigh damping
@@ -99,11 +99,16 @@ class Model:
     needs_body: bool = True
     is_reduced: bool = False
     is_infinite: bool = False
-    is_steady: bool = False
+    from_rest: str = ""
     is_stepped: bool = False
     is_nonlinear: bool = False
     fits_damping: bool = False
     takes_series: "Callable[[Body], bool]" = lambda body: False
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it is of the steady state, and leaves out the start from rest."""
+        return bool(self.from_rest)
 
 
 _MODELS: dict[str, Model] = {}

@@ -125,6 +125,6 @@ HARMONIC = register(
         reads=of_waves,
         takes_load=takes_load,
         is_infinite=True,
-        is_steady=True,
+        from_rest="flat-body",
     )
 )

@@ -66,7 +66,7 @@ HARMONIC = register(
         takes_load=lambda scene: True,
         colour="#CC79A7",
         sources=(MACROELEMENTS,),
-        is_steady=True,
+        from_rest="fem",
     )
 )
 TRANSIENT = register(

@@ -183,14 +183,14 @@ MODES = register(
         colour="#F0E442",
         sources=(PLATES,),
         reads=of_surface_motion,
-        is_steady=True,
+        from_rest="plate-modes-transient",
     )
 )
 FROM_REST = register(
     replace(
         MODES,
         name="plate-modes-transient",
-        is_steady=False,
+        from_rest="",
         solve=answer_from_rest,
         method="modes of a thin plate by Ritz's method, from rest",
         words="a thin plate from rest, in its modes by Ritz's method",

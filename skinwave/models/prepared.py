@@ -11,7 +11,7 @@ from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.focus import spot_width
-from simple_model.load_spectrum import merge_lines
+from simple_model.load_spectrum import merge_lines, synthesise
 from simple_model.material import Material
 from simple_model.quantities import Quantity
 from simple_model.sampling import shown
@@ -313,6 +313,26 @@ def answer(
         model="fem", times=times, probes=prepared.probes, quantity=asked.name,
         values=asked.waveforms(waveforms, len(prepared.probes)), effort=effort,
     )  # fmt: skip
+
+
+def steady_waveforms(prepared: Prepared, scene: Scene, times: Floats) -> Floats:
+    """Waveforms (t, p) of a reduced body in the steady state, as fem-harmonic has them.
+
+    Parameters
+    ----------
+    prepared, scene : as for `answer`
+    times : (t,) float, s, equally spaced from 0
+
+    Returns
+    -------
+    (t, p) float, in the unit of the quantity
+    """
+    motion, asked = components(prepared, *scene.loads), prepared.reading.asked
+    # Under its mean an unconstrained body has no steady state.
+    heard = shown(scene.pressure, motion.frequencies, times)
+    heard &= scene.body.is_held | (motion.frequencies > 0)
+    moving = synthesise(motion.frequencies[heard], motion.lines[heard], times)
+    return asked.waveforms(with_sag(moving, prepared.sag, asked), len(prepared.probes))
 
 
 def components(prepared: Prepared, *pressures: MovingPressure) -> ReducedResponse:

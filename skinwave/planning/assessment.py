@@ -143,7 +143,7 @@ def sentences(
     if named(response.model).default_size and h:
         known = of_elements(scene, h, error, tolerance)
     else:
-        known = plan(scene, tolerance, model=response.model).warnings
+        known = plan(scene, tolerance, model=response.model, times=response.times).warnings
     return (*known, *beyond_linear(scene, response))
 
 

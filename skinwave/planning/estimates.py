@@ -1,4 +1,4 @@
-"""A-priori estimates of lines, edge reflections and the initial transient of a response."""
+"""A-priori estimates of lines and edge reflections of a response."""
 
 from dataclasses import replace
 from math import isfinite
@@ -7,7 +7,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Trajectory
-from simple_model.flat_body import flat_body, steady_lines, steady_state
+from simple_model.flat_body import flat_body, steady_lines
 from simple_model.focus import gaussian_width, spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
@@ -92,43 +92,31 @@ def _width(pressure: MovingPressure) -> float | None:
     return gaussian_width(pressure.height, pressure.profile)
 
 
-def reflection_and_transient(scene: Scene) -> tuple[float, float]:
-    """Edge reflections at the probes relative to their motion in an infinite body, and the
-    transient relative to the steady state; at most 1 each. Both are computed for the first
-    `FOLLOWED`. A body without loss, or nearly so, has no steady state, and all of its motion counts
-    as transient.
+def side_reflections(scene: Scene) -> float:
+    """Edge reflections at the probes relative to their motion in an infinite body, at most 1, for
+    the first `FOLLOWED`.
 
     The reflection of a side at a probe is the motion of an infinite body at the probe's mirror
     image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
     `OVERDAMPED` times that where shear waves cannot oscillate. Absorbing sides count as free of
     reflections, and a half-space has no sides.
     """
-    body, probes, tacton = scene.body, scene.probe_points, scene.tacton
+    body, probes = scene.body, scene.probe_points
     half = np.array([body.width, body.height]) / 2
     images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
-    width = spot_scale(scene.pressure)
+    if not images:
+        return 0.0
     known = scene.load.is_normal  # what returns of another load is not estimated
-    if images and (not known or _to_edge(scene, half) < 2 * width):
-        return 1.0, 1.0
-    times = np.arange(max(2, round(min(tacton.duration, FOLLOWED) * FOLLOWED_AT))) / FOLLOWED_AT
+    if not known or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
+        return 1.0
+    duration = min(scene.tacton.duration, FOLLOWED)
+    times = np.arange(max(2, round(duration * FOLLOWED_AT))) / FOLLOWED_AT
     seen = np.vstack([probes, *images])
     u = flat_body(compliance(body), scene.pressure, seen, times).displacement
     own, *returned = (u**2).mean(axis=0).reshape(-1, len(probes))
     share = float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)
-    back = min(1.0, IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share)
-    if tacton.is_sampled or tacton.trajectory.shape == "recorded":
-        return back, 1.0
-    try:
-        steady = steady_state(compliance(body), scene.pressure, probes, times).displacement
-    except ArithmeticError:
-        return back, 1.0
-    left = (u[:, : len(probes)] - steady) ** 2
-    # The transient at the end of that time is taken to last, which is an upper bound.
-    lasting = left[-len(left) // 4 :].mean(axis=0) * (tacton.duration - len(times) / FOLLOWED_AT)
-    energy = left.sum(axis=0) / FOLLOWED_AT + np.maximum(lasting, 0.0)
-    own = np.maximum((steady**2).mean(axis=0) * tacton.duration, 1e-300)
-    return back, min(1.0, float(np.sqrt((energy / own).max())))
+    return min(1.0, IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share)
 
 
 def _loss_at_cut_off(body: Body) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import fem
 from simple_model.focus import gaussian_width
@@ -21,8 +22,8 @@ from skinwave.models.prepared import Prepared, sample_times
 from skinwave.planning.estimates import (
     cutoff_frequency,
     has_wavenumber_solution,
-    reflection_and_transient,
     response_spectrum,
+    side_reflections,
 )
 from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
 from skinwave.planning.goal_oriented import goal_refined, has_goal_oriented
@@ -31,7 +32,13 @@ from skinwave.planning.refinement import refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
 from skinwave.planning.sheets import why_modes
-from skinwave.planning.warnings import error_not_estimated, of_mesh, over_tolerance
+from skinwave.planning.start import start_left_out
+from skinwave.planning.warnings import (
+    error_not_estimated,
+    of_mesh,
+    over_tolerance,
+    start_over_tolerance,
+)
 from skinwave.scene import FLAT, Body, Scene
 
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
@@ -77,6 +84,7 @@ def plan(
     dt: float | None = None,
     solver: str = "auto",
     progress: Progress | None = None,
+    times: ArrayLike | None = None,
 ) -> Plan:
     """Plan a scene's simulation to a relative error in its probes' waveforms.
 
@@ -87,6 +95,7 @@ def plan(
     model, h, dt : given choices: a model's name, element size in metre, time step in s; with both
         a model and h all of the body is modelled
     solver, progress : for the meshes that are tried where the scene needs elements
+    times : (t,) float, s, of the response, as for `simulate`: over which a start counts
 
     Returns
     -------
@@ -113,10 +122,10 @@ def plan(
         asked.refuse(scene.body)
         check_reading(asked, scene)
         if asked.error and not asked.needs_body:
-            return _unplanned(scene, tolerance, asked, h)
+            return _unplanned(scene, tolerance, asked, h, times)
     check_laws(scene.body, scene.pressure)
     if asked and asked.error:
-        return _unplanned(scene, tolerance, asked, h)
+        return _unplanned(scene, tolerance, asked, h, times)
     spectrum = response_spectrum(scene, tolerance)
     motion = scene.load.support_motion
     highest = max(cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0)
@@ -128,12 +137,10 @@ def plan(
             f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    returned, start = (
-        reflection_and_transient(scene) if has_wavenumber_solution(scene) else (1.0, 1.0)
-    )
+    returned = side_reflections(scene) if has_wavenumber_solution(scene) else 1.0
     exact = returned <= WAVES_SHARE * tolerance and FLAT_BODY.takes_load(scene)
     if asked.is_infinite if asked else exact:
-        found = _without_mesh(scene, tolerance, asked, highest, returned, start, rows)
+        found = _without_mesh(scene, tolerance, asked, highest, returned, rows, times)
         return with_series(found, scene, tolerance)
     if asked is None and (reason := why_modes(scene)):
         return _by_modes(scene, tolerance, highest, reason, rows)
@@ -159,10 +166,11 @@ def plan(
         raise ValueError(f"{error}; or use --model {FROM_REST.name}") from None
     scene = replace(scene, body=body)
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    step_error, start_error = _march_errors(scene, asked, step)
+    step_error = _march_error(scene, step) if asked and asked.is_stepped else 0.0
+    start = start_left_out(scene, asked, mesh.prepared, times) if asked else 0.0
     found = Plan(
         model=model or "fem", body=body, symmetry=axes, h=mesh.h, highest=highest,
-        error=mesh.error + step_error + start_error,
+        error=mesh.error + step_error + start,
         seconds=sum(mesh.prepared.effort.seconds.values()),
         memory=mesh.prepared.effort.peak_memory,
         rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
@@ -170,19 +178,22 @@ def plan(
             *of_mesh(scene, mesh, tolerance),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
-            *over_tolerance("fem-harmonic, which leaves out the initial transient,", start_error,
-                      tolerance, "fem is"),
+            *start_over_tolerance(asked, start, tolerance),
         ),
         prepared=mesh.prepared,
     )  # fmt: skip
     return with_series(found, scene, tolerance)
 
 
-def _unplanned(scene: Scene, tolerance: float, model: Model, h: float | None) -> Plan:
+def _unplanned(
+    scene: Scene, tolerance: float, model: Model, h: float | None, times: ArrayLike | None
+) -> Plan:
     """Plan of a model that states its own error. That of a sheet at large deflection does not come
     from the linear response: stiffened by stretching it has longer waves and fewer resonances.
     """
-    rows = [PlanRow(what="model", value=model.name, reason=f"as asked: {model.method}")]
+    start = start_left_out(scene, model, times=times)
+    reason = f"as asked: {model.method}{_without(start)}"
+    rows = [PlanRow(what="model", value=model.name, reason=reason)]
     what, size = f"the {model.method}", None
     cure = "a model with waves is"
     if model.default_size:
@@ -195,10 +206,12 @@ def _unplanned(scene: Scene, tolerance: float, model: Model, h: float | None) ->
         what, cure = f"elements of {1e3 * size:.3g} mm", "smaller ones are"
     error = model.error(scene, size) if model.error else np.nan
     return Plan(
-        model=model.name, body=scene.body, h=size, error=error, rows=tuple(rows),
+        model=model.name, body=scene.body, h=size, error=error + start, rows=tuple(rows),
         seconds=model.seconds, memory=model.memory,
         warnings=(
-            *error_not_estimated(model.name, error), *over_tolerance(what, error, tolerance, cure)
+            *error_not_estimated(model.name, error),
+            *over_tolerance(what, error, tolerance, cure),
+            *start_over_tolerance(model, start, tolerance),
         ),
     )  # fmt: skip
 
@@ -225,26 +238,26 @@ def _without_mesh(
     asked: Model | None,
     highest: float,
     returned: float,
-    start: float,
     rows: list[PlanRow],
+    times: ArrayLike | None,
 ) -> Plan:
+    # Reflections are of the load's lines, the start of the body's own: their powers add.
+    try:
+        start = start_left_out(scene, asked or HARMONIC, times=times)
+    except (ValueError, ArithmeticError):  # no steady state, which the model itself refuses
+        start = np.inf
     if asked is None:
-        # One is of the load's lines, the other of the body's own: their powers add.
-        both = np.hypot(returned, start)
-        asked = HARMONIC if both <= tolerance else FLAT_BODY
+        asked = HARMONIC if np.hypot(returned, start) <= tolerance else FLAT_BODY
     model, left = asked.name, start if asked.is_steady else 0.0
     reason = f"{_section(scene.body)} without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
-    if left:
-        reason += f"; the initial transient, {100 * start:.2g} %, is left out"
+    reason += _without(left)
     warnings = (
         *over_tolerance(
             f"{model}, which leaves out reflections from the sides,", returned, tolerance, "fem is"
         ),
-        *over_tolerance(
-            f"{model}, which leaves out the initial transient,", left, tolerance, "flat-body is"
-        ),
+        *start_over_tolerance(asked, left, tolerance),
     )
     rows = [
         *rows,
@@ -257,19 +270,20 @@ def _without_mesh(
     )  # fmt: skip
 
 
+def _without(start: float) -> str:
+    return f"; the initial transient, {100 * start:.2g} %, is left out" if start else ""
+
+
 def _section(body: Body) -> str:
     layers = len(body.strata)
     return "a homogeneous flat slab" if layers == 1 else f"a flat slab of {layers} layers"
 
 
-def _march_errors(scene: Scene, asked: Model | None, dt: float) -> tuple[float, float]:
-    """Expected relative errors of a time step, and of leaving out the initial transient."""
-    if asked is None or not (asked.is_stepped or asked.is_steady):
-        return 0.0, 0.0
+def _march_error(scene: Scene, dt: float) -> float:
+    """Expected relative error of a time step."""
     known = sensitivity(scene)
     # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
-    step = known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12
-    return (min(1.0, step), 0.0) if asked.is_stepped else (0.0, known.start)
+    return min(1.0, known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12)
 
 
 def _why_elements(scene: Scene, returned: float) -> str:

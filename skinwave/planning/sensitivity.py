@@ -28,12 +28,11 @@ LONGEST = 1.0  # s of the responses that are compared
 class Sensitivity:
     """Sensitivity of a response. `value`: relative change of the worst probe's waveform per
     relative change of all natural frequencies; `frequency` in Hz: that of the motion, root mean
-    square; `start`: the share of the waveform that is transient.
+    square.
     """
 
     value: float
     frequency: float
-    start: float
 
 
 def sensitivity(scene: Scene, prepared: Prepared | None = None) -> Sensitivity:
@@ -46,24 +45,20 @@ def sensitivity(scene: Scene, prepared: Prepared | None = None) -> Sensitivity:
     frequencies, forces = reduced_forces(coarse.body, *scene.loads)
     times = np.arange(max(2, round(min(scene.tacton.duration, LONGEST) * RATE))) / RATE
 
-    def parts(moved: float) -> tuple[Floats, Floats]:
-        """Steady state and transient (t, p) where all natural frequencies are higher by so much."""
+    def waveforms(moved: float) -> Floats:
+        """Waveforms (t, p) where all natural frequencies are higher by so much."""
         higher = np.asarray(values * (1 + moved), np.complex128)
         poles = replace(coarse.body.poles, values=higher)
         lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
-        return (
-            fem.exponential_sum(np.asarray(2j * np.pi * frequencies), lines, times),
-            fem.exponential_sum(higher, start, times),
-        )
+        rates = np.concatenate([2j * np.pi * frequencies, higher])
+        return fem.exponential_sum(rates, np.vstack([lines, start]), times)
 
-    steady, start = parts(0.0)
-    whole = steady + start
+    whole = waveforms(0.0)
     moving = whole - whole.mean(axis=0)
     speed = float(np.linalg.norm(np.diff(moving, axis=0))) * RATE
     return Sensitivity(
-        value=_share(sum(parts(MOVED)) - whole, whole) / MOVED,
+        value=_share(waveforms(MOVED) - whole, whole) / MOVED,
         frequency=speed / max(float(np.linalg.norm(moving)), 1e-300) / (2 * np.pi),
-        start=_share(start, whole),
     )
 
 

@@ -8,7 +8,7 @@ from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.sheet import tension
-from skinwave.models import named
+from skinwave.models import Model, named
 from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import Refined, enough
@@ -189,6 +189,14 @@ def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tupl
         f"{what} will have a relative error of about {percent} %, more than the tolerance of "
         f"{100 * tolerance:g} %; {cure} enough",
     )
+
+
+def start_over_tolerance(model: Model | None, start: float, tolerance: float) -> tuple[str, ...]:
+    """Warning of a model of the steady state where the start from rest is above the tolerance."""
+    if model is None:
+        return ()
+    what = f"{model.name}, which leaves out the initial transient,"
+    return over_tolerance(what, start, tolerance, f"{model.from_rest} is")
 
 
 def under_resolved(h: float, width: float) -> tuple[str, ...]:
