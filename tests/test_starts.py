@@ -12,7 +12,7 @@ from skinwave.simulation import compute
 LAYER = """
 [tacton]
 am_frequency_hz = 140
-duration_s = 0.05
+duration_s = 0.03
 [body]
 thickness_mm = 10
 size_x_mm = 24
@@ -80,7 +80,7 @@ def test_elements_state_the_start_of_the_quantity():
 
 def test_a_start_counts_over_the_times_that_are_asked_for():
     """Late, it has died out; at first, there is nothing else."""
-    scene = loads(LAYER.replace("0.05", "0.5"))
+    scene = loads(LAYER.replace("0.03", "0.5"))
     whole, *parts = (
         stated(scene, "flat-body-harmonic", "flat-body", times=np.arange(*span) / 1e4)
         for span in ((5000,), (100,), (4000, 5000))
