@@ -19,7 +19,6 @@ from simple_model.load_spectrum import synthesise
 from simple_model.quantities import Quantity
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
-from skinwave.models import of_waves
 from skinwave.models.flat_body import field_read
 from skinwave.models.loads import line_factor, probe_rows
 from skinwave.models.reduction import read_at
@@ -89,7 +88,7 @@ def quantity_map(
         )
     depth, (x, y) = scene.depths[0], grid(scene, reach, step)
     asked, places = scene.reading.asked, np.stack(np.meshgrid(x, y), axis=-1)
-    if has_wavenumber_integral(scene) and of_waves(scene):
+    if has_wavenumber_integral(scene):
         return QuantityMap(
             x=x, y=y, rms=_flat_rms(scene, depth, places), asked=asked, depth=depth,
             note="wavenumber integral of the laterally infinite body",

@@ -12,8 +12,9 @@ import fem
 from simple_model import Response
 from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
-from skinwave.models import MapFunction, Request, check_reading, named
+from skinwave.models import MapFunction, Request, named
 from skinwave.models.laws import check_laws
+from skinwave.models.limits import check_taken
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
 from skinwave.planning.warnings import beyond_linear
@@ -216,8 +217,7 @@ def compute(
     check_options(solver, h=h, dt=dt)
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    known.refuse(scene.body)
-    check_reading(known, scene)
+    check_taken(known, scene)
     if known.needs_body:
         check_laws(scene.body, scene.pressure)
     grid, first = sample_grid(scene, times)

@@ -14,7 +14,7 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
 from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import load_lines, pressure_lines
-from skinwave.bodies.analytic import exact_waves, has_exact_waves
+from skinwave.bodies.analytic import compliance, has_exact_waves
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
 from skinwave.pictures.motion import Waves, line_amplitudes, waves
@@ -96,10 +96,10 @@ def body_map(
         size = max(h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
         moved = waves(scene, REDUCED, progress, h=size, solver=solver)
         return replace(element_map(moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
-    compliance = exact_waves(scene.body, "flat-body-harmonic")
+    waves_of = compliance(scene.body)
 
     def answer(places: Floats) -> Lines:
-        return steady_lines(compliance, scene.pressure, places, threshold=FAINT)
+        return steady_lines(waves_of, scene.pressure, places, threshold=FAINT)
 
     found = _mapped(scene.pressure, answer, x, y, "m")
     return replace(found, note="laterally infinite layer")

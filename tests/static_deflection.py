@@ -1,9 +1,12 @@
 """A model from outside: static compliance of the surface times the pressure, at all times."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from simple_model import Response
 from skinwave.models import Model, Request, register
+from skinwave.models.limits import Limit, of_body, plain_only
 from skinwave.scene import Body, Scene
 
 
@@ -14,9 +17,14 @@ def per_pressure(body: Body) -> float:
     return body.depth / modulus
 
 
-def refuse(body: Body) -> None:
+def limits(scene: Scene) -> Iterator[Limit]:
+    body = scene.body
     if body.base != "clamped" or not np.isfinite(body.depth):
-        raise ValueError(f"static-deflection needs a clamped base, not a {body.base} one; use fem")
+        yield Limit(
+            why=f"takes a body of finite depth with a clamped base, not a {body.base} one",
+            cure='take base = "clamped"', change=of_body(base="clamped"),
+        )  # fmt: skip
+    yield from plain_only(scene)
 
 
 def solve(scene: Scene, request: Request) -> Response:
@@ -33,6 +41,6 @@ STATIC = register(
         method="static compliance times pressure",
         words="the static deflection of a layer under the pressure of each time, without waves",
         solve=solve,
-        refuse=refuse,
+        limits=limits,
     )
 )

@@ -156,7 +156,7 @@ def test_placement_and_layers_come_back_from_a_file():
 
 def test_exact_waves_refuse_tilts():
     lifted = replace(SKIN, body=replace(SKIN.body, placement=Placement(lift=0.01)))
-    with pytest.raises(ValueError, match="use fem"):
+    with pytest.raises(ValueError, match="use --model fem"):
         compute(lifted, "flat-body")
 
 

@@ -17,7 +17,8 @@ from simple_model.quantities import QUANTITIES, Quantity, register
 from simple_model.tensors import energy_root, largest_shear, von_mises
 from skinwave.bodies.parts import Layer
 from skinwave.cli import main
-from skinwave.models import check_reading, named
+from skinwave.models import named
+from skinwave.models.limits import check_taken, takes
 from skinwave.models.loads import probe_rows
 from skinwave.models.prepared import sample_times
 from skinwave.reports.album import open_album
@@ -103,12 +104,13 @@ def test_a_sheet_has_quantities_within_its_thickness():
 def test_a_model_without_the_quantity_refuses_it():
     sheet = loads('[tacton]\nduration_s = 0.01\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
                   'sides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n')  # fmt: skip
-    assert named("plate-modes").reads(replace(sheet, quantity="velocity"))
-    assert named("fem-nonlinear").reads(replace(sheet, quantity="strain_xx"))
+    assert takes(named("plate-modes"), replace(sheet, quantity="velocity"))
+    assert takes(named("fem-nonlinear"), replace(sheet, quantity="strain_xx"))
     kernel = compute(scene("strain_zz", "2"), "point-kernel")
     assert (kernel.quantity, kernel.unit) == ("pressure", "Pa")
-    with pytest.raises(ValueError, match="plate-modes has no strain zz at a depth of 2 mm"):
-        check_reading(named("plate-modes"), scene("strain_zz", "2"))
+    assert not takes(named("plate-modes"), replace(sheet, quantity="strain_xx"))
+    with pytest.raises(ValueError, match="plate-modes takes a sheet, not a slab"):
+        check_taken(named("plate-modes"), scene("strain_zz", "2"))
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])

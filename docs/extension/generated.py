@@ -178,11 +178,12 @@ def models() -> str:
 
 
 def _takes(model: Any, body: Any) -> str:
-    try:
-        model.refuse(body)
-    except ValueError:
-        return ""
-    return "yes"
+    from simple_model import MovingPressure, Tacton
+    from skinwave.models.limits import takes
+    from skinwave.scene import Scene
+
+    scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
+    return "yes" if takes(model, scene) else ""
 
 
 def bodies() -> str:

@@ -1,6 +1,6 @@
 """Analytic solutions of a body: its stack of layers, their wavenumber integral and modes."""
 
-from math import inf
+from math import inf, isfinite
 
 from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
@@ -26,18 +26,9 @@ def is_flat_layer(body: Body) -> bool:
     return body.of_kind.is_layer and body.placement == FLAT
 
 
-def exact_waves(body: Body, model: str) -> Compliance:
-    """Compliance of a body for a wavenumber-integral model.
-
-    Raises
-    ------
-    ValueError
-        If there is no body, or it has no wavenumber integral.
-    """
-    if body.placement != FLAT:
-        raise ValueError(f"{model} takes a body that lies flat across the beam; use fem")
-    body.of_kind.check_exact(body)
-    return compliance(body)
+def is_laterally_infinite(body: Body) -> bool:
+    """Whether a body has no sides that reflect: they absorb, or it is a half-space."""
+    return body.sides == "absorbing" or not isfinite(body.depth)
 
 
 def compliance(body: Body) -> Compliance:
@@ -51,7 +42,8 @@ def compliance(body: Body) -> Compliance:
     """
     if body.of_kind.compliance is None:
         raise ValueError(
-            f"flat-body is for a sheet or a slab, not a body of kind '{body.kind}'; use fem"
+            f"a wavenumber integral is of a sheet or a slab, not of a body of kind '{body.kind}'; "
+            "take one of these"
         )
     return body.of_kind.compliance(body)
 

@@ -289,7 +289,6 @@ class BodyKind:
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
     compliance : wavenumber integral of a laterally infinite body; None without any
-    check_exact : raises a ValueError for a body of which that is an estimate alone
     dispersion : dispersion curves of a laterally infinite body of the same section, at
         frequencies (f,) in Hz and of at most so many modes; None without any
     wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
@@ -323,7 +322,6 @@ class BodyKind:
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3
     compliance: Callable[[Body], Compliance] | None = None
-    check_exact: Callable[[Body], object] = lambda body: None
     dispersion: Callable[[Body, Floats, int], DispersionCurves] | None = None
     wave_speed: Callable[[Body, float], float] = lambda body, frequency: _rayleigh(body, frequency)
     named_sides: tuple[str, ...] = ()

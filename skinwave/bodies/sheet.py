@@ -140,7 +140,7 @@ def check_alike(body: Body) -> None:
         what = "curled" if body.mounting.is_curled else what
         raise ValueError(
             f"the wavenumber integral is of waves alike in all directions, and this sheet is {what}"
-            "; use --model fem, or a flat sheet of an isotropic material and equal tensions"
+            "; take a flat one of an isotropic material and equal tensions"
         )
 
 
@@ -196,6 +196,15 @@ def air_mass(body: Body, frequency: float) -> float:
     return 2 * AIR_DENSITY / bending_wavenumber(body, frequency)
 
 
+def open_air(body: Body) -> str:
+    """How a sheet is held around whose free edges air flows, which elements do not have; empty if
+    there is none.
+    """
+    if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
+        return ""
+    return body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"
+
+
 def refuse_open_air(body: Body) -> None:
     """Refuse a sheet with air that flows around a free edge, which elements do not have.
 
@@ -204,15 +213,10 @@ def refuse_open_air(body: Body) -> None:
     ValueError
         If it has no frame.
     """
-    if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
-        return
-    how, cure, other = f"with {body.sides} sides", "clamp them", "flat-body"
-    if body.sides == "clamped":
-        how, cure, other = f"one {body.mounting.words}", "hold all its edges", "plate-modes"
-    raise ValueError(
-        f"elements have air around a sheet in a frame, not {how}; {cure}, leave air out, or "
-        f"use --model {other}"
-    )
+    if how := open_air(body):
+        raise ValueError(
+            f"elements have air around a sheet in a frame, not around one {how}; leave out its air"
+        )
 
 
 def air(body: Body, build: Build, operators: Operators | AffineOperators) -> AddedMass | None:
@@ -260,7 +264,6 @@ SHEET = register(
         default_size=lambda body: min(body.width, body.height) / SHEET_CELLS,
         interactive_size=2.5e-3,
         compliance=compliance,
-        check_exact=check_alike,
         dispersion=dispersion,
         wave_speed=lambda body, frequency: 2 * pi * frequency / bending_wavenumber(body, frequency),
         is_plate=True,

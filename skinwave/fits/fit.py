@@ -7,7 +7,6 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
-from skinwave.bodies.analytic import has_exact_waves
 from skinwave.effort import Progress, silent
 from skinwave.fits.fitted import fitted
 from skinwave.fits.identify import (
@@ -29,6 +28,7 @@ from skinwave.fits.profile import Profile, profiles
 from skinwave.fits.solve import Solution, solve
 from skinwave.measurements import Measurement
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import takes
 from skinwave.scene import Scene
 
 STARTS = 8
@@ -176,5 +176,4 @@ def sampled(found: Fit, steps: int, seed: int = 0, progress: Progress = silent) 
 def _model(scene: Scene, model: str) -> str:
     if model != "auto":
         return model
-    flat = has_exact_waves(scene.body) or scene.body.of_kind.is_plate
-    return FLAT_BODY.name if flat and FLAT_BODY.takes_load(scene) else "fem"
+    return FLAT_BODY.name if takes(FLAT_BODY, scene) else "fem"

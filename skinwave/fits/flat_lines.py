@@ -9,7 +9,7 @@ from simple_model.flat_quantities import from_rest, steady, surface_field
 from simple_model.load_spectrum import merge_lines
 from simple_model.material import Complex
 from simple_model.wavenumber_integral import Field
-from skinwave.bodies.analytic import exact_waves
+from skinwave.bodies.analytic import compliance
 from skinwave.models.flat_body import fields_read
 from skinwave.scene import Scene
 
@@ -19,33 +19,32 @@ PARTS = (1 / 12, 1 / 4)  # of a record, after which it may have decayed
 BEFORE_END = 0.9  # of such a part: its last samples see it end
 
 
-def flat_lines(scene: Scene, model: str) -> tuple[Floats, Complex]:
+def flat_lines(scene: Scene) -> tuple[Floats, Complex]:
     """Lines of what a scene's probes read: frequencies (f,) in Hz, amplitudes (f, p), SI.
 
     Parameters
     ----------
     scene : Scene, of a quantity of normal motion at the surface
-    model : name of the model, for its refusals
     """
     points = scene.probe_points
     if scene.load.is_plain:
-        body = exact_waves(scene.body, model)
+        body = compliance(scene.body)
         f, a = steady_lines(body, scene.pressure, points, threshold=THRESHOLD)
         return f, a * scene.reading.asked.factor(2j * np.pi * f)[:, None]
-    each = [field_lines(*part, points, threshold=THRESHOLD) for part in _parts(scene, model)]
+    each = [field_lines(*part, points, threshold=THRESHOLD) for part in _parts(scene)]
     frequencies, amplitudes = zip(*each, strict=True)
     return merge_lines(np.concatenate(frequencies), np.vstack(amplitudes)[..., 0])
 
 
-def flat_history(scene: Scene, model: str, times: Floats) -> Floats:
+def flat_history(scene: Scene, times: Floats) -> Floats:
     """Waveforms (t, p) of what a scene's probes read, SI: from rest until that is the steady state.
 
     Parameters
     ----------
-    scene, model : as for `flat_lines`
+    scene : as for `flat_lines`
     times : (t,) float, s, equally spaced from 0
     """
-    parts, asked, points = _parts(scene, model), scene.reading.asked, scene.probe_points
+    parts, asked, points = _parts(scene), scene.reading.asked, scene.probe_points
 
     def begun(until: Floats) -> Floats:
         each = (from_rest(field, asked, load, points, until) for field, load in parts)
@@ -63,9 +62,9 @@ def flat_history(scene: Scene, model: str, times: Floats) -> Floats:
     return begun(times)
 
 
-def _parts(scene: Scene, model: str) -> list[tuple[Field, MovingPressure]]:
+def _parts(scene: Scene) -> list[tuple[Field, MovingPressure]]:
     """Field of each component of the load, and that."""
     if scene.load.is_plain:
-        compliance = exact_waves(scene.body, model)
-        return [(surface_field(scene.reading.asked, compliance), scene.pressure)]
+        body = compliance(scene.body)
+        return [(surface_field(scene.reading.asked, body), scene.pressure)]
     return list(zip(fields_read(scene, 0.0), scene.loads, strict=True))

@@ -32,9 +32,10 @@ from skinwave.fits.parameters import (
     Values,
     of_scene,
 )
-from skinwave.models import Model, check_reading, named
+from skinwave.models import Model, named
 from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import free_keys
+from skinwave.models.limits import check_taken
 from skinwave.parametric import ParametricBody
 from skinwave.scene import SAMPLE_RATE, Scene
 from skinwave.simulation import compute
@@ -140,8 +141,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
         raise ValueError(f"{model} has no body whose motion could be fitted; take another model")
     found = Target(scene=scene, model=model, quantity=quantity, places=places)
     moved = found.varied({})
-    record.refuse(moved.body)
-    check_reading(record, moved)
+    check_taken(record, moved)
     return found
 
 
@@ -217,7 +217,7 @@ def _kept(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
 
 def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Lines by wavenumber integrals."""
-    f, a = flat_lines(aim.varied(values), aim.model)
+    f, a = flat_lines(aim.varied(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
     _check_lines(f[at], frequencies, values)
     return np.asarray(a[at])
@@ -255,4 +255,4 @@ def _history(aim: Target, values: Values, last: float) -> CubicSpline:
         found = compute(scene, aim.model)
         return CubicSpline(found.times, found.values)
     times = np.asarray(np.arange(int(np.ceil(last * SAMPLE_RATE)) + 2) / SAMPLE_RATE, np.float64)
-    return CubicSpline(times, flat_history(scene, aim.model, times))
+    return CubicSpline(times, flat_history(scene, times))

@@ -22,6 +22,7 @@ from skinwave.inference.nearest_sheets import distinct
 from skinwave.inference.ranking import Row
 from skinwave.inference.scenes import scene_of
 from skinwave.models import named
+from skinwave.models.limits import beyond
 from skinwave.models.stretching import MOST_MODES, unstretched_lines
 from skinwave.planning.sheets import modes_below
 from skinwave.run import Run
@@ -45,12 +46,10 @@ def candidate_of(row: Row) -> Candidate:
 
 def refusal(row: Row) -> str:
     """Why a candidate's sheet is not computed at large deflection; empty if it is."""
-    body = scene_of(candidate_of(row), next(tactons())[1]).body
-    try:
-        named(MODEL).refuse(body)
-    except ValueError as error:
-        return str(error)
-    if (count := modes_below(body, HIGHEST)) > MOST_MODES:
+    scene = scene_of(candidate_of(row), next(tactons())[1])
+    if found := beyond(named(MODEL), scene):
+        return f"{MODEL} {' and '.join(limit.why for limit in found)}"
+    if (count := modes_below(scene.body, HIGHEST)) > MOST_MODES:
         return (
             f"it has about {count:.0f} modes below {HIGHEST:.0f} Hz, of which {MODEL} takes "
             f"{MOST_MODES}"

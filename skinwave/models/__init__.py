@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from simple_model import Response
     from skinwave.bodies import Body
     from skinwave.effort import Progress
+    from skinwave.models.limits import Limit
     from skinwave.scene import Scene
 
 MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
@@ -33,6 +34,12 @@ BUILT_IN = {  # name -> the file that registers it
     "plate-modes": "plate_modes",
     "plate-modes-transient": "plate_modes",
 }
+
+
+def _plain_only(scene: "Scene") -> "Iterable[Limit]":
+    from skinwave.models.limits import plain_only
+
+    return plain_only(scene)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,15 +68,14 @@ class Model:
     method : str, in a plan: what is computed, in a few words
     words : str, on pages: what it computes and leaves out, one clause
     solve : response of a scene to a request
-    refuse : raises a ValueError, with the reason, for a body that it is not for
+    limits : of a scene with a body, each `Limit` of the model that it is beyond; none if the model
+        takes it; the displacement of the surface under a pressure alone if not given
     error : expected relative error with elements of a size in metre, nan if it is unknown; None for
         linear waves, whose error a plan estimates by reflections and transient, or mesh refinement
     default_size : element size in metre for a body; None without a mesh
     seconds, memory : predicted for a first response where a plan does not measure, s and bytes
     colour : str, of figures
     sources : of str, references to cite for its method
-    reads : whether it has the quantity that a scene asks for, at the depths of its probes
-    takes_load : whether it takes the load of a scene
     quantity : name of the one that it has whatever a scene asks for, as the point kernel has; or ""
     needs_body : bool
     is_reduced : bool, whether bodies are reduced once for all Tactons
@@ -85,7 +91,7 @@ class Model:
     method: str
     words: str
     solve: "Callable[[Scene, Request], Response]"
-    refuse: "Callable[[Body], object]" = lambda body: None
+    limits: "Callable[[Scene], Iterable[Limit]]" = _plain_only
     error: "Callable[[Scene, float | None], float] | None" = lambda scene, h: nan
     default_size: "Callable[[Body], float] | None" = None
     seconds: float = 0.1
@@ -93,8 +99,6 @@ class Model:
     colour: str = "#56B4E9"
     sources: tuple[str, ...] = ()
     label: str = ""
-    reads: "Callable[[Scene], bool]" = lambda scene: scene.reading.is_plain
-    takes_load: "Callable[[Scene], bool]" = lambda scene: scene.load.is_plain
     quantity: str = ""
     needs_body: bool = True
     is_reduced: bool = False
@@ -127,45 +131,6 @@ def register(model: Model) -> Model:
         raise ValueError(f"'{model.name}' is registered already; choose another name")
     extensions.add(_MODELS, model.name, model, model.solve)
     return model
-
-
-def of_surface_motion(scene: "Scene") -> bool:
-    """Whether a scene asks for the normal motion of the surface, or its rates."""
-    return scene.reading.asked.is_normal and scene.reading.is_on_surface
-
-
-def of_waves(scene: "Scene") -> bool:
-    """Whether wavenumber integrals have the quantity: of layers any, of a sheet the same."""
-    return not scene.body.of_kind.is_plate or of_surface_motion(scene)
-
-
-def check_reading(model: Model, scene: "Scene") -> None:
-    """Refuse a scene whose quantity, depth or load a model does not have.
-
-    Raises
-    ------
-    ValueError
-        If it is so.
-    """
-    if not model.reads(scene):
-        raise ValueError(
-            f"{model.name} has no {scene.reading.words}; use --model fem, or ask for the "
-            "displacement at the surface"
-        )
-    if not model.takes_load(scene):
-        raise ValueError(
-            f"{model.name} does not take {scene.load.words} with {scene.reading.words}; use "
-            "--model fem, or leave out [load]"
-        )
-
-
-def takes(model: Model, scene: "Scene") -> bool:
-    """Whether a model is for a scene's body and load, and has the quantity that it asks for."""
-    try:
-        model.refuse(scene.body)
-    except ValueError:
-        return False
-    return model.reads(scene) and model.takes_load(scene)
 
 
 def names() -> tuple[str, ...]:

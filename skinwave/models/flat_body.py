@@ -1,7 +1,8 @@
 """Wavenumber integrals of a laterally infinite body: in time from rest, and the steady state."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,10 +16,21 @@ from simple_model.flat_quantities import (
     surface_field,
     traction_field,
 )
+from simple_model.focus import gaussian_width
 from simple_model.wavenumber_integral import Field
-from skinwave.bodies.analytic import exact_waves, stack
-from skinwave.models import Model, Request, of_waves, register
+from skinwave.bodies.analytic import compliance, stack
+from skinwave.bodies.parts import FLAT
+from skinwave.models import Model, Request, register
 from skinwave.models.laws import has_table
+from skinwave.models.limits import (
+    Limit,
+    load_limit,
+    of_body,
+    of_material,
+    read_at_surface,
+    reading_limit,
+)
+from skinwave.models.sheet_limits import of_alike_directions
 from skinwave.models.sources import LAYERS
 from skinwave.scene import Scene
 
@@ -26,19 +38,19 @@ STEP = "wavenumber integral"
 
 
 def _from_rest(scene: Scene, request: Request) -> Response:
-    compliance = exact_waves(scene.body, "flat-body")
     request.report(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
         return _read("flat-body", from_rest, scene, request)
-    return simple_model.flat_body(compliance, scene.pressure, scene.probe_points, request.times)
+    return simple_model.flat_body(
+        compliance(scene.body), scene.pressure, scene.probe_points, request.times
+    )
 
 
 def _steady(scene: Scene, request: Request) -> Response:
-    compliance = exact_waves(scene.body, "flat-body-harmonic")
     request.report(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
         return _read("flat-body-harmonic", steady, scene, request)
-    return steady_state(compliance, scene.pressure, scene.probe_points, request.times)
+    return steady_state(compliance(scene.body), scene.pressure, scene.probe_points, request.times)
 
 
 def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, request: Request) -> Response:
@@ -68,13 +80,53 @@ def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
     return tuple(traction_field(asked, layers, direction) for direction in upright)
 
 
-def takes_load(scene: Scene) -> bool:
-    """Whether it takes a scene's load: of tractions of any direction, which need a stack of layers,
-    it has the normal motion of the surface.
-    """
-    reading, load = scene.reading, scene.load
-    own = reading.asked.is_normal and reading.is_on_surface and scene.body.of_kind.is_layer
-    return load.is_plain or (own and not load.gravity and not load.support_motion)
+def _limits(scene: Scene) -> Iterator[Limit]:
+    body, reading, load, pressure = scene.body, scene.reading, scene.load, scene.pressure
+    if body.of_kind.compliance is None:
+        yield Limit(why=f"takes a slab or a sheet, not a {body.kind}")
+        return
+    if body.placement != FLAT:
+        yield Limit(
+            why="takes a body that lies flat at the origin, not a tilted or moved one",
+            cure="leave out [placement]", change=of_body(placement=FLAT),
+        )  # fmt: skip
+    if body.of_kind.is_plate:
+        yield from of_alike_directions(body)
+    if gaussian_width(pressure.height, pressure.profile) is None:
+        yield Limit(
+            why=f"takes a Gaussian focus, not the profile {pressure.profile_name}",
+            cure='take profile = "gaussian"',
+            change=lambda scene: replace(
+                scene, pressure=replace(scene.pressure, profile="gaussian")
+            ),
+        )
+    of_surface = reading.asked.is_normal and reading.is_on_surface
+    if body.of_kind.is_plate and not of_surface:
+        yield reading_limit(scene)
+    if not load.is_plain and (body.of_kind.is_plate or load.gravity or load.support_motion):
+        yield load_limit(scene)
+    elif not (load.is_plain or of_surface):
+        yield Limit(
+            why=f"has no {reading.words} under {load.words}",
+            cure="ask for the displacement at the surface", change=read_at_surface,
+        )  # fmt: skip
+
+
+def _steady_limits(scene: Scene) -> Iterator[Limit]:
+    yield from _limits(scene)
+    if scene.tacton.trajectory.shape == "recorded":
+        yield Limit(why="takes a path that repeats, not a recorded one")
+    if not any(solid.has_loss for solid in scene.body.solids):
+        yield Limit(
+            why="takes a material with loss, not one whose resonances are unbounded",
+            cure="give the material a viscosity_pa_s", change=_with_loss,
+        )  # fmt: skip
+
+
+def _with_loss(scene: Scene) -> Scene:
+    """The scene with a loss tangent of a tenth at 100 Hz."""
+    viscosity = 0.1 * scene.body.solid.shear_modulus / (2 * np.pi * 100)
+    return of_material(viscosity=viscosity)(scene)
 
 
 def field_read(scene: Scene, depth: float) -> Field:
@@ -88,7 +140,7 @@ def field_read(scene: Scene, depth: float) -> Field:
     body, asked = scene.body, scene.reading.asked
     if body.of_kind.is_layer:
         return quantity_field(asked, stack(body), depth)
-    return surface_field(asked, exact_waves(body, "flat-body"))
+    return surface_field(asked, compliance(body))
 
 
 FLAT_BODY = register(
@@ -97,14 +149,12 @@ FLAT_BODY = register(
         method=STEP,
         words="linear waves of a laterally infinite flat body, by the wavenumber integral",
         solve=_from_rest,
-        refuse=lambda body: exact_waves(body, "flat-body"),
+        limits=_limits,
         error=None,
         seconds=2.0,
         memory=3e8,
         colour="#009E73",
         sources=(LAYERS,),
-        reads=of_waves,
-        takes_load=takes_load,
         is_infinite=True,
         takes_series=has_table,
     )
@@ -116,14 +166,12 @@ HARMONIC = register(
         words="the steady state of linear waves of a laterally infinite flat body, by the "
         "wavenumber integral",
         solve=_steady,
-        refuse=lambda body: exact_waves(body, "flat-body-harmonic"),
+        limits=_steady_limits,
         error=None,
         seconds=2.0,
         memory=3e8,
         colour="#E69F00",
         sources=(LAYERS,),
-        reads=of_waves,
-        takes_load=takes_load,
         is_infinite=True,
         from_rest="flat-body",
     )

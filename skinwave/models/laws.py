@@ -82,18 +82,3 @@ def relaxing(body: Body, tolerance: float) -> Body:
     layers = tuple(replace(layer, material=made(layer.material)) for layer in body.layers)
     regions = tuple((name, made(material)) for name, material in body.regions)
     return replace(body, material=made(body.material), layers=layers, regions=regions)
-
-
-def without_own_law(model: str, body: Body) -> None:
-    """Refuse a body with a modulus law of its own, for a model that has no internal variables.
-
-    Raises
-    ------
-    ValueError
-        If it has one.
-    """
-    if has_own_law(body):
-        raise ValueError(
-            f"{model} has no internal variables, which the Prony series of a modulus law needs; "
-            "give the material a viscosity or a loss_factor, or use --model fem"
-        )

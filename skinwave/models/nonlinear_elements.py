@@ -1,18 +1,23 @@
 """A sheet at large deflection, in its modes or with all dofs."""
 
+from collections.abc import Callable, Iterator
 from functools import partial
 
 from skinwave.bodies.body import Body
-from skinwave.bodies.sheet import refuse_open_air
 from skinwave.models import Model, register
-from skinwave.models.laws import without_own_law
-from skinwave.models.linear_elements import vacuum_only
+from skinwave.models.limits import Limit, load_limit
+from skinwave.models.linear_elements import of_mesh
+from skinwave.models.sheet_limits import (
+    of_air_in_a_frame,
+    of_held_sheet,
+    of_one_modulus,
+    of_vacuum,
+)
 from skinwave.models.sources import ALPHA, NEWTON
 from skinwave.models.stretching import (
     expected_error,
     full_answer,
     reduced_answer,
-    sheet_only,
     stretching_size,
 )
 from skinwave.scene import Scene
@@ -25,16 +30,22 @@ def _error(scene: Scene, h: float | None) -> float:
     return expected_error(scene.body, h)
 
 
-def _refuse_of_reduced(body: Body) -> None:
-    sheet_only(body, "fem-nonlinear")
-    refuse_open_air(body)
-    without_own_law("fem-nonlinear", body)
+def _limits(
+    of_air: Callable[[Body], Iterator[Limit]], size: Callable[[Body], float], scene: Scene
+) -> Iterator[Limit]:
+    body = scene.body
+    if not body.of_kind.is_plate:
+        yield Limit(why=f"takes a sheet, not a {body.kind}")
+        return
+    yield from of_held_sheet(body)
+    yield from of_air(body)
+    yield from of_one_modulus(body)
+    yield from of_mesh(body, size(body))
+    if not scene.load.is_plain:
+        yield load_limit(scene)
 
 
-def _refuse_of_full(body: Body) -> None:
-    sheet_only(body, "fem-nonlinear-transient")
-    vacuum_only("fem-nonlinear-transient", body)
-    without_own_law("fem-nonlinear-transient", body)
+REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=which) for which in (True, False))
 
 
 REDUCED = register(
@@ -43,10 +54,9 @@ REDUCED = register(
         method=METHOD,
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
-        refuse=_refuse_of_reduced,
+        limits=partial(_limits, of_air_in_a_frame, REDUCED_SIZE),
         error=_error,
-        default_size=partial(stretching_size, reduced=True),
-        reads=lambda scene: True,
+        default_size=REDUCED_SIZE,
         sources=(ALPHA, NEWTON),
         is_nonlinear=True,
     )
@@ -57,10 +67,9 @@ FULL = register(
         method=METHOD,
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
         solve=full_answer,
-        refuse=_refuse_of_full,
+        limits=partial(_limits, of_vacuum, FULL_SIZE),
         error=_error,
-        default_size=partial(stretching_size, reduced=False),
-        reads=lambda scene: True,
+        default_size=FULL_SIZE,
         sources=(ALPHA, NEWTON),
         is_nonlinear=True,
     )

@@ -3,6 +3,7 @@ steady state, and from rest.
 """
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -19,8 +20,10 @@ from simple_model.sampling import shown
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.effort import peak_memory, silent
-from skinwave.models import Model, Request, of_surface_motion, register
+from skinwave.models import Model, Request, register
+from skinwave.models.limits import Limit, of_body, surface_motion
 from skinwave.models.prepared import sample_times
+from skinwave.models.sheet_limits import of_held_sheet, of_one_modulus
 from skinwave.models.sources import PLATES
 from skinwave.scene import Scene
 
@@ -150,24 +153,19 @@ def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> 
     return fem.exponential_sum(poles, start[:, None] * driven.outputs.T, times)
 
 
-def _refuse(body: Body) -> None:
-    if not body.of_kind.is_plate or body.sides != "clamped":
-        raise ValueError(
-            f"plate-modes is for a sheet that is held, not a {body.kind} with {body.sides} sides; "
-            "give it one, or use --model fem"
-        )
-    if body.base != "free" or body.placement.is_tilted:
-        raise ValueError(
-            "plate-modes is for a sheet of free faces that lies across the beam; leave out its "
-            "base and its tilt, or use --model fem"
-        )
-    if body.mounting.is_curled:
-        raise ValueError("plate-modes is for a flat sheet, not a curled one; use --model fem")
-    if body.solid.prony or body.solid.law is not None:
-        raise ValueError(
-            "plate-modes takes one modulus at all frequencies; give the material a loss_factor or "
-            "a viscosity, or use --model fem"
-        )
+def _limits(scene: Scene) -> Iterator[Limit]:
+    body = scene.body
+    if not body.of_kind.is_plate:
+        yield Limit(why=f"takes a sheet, not a {body.kind}")
+        return
+    yield from of_held_sheet(body)
+    if body.base != "free":
+        yield Limit(
+            why=f"takes a sheet of free faces, not one with the base {body.base}",
+            cure='take base = "free"', change=of_body(base="free"),
+        )  # fmt: skip
+    yield from of_one_modulus(body)
+    yield from surface_motion(scene)
 
 
 MODES = register(
@@ -176,13 +174,12 @@ MODES = register(
         method="modes of a thin plate by Ritz's method, line by line",
         words="the steady state of a thin plate, in its modes by Ritz's method",
         solve=steady_answer,
-        refuse=_refuse,
+        limits=_limits,
         error=lambda scene, h: ERROR,
         seconds=0.5,
         memory=2e8,
         colour="#F0E442",
         sources=(PLATES,),
-        reads=of_surface_motion,
         from_rest="plate-modes-transient",
     )
 )

@@ -1,8 +1,11 @@
 """Point kernel under the scene's own load, and under that of the paper."""
 
+from collections.abc import Iterator
+
 from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.quantities import PRESSURE
 from skinwave.models import Model, Request, register
+from skinwave.models.limits import Limit, load_limit
 from skinwave.scene import Scene
 
 ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
@@ -16,6 +19,11 @@ def _published(scene: Scene, request: Request) -> Response:
     return point_kernel_published(scene.pressure, scene.probe_points, request.times)
 
 
+def _limits(scene: Scene) -> Iterator[Limit]:
+    if not scene.load.is_plain:
+        yield load_limit(scene)
+
+
 SAME_LOAD = register(
     Model(
         name="point-kernel",
@@ -26,7 +34,7 @@ SAME_LOAD = register(
         solve=_same_load,
         error=lambda scene, h: ERROR,
         colour="#000000",
-        reads=lambda scene: True,
+        limits=_limits,
         quantity=PRESSURE.name,
         needs_body=False,
     )
@@ -41,7 +49,7 @@ PUBLISHED = register(
         solve=_published,
         error=lambda scene, h: ERROR,
         colour="#999999",
-        reads=lambda scene: True,
+        limits=_limits,
         quantity=PRESSURE.name,
         needs_body=False,
     )

@@ -39,34 +39,6 @@ HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
 FEWEST_MODES, MOST_MODES = 40, 160
 
 
-def sheet_only(body: Body, model: str) -> None:
-    """Refuse a body that is no sheet with clamped edges, or of a material with Prony terms.
-
-    Raises
-    ------
-    ValueError
-        If it is one of these.
-    """
-    if not body.of_kind.is_plate or body.sides != "clamped":
-        raise ValueError(
-            f"{model} is for a sheet with clamped sides, not a {body.kind} with {body.sides} "
-            "sides; give it one, or use --model fem"
-        )
-    if body.solid.prony:
-        raise ValueError(
-            f"{model} has no Maxwell branches, and this material's Prony terms have moduli of "
-            f"{body.solid.fast_modulus:g} Pa; leave them out, or use --model fem, fem-harmonic "
-            "or fem-transient"
-        )
-    if body.mounting.is_curled:
-        raise ValueError(f"{model} is for a flat sheet, not a curled one; use --model fem")
-    if body.placement.is_tilted:
-        raise ValueError(
-            f"{model} is for a sheet that lies across the beam, not a tilted one; leave out its "
-            "tilt, or use --model fem"
-        )
-
-
 def stretching_size(body: Body, *, reduced: bool) -> float:
     """Default element size of a sheet at large deflection, metre."""
     return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)

@@ -1,7 +1,6 @@
 """A-priori estimates of lines and edge reflections of a response."""
 
 from dataclasses import replace
-from math import isfinite
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from simple_model.focus import gaussian_width, spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
 from simple_model.trajectory import BY_POINTS
 from simple_model.wavenumber_integral import point_response
-from skinwave.bodies.analytic import compliance, is_flat_layer, stack
+from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
 from skinwave.bodies.mounting import EDGES
 from skinwave.scene import Body, Scene
 
@@ -71,11 +70,6 @@ def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> f
     """
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
-
-
-def is_laterally_infinite(body: Body) -> bool:
-    """Whether a body has no sides that reflect: they absorb, or it is a half-space."""
-    return body.sides == "absorbing" or not isfinite(body.depth)
 
 
 def has_wavenumber_solution(scene: Scene) -> bool:

@@ -13,10 +13,19 @@ from simple_model.sampling import resolving_step
 from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
-from skinwave.models import Model, check_reading, named, takes
+from skinwave.models import Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws
+from skinwave.models.limits import (
+    Limit,
+    beyond,
+    check_taken,
+    default_model,
+    refusal,
+    takers,
+    takes,
+)
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, sample_times
 from skinwave.planning.estimates import (
@@ -114,13 +123,12 @@ def plan(
         step_count(float(sample_times(scene)[-1]), dt)
     if not scene.body.of_kind.discretise:
         if asked and asked.needs_body:
-            raise ValueError(f"a scene without a body has no {model} response; use --model auto")
+            check_taken(asked, scene)
         kernel = model or "point-kernel"
         row = PlanRow(what="model", value=kernel, reason="there is no body to move")
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if asked:
-        asked.refuse(scene.body)
-        check_reading(asked, scene)
+        check_taken(asked, scene)
         if asked.error and not asked.needs_body:
             return _unplanned(scene, tolerance, asked, h, times)
     check_laws(scene.body, scene.pressure)
@@ -138,12 +146,17 @@ def plan(
         )
     ]
     returned = side_reflections(scene) if has_wavenumber_solution(scene) else 1.0
-    exact = returned <= WAVES_SHARE * tolerance and FLAT_BODY.takes_load(scene)
+    exact = returned <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene)
     if asked.is_infinite if asked else exact:
         found = _without_mesh(scene, tolerance, asked, highest, returned, rows, times)
         return with_series(found, scene, tolerance)
     if asked is None and (reason := why_modes(scene)):
         return _by_modes(scene, tolerance, highest, reason, rows)
+    if asked is None and (other := default_model(scene)) != "fem":
+        found = plan(scene, tolerance, model=other, dt=dt, solver=solver)
+        why = f"fem {beyond(named('fem'), scene)[0].why}"
+        rows = [replace(row, reason=why) if row.what == "model" else row for row in found.rows]
+        return replace(found, rows=tuple(rows))
     body: Body = scene.body
     cut: list[PlanRow] = []
     if model is None or h is None:  # else all of it is meshed, as asked
@@ -161,9 +174,8 @@ def plan(
         else:
             mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
     except fem.NotReduced as error:
-        if not takes(FROM_REST, scene):
-            raise
-        raise ValueError(f"{error}; or use --model {FROM_REST.name}") from None
+        limit = Limit(why=f"cannot reduce this body: {error}")
+        raise refusal(scene, named(model or "fem"), [limit]) from None
     scene = replace(scene, body=body)
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     step_error = _march_error(scene, step) if asked and asked.is_stepped else 0.0
@@ -255,7 +267,10 @@ def _without_mesh(
     reason += _without(left)
     warnings = (
         *over_tolerance(
-            f"{model}, which leaves out reflections from the sides,", returned, tolerance, "fem is"
+            f"{model}, which leaves out reflections from the sides,",
+            returned,
+            tolerance,
+            f"{takers(scene)[0]} is" if takers(scene) else "absorbing sides are",
         ),
         *start_over_tolerance(asked, left, tolerance),
     )
@@ -288,7 +303,7 @@ def _march_error(scene: Scene, dt: float) -> float:
 
 def _why_elements(scene: Scene, returned: float) -> str:
     body = scene.body
-    if not FLAT_BODY.takes_load(scene):
+    if not scene.load.is_plain and not takes(FLAT_BODY, scene):
         return f"the wavenumber integral has no {scene.reading.words} under {scene.load.words}"
     if gaussian_width(scene.pressure.height, scene.pressure.profile) is None:
         return (

@@ -9,12 +9,13 @@ from simple_model import Response
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.sheet import tension
 from skinwave.models import Model, named
+from skinwave.models.limits import cures_for, in_words
 from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import Refined, enough
 from skinwave.scene import Scene
 
-NONLINEAR = "use --model fem-nonlinear"
+NONLINEAR = "fem-nonlinear"
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its band is up to 0.3
 
@@ -89,7 +90,8 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
     factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth
     if factor <= LINEAR:
         return ()
-    cure = NONLINEAR if clamped else "take a thicker sheet or a lower pressure"
+    cures = cures_for(scene, named(NONLINEAR)) if clamped else []
+    cure = in_words(cures, "") if cures else "take a thicker sheet or a lower pressure"
     return (
         f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
         f"of it; {cure}",

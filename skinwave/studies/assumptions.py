@@ -14,6 +14,7 @@ import numpy as np
 from simple_model import MovingPressure, Trajectory
 from simple_model.drive import PUBLISHED, beyond_published
 from simple_model.material import PRESETS, Material, PronyTerm
+from skinwave.bodies.sheet import check_alike
 from skinwave.planning.estimates import response_spectrum
 from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
 
@@ -56,7 +57,8 @@ def droppable(scene: Scene) -> tuple[str, ...]:
     body, path = scene.body, scene.tacton.trajectory
     if not body.of_kind.discretise:
         raise ValueError("a scene without a body keeps every assumption; give it one")
-    body.of_kind.check_exact(body)
+    if body.of_kind.is_plate:
+        check_alike(body)
     sheet, slab, solid = body.of_kind.is_plate, body.of_kind.is_layer, body.solid
     kept = {
         "little loss": slab and solid.has_loss,

@@ -14,11 +14,13 @@ import numpy as np
 from simple_model import Response
 from simple_model.choices import choose
 from skinwave import parametric
+from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.effort import Progress, silent
 from skinwave.models import named, names
+from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import default_model, takes
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
-from skinwave.planning.estimates import has_wavenumber_solution, is_laterally_infinite
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Scene
 from skinwave.simulation import answered, check_options
@@ -152,9 +154,8 @@ def model_of(scene: Scene, asked: str) -> str:
         return asked
     if not scene.body.of_kind.discretise:
         return "point-kernel"
-    is_exact = has_wavenumber_solution(scene) and is_laterally_infinite(scene.body)
-    is_exact = is_exact and named("flat-body").takes_load(scene)
-    return "flat-body" if is_exact else "fem"
+    is_exact = is_flat_layer(scene.body) and is_laterally_infinite(scene.body)
+    return FLAT_BODY.name if is_exact and takes(FLAT_BODY, scene) else default_model(scene)
 
 
 def _check(model_options: ModelOptions) -> None:

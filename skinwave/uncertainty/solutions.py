@@ -19,10 +19,9 @@ from simple_model.load_spectrum import Complex, synthesise
 from simple_model.path_operator import PathOperator, path_operator
 from simple_model.pressure import MovingPressure
 from simple_model.response import SETTLE, phasors
-from skinwave.bodies.analytic import exact_waves
+from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
-from skinwave.models.flat_body import HARMONIC
 from skinwave.models.prepared import components, prepare, reduction_tolerance, sample_times
 from skinwave.parametric import lines_of
 from skinwave.pictures.styles import SHOWN
@@ -211,11 +210,11 @@ def _of_lines(
 
 
 def _lines(scene: Scene, points: Floats, method: Method) -> tuple[Floats, Complex]:
-    compliance = exact_waves(scene.body, HARMONIC.name)
+    waves = compliance(scene.body)
     if not method.same_load:
-        return steady_lines(compliance, scene.pressure, points, threshold=FAINT)
+        return steady_lines(waves, scene.pressure, points, threshold=FAINT)
     operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
-    return operator.steady_lines(compliance)
+    return operator.steady_lines(waves)
 
 
 @lru_cache(maxsize=2)

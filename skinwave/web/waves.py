@@ -213,7 +213,7 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
     if is_tabulated(scene.body) and scene.body.sides == "absorbing":
         return answer  # an infinite slab, whose sides reflect nothing
     found = sentences(scene, response, h=default_size(scene.body))
-    said = tuple(sentence.replace(NONLINEAR, ON_PAGE) for sentence in found)
+    said = tuple(sentence.replace(f"use --model {NONLINEAR}", ON_PAGE) for sentence in found)
     effort = replace(response.effort, warnings=said)
     return replace(answer, response=replace(response, effort=effort))
 
