@@ -13,8 +13,8 @@ from simple_model import Response
 from simple_model.choices import choose
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models import MapFunction, Request, named
+from skinwave.models.advice import check_taken
 from skinwave.models.laws import check_laws
-from skinwave.models.limits import check_taken
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
 from skinwave.planning.warnings import beyond_linear

@@ -23,7 +23,7 @@ from simple_model.trajectory import SHAPES, SWEEPS
 from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
 from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named, names
-from skinwave.models.limits import takes
+from skinwave.models.advice import takes
 from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute, simulate

@@ -18,7 +18,7 @@ from simple_model.tensors import energy_root, largest_shear, von_mises
 from skinwave.bodies.parts import Layer
 from skinwave.cli import main
 from skinwave.models import named
-from skinwave.models.limits import check_taken, takes
+from skinwave.models.advice import check_taken, takes
 from skinwave.models.loads import probe_rows
 from skinwave.models.prepared import sample_times
 from skinwave.reports.album import open_album

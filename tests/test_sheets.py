@@ -18,7 +18,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.mounting import EDGES, Mounting
 from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumber
 from skinwave.models import Request, named
-from skinwave.models.limits import beyond
+from skinwave.models.advice import beyond
 from skinwave.models.plate_modes import middle_compliance, plate_of
 from skinwave.planning.extent import mean_sag, symmetry
 from skinwave.scene import BODIES, Body, Scene

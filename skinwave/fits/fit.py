@@ -27,8 +27,8 @@ from skinwave.fits.problem import Problem
 from skinwave.fits.profile import Profile, profiles
 from skinwave.fits.solve import Solution, solve
 from skinwave.measurements import Measurement
+from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
-from skinwave.models.limits import takes
 from skinwave.scene import Scene
 
 STARTS = 8

@@ -33,9 +33,9 @@ from skinwave.fits.parameters import (
     of_scene,
 )
 from skinwave.models import Model, named
+from skinwave.models.advice import check_taken
 from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import free_keys
-from skinwave.models.limits import check_taken
 from skinwave.parametric import ParametricBody
 from skinwave.scene import SAMPLE_RATE, Scene
 from skinwave.simulation import compute

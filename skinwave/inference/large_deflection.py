@@ -22,7 +22,7 @@ from skinwave.inference.nearest_sheets import distinct
 from skinwave.inference.ranking import Row
 from skinwave.inference.scenes import scene_of
 from skinwave.models import named
-from skinwave.models.limits import beyond
+from skinwave.models.advice import beyond
 from skinwave.models.stretching import MOST_MODES, unstretched_lines
 from skinwave.planning.sheets import modes_below
 from skinwave.run import Run

@@ -21,7 +21,7 @@ from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import Complex
 from simple_model.numbers import percent, stated_error
 from skinwave.bodies.analytic import flattened
-from skinwave.models.limits import takes
+from skinwave.models.advice import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
 from skinwave.numbers import significant

@@ -14,18 +14,12 @@ from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
 from skinwave.effort import Progress
 from skinwave.models import Model, named
+from skinwave.models.advice import beyond, check_taken, default_model, refusal, takers, takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws
-from skinwave.models.limits import (
-    Limit,
-    beyond,
-    check_taken,
-    default_model,
-    refusal,
-    takers,
-    takes,
-)
+from skinwave.models.limits import Limit
+from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, sample_times
 from skinwave.planning.estimates import (
@@ -152,9 +146,9 @@ def plan(
         return with_series(found, scene, tolerance)
     if asked is None and (reason := why_modes(scene)):
         return _by_modes(scene, tolerance, highest, reason, rows)
-    if asked is None and (other := default_model(scene)) != "fem":
-        found = plan(scene, tolerance, model=other, dt=dt, solver=solver)
-        why = f"fem {beyond(named('fem'), scene)[0].why}"
+    if asked is None and (other := default_model(scene)) != FEM.name:
+        found = plan(scene, tolerance, model=other, dt=dt, solver=solver, times=times)
+        why = f"{FEM.name} {beyond(FEM, scene)[0].why}"
         rows = [replace(row, reason=why) if row.what == "model" else row for row in found.rows]
         return replace(found, rows=tuple(rows))
     body: Body = scene.body

@@ -3,7 +3,7 @@
 from math import pi
 
 from skinwave.bodies.sheet import bending_wavenumber
-from skinwave.models.limits import takes
+from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.reduction import BAND
 from skinwave.scene import Body, Scene

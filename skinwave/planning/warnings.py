@@ -9,7 +9,7 @@ from simple_model import Response
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.sheet import tension
 from skinwave.models import Model, named
-from skinwave.models.limits import cures_for, in_words
+from skinwave.models.advice import cures_for, in_words
 from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import Refined, enough

@@ -17,8 +17,8 @@ from skinwave import parametric
 from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.effort import Progress, silent
 from skinwave.models import named, names
+from skinwave.models.advice import default_model, takes
 from skinwave.models.flat_body import FLAT_BODY
-from skinwave.models.limits import default_model, takes
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
 from skinwave.planning.refinement import compared_with, refined

@@ -18,7 +18,7 @@ from simple_model import Response, sensation_level, spectrum
 from simple_model.line_names import line_frequency
 from simple_model.response import phasors
 from skinwave.effort import silent
-from skinwave.models.limits import takes
+from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import sample_times
