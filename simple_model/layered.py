@@ -37,7 +37,6 @@ WEAKEST = 0.1  # of the mean decay, that of a mode that is mostly in a layer wit
 YIELDING = (
     0.5  # of that estimate, poles above an elastic base, on which layers and springs are in series
 )
-SLOWEST = 2 * np.pi * 0.5  # rad/s: slower lines of a free stack count as its mean
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
@@ -64,8 +63,8 @@ class Impedances(NamedTuple):
 
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
-    """Displacement of the surface into the stack per pressure; of a free stack, which has no bound
-    at rest, about its mean: 0 at w = 0 and at lines slower than `SLOWEST`.
+    """Displacement of the surface into the stack per pressure; 0 at w = 0 of a free stack, which
+    has no static deflection.
 
     Parameters
     ----------
@@ -147,12 +146,7 @@ def clearance(stack: Stack, w: Complex) -> float:
 
 
 def _about_mean(stack: Stack, w: Complex, values: Complex) -> Complex:
-    return np.asarray(values if stack.is_fixed else np.where(_drifts(w), 0, values))
-
-
-def _drifts(w: Complex) -> Any:
-    """Whether a steady frequency is so low that a free stack moves by it as by the mean."""
-    return (np.imag(w) == 0) & (np.abs(w) < SLOWEST)
+    return np.asarray(values if stack.is_fixed else np.where(w == 0, 0, values))
 
 
 def _bending(stack: Stack, w: Complex) -> float:
@@ -168,7 +162,7 @@ def _bending(stack: Stack, w: Complex) -> float:
     z = z - (stiff * z).sum(axis=0) / stiff.sum(axis=0)
     bending = (stiff * (z**2 + h[:, None] ** 2 / 12)).sum(axis=0)
     mass = sum(m.density * t for m, t in zip(stack.materials, stack.thicknesses, strict=True))
-    moving = np.ones(w.shape, bool) if stack.is_fixed else ~_drifts(w)
+    moving = np.ones(w.shape, bool) if stack.is_fixed else w != 0
     w, bending = (np.broadcast_to(x, w.shape)[moving] for x in (w, bending))
     k = ((mass * w**2 - stack.base_stiffness) / bending + 0j) ** 0.25 * np.array([1, 1j, -1, -1j])[
         :, None

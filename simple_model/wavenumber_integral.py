@@ -34,7 +34,7 @@ from simple_model.trajectory import Floats
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
 AT_ONCE = 2**12  # pairs of frequency and wavenumber, in arrays that stay in cache
-UNRESOLVED = "the wavenumber integral does not converge; add some loss"
+UNRESOLVED = "the wavenumber integral does not converge; add some loss, or give a free slab a base"
 CHECKED_EACH = 8  # batches: how often the grid is checked by halving
 BATCH = 256  # frequencies at a time
 FIRST_BATCH = 64  # of a transient, whose later batches are as long as all before

@@ -250,7 +250,9 @@ def _without_mesh(
     # Reflections are of the load's lines, the start of the body's own: their powers add.
     try:
         start = start_left_out(scene, asked or HARMONIC, times=times)
-    except (ValueError, ArithmeticError):  # no steady state, which the model itself refuses
+    except (ValueError, ArithmeticError):  # no steady state
+        if asked:
+            raise
         start = np.inf
     if asked is None:
         asked = HARMONIC if np.hypot(returned, start) <= tolerance else FLAT_BODY
