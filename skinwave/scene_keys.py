@@ -231,6 +231,11 @@ def _relief(key: str, value: Any) -> Relief:
     return Relief(**checked(f"[body.{key}]", as_table(f"body.{key}", value), RELIEF))
 
 
+def _write_relief(relief: Relief) -> dict[str, Any]:
+    given = {key: field for key, field in RELIEF.items() if getattr(relief, field.name) is not None}
+    return written(given, relief)
+
+
 def _bone(key: str, value: Any) -> Phalanx:
     return Phalanx(**checked(f"[body.{key}]", as_table(f"body.{key}", value), BONE))
 
@@ -430,7 +435,7 @@ SECTIONS = {
         "sides": SceneKey("sides", _sides, _write_sides),
         "base_stiffness_n_per_m3": _scaled("base_stiffness"),
         "layers": SceneKey("layers", _layers, lambda layers: [written(LAYER, x) for x in layers]),
-        "relief": SceneKey("relief", _relief, partial(written, RELIEF)),
+        "relief": SceneKey("relief", _relief, _write_relief),
         "bone": SceneKey("bone", _bone, partial(written, BONE)),
         "file": _word("file"),
         "unit": _word("unit"),

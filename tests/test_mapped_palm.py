@@ -8,13 +8,13 @@ from scipy.integrate import quad
 
 import fem
 import meshes
-from meshes import MeshError, Palm
+from meshes import MeshError, Palm, corner_volumes, mapped_palm
 from meshes.shapes import palm as shape
 from meshes.shapes.kuhn import kuhn_tets
 from meshes.surface.triangulation import area, volume
 from skinwave.bodies import palm as body_palm
 from skinwave.bodies.body import Body
-from skinwave.scene import BODIES
+from skinwave.scene import BODIES, Relief
 
 FLAT = Palm(
     cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, thickness=0.015,
@@ -114,9 +114,7 @@ def test_a_relief_that_a_grid_cannot_follow_is_left_to_the_mesher(monkeypatch):
     steep = replace(Palm(), thenar_height=0.022, hypothenar_height=0.022, edge_radius=0.001)
     with pytest.raises(MeshError, match="lower relief or `palm_mesh`"):
         meshes.mapped_palm(steep, *grid(steep, 5e-3))
-    relief = replace(
-        Body(kind="palm").relief, thenar_height=0.022, hypothenar_height=0.022, edge_radius=0.001
-    )
+    relief = Relief(thenar_height=0.022, hypothenar_height=0.022, edge_radius=0.001)
     asked = []
 
     def meshed(palm, h, sizing):
@@ -126,3 +124,37 @@ def test_a_relief_that_a_grid_cannot_follow_is_left_to_the_mesher(monkeypatch):
     monkeypatch.setattr(body_palm, "palm_mesh", meshed)
     body_palm.discretise(Body(kind="palm", width=0.085, depth=0.022, relief=relief), 5e-3)
     assert asked == [(steep, 5e-3, pytest.approx(4e-3))]
+
+
+@pytest.mark.parametrize(
+    "size", [(0.044, 0.048, 0.0093), (0.05, 0.05, 0.006), (0.03, 0.12, 0.008), (0.06, 0.06, 0.012)]
+)
+def test_the_usual_relief_fits_every_palm(size):
+    """Its volume is below that of the box and its mounds, and above half of the box."""
+    width, height, depth = size
+    body = Body(kind="palm", width=width, height=height, depth=depth)
+    mesh = mapped_palm(body.palm, *body_palm.body_lines(body, min(depth / 2, 8e-3)))
+    box = width * height * depth
+    filled = corner_volumes(mesh.points, mesh.tets).sum()
+    assert 0.5 * box < filled < box * (1 + body.palm.thenar_height / depth)
+
+
+def test_the_usual_relief_of_a_palm_is_an_adults():
+    body = Body(kind="palm", width=0.085)
+    assert body.palm == replace(Palm(), thickness=0.015, edge_radius=0.007)
+
+
+def test_a_palm_without_a_mesh_says_which_key_to_change(monkeypatch):
+    """With the value that it names there is a mesh."""
+    relief = Relief(thenar_height=0.022, edge_radius=0.001)
+    body = Body(kind="palm", width=0.085, depth=0.022, relief=relief)
+
+    def crosses(palm, h, sizing):
+        raise MeshError("the surface crosses itself")
+
+    monkeypatch.setattr(body_palm, "palm_mesh", crosses)
+    with pytest.raises(MeshError, match="take thenar_height_mm = ") as refused:
+        body_palm.discretise(body, 8e-3)
+    height = float(str(refused.value).split("= ")[-1]) / 1e3
+    lower = replace(body, relief=replace(relief, thenar_height=height))
+    assert len(body_palm.discretise(lower, 8e-3).mesh.tets)

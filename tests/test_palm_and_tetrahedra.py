@@ -105,12 +105,13 @@ def test_without_relief_the_top_is_a_plane():
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"thickness": 0.0}, "thickness = 0.0 m of the palm must be above 0"),
+        ({"thickness": 0.0}, "thickness = 0 mm of the palm must be above 0"),
         ({"length": float("nan")}, "length = nan"),
         ({"breadth": 85.0}, "below 1 m"),
         ({"cup_depth": -0.001}, "must be 0 or above"),
         ({"thenar_height": 0.05}, "exceeds the thickness"),
-        ({"edge_radius": 0.02}, "keep the edge within half the thickness"),
+        ({"edge_radius": 0.02}, "edge_radius = 20 mm .* more than half the thickness, 11 mm"),
+        ({"corner_radius": 0.05}, "corner_radius = 50 mm .* half the shorter side, 42.5 mm"),
     ],
 )
 def test_no_palm_is_refused(fields, said):

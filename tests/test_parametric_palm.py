@@ -20,7 +20,7 @@ from skinwave.models.free_materials import affine_operators
 from skinwave.models.prepared import answer as own_answer
 from skinwave.models.prepared import prepare as own_body
 from skinwave.models.thicknesses import build_at, geometry_shares
-from skinwave.scene import BODIES, Layer
+from skinwave.scene import BODIES, Layer, Relief
 
 PALM, KEY, COAT = BODIES["palm"], "body.thickness_mm", "body.layers.0.thickness_mm"
 H = 12e-3
@@ -57,6 +57,10 @@ def test_a_palm_is_not_stretched_to_what_it_does_not_reach():
     with pytest.raises(MeshError, match="take a narrower range of thicknesses"):
         stretched_palm(mesh, FLAT, replace(FLAT, thickness=0.4))
     thin = replace(PALM, relief=replace(PALM.relief, edge_radius=1e-3))
+    with pytest.raises(ValueError, match="give all lengths of .body.relief."):
+        parametric._range(thin, free_keys(thin, {KEY: (5.0, 60.0)}), 5e-3)
+    given = {name: value for name, value in vars(thin.palm).items() if name in vars(thin.relief)}
+    thin = replace(thin, relief=Relief(**given))
     free = free_keys(thin, {KEY: (5.0, 60.0)})
     with pytest.raises(ValueError, match="narrow the range of its thickness"):
         parametric._range(thin, free, 5e-3)

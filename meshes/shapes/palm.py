@@ -13,7 +13,7 @@ whose top is the plane z = 0 up to `edge_radius` from its sides.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,25 +59,28 @@ class Palm:
 
     def __post_init__(self) -> None:
         relief = ("cup_depth", "thenar_height", "hypothenar_height", "pad_height")
-        for field in fields(self):
-            value, flat = getattr(self, field.name), field.name in relief
+        for name, value in vars(self).items():
+            flat = name in relief
             if not (0 <= value < 1 if flat else 0 < value < 1):
                 least = "0 or above" if flat else "above 0"
                 raise MeshError(
-                    f"{field.name} = {value} m of the palm must be {least} and below 1 m"
+                    f"{name} = {1e3 * value:g} mm of the palm must be {least} and below 1 m"
                 )
             if flat and value > self.thickness:
                 raise MeshError(
-                    f"{field.name} = {value} m exceeds the thickness {self.thickness} m of the "
-                    "palm; give a lower one"
+                    f"{name} = {1e3 * value:g} mm exceeds the thickness of the palm, "
+                    f"{1e3 * self.thickness:g} mm; give a lower one"
                 )
-        widest = min(self.breadth, self.length) / 2
-        if not self.edge_radius <= min(self.thickness / 2, self.corner_radius) <= widest:
-            raise MeshError(
-                f"edge_radius = {self.edge_radius} m and corner_radius = {self.corner_radius} m do "
-                f"not fit a palm of {self.breadth} x {self.length} x {self.thickness} m; keep the "
-                "edge within half the thickness and the corner, and the corner within half the side"
-            )
+        for name, limit, what in (
+            ("corner_radius", min(self.breadth, self.length) / 2, "half the shorter side"),
+            ("edge_radius", self.thickness / 2, "half the thickness"),
+            ("edge_radius", self.corner_radius, "corner_radius"),
+        ):
+            if not (value := getattr(self, name)) <= limit * (1 + 1e-9):
+                raise MeshError(
+                    f"{name} = {1e3 * value:g} mm of the palm is more than {what}, "
+                    f"{1e3 * limit:g} mm; give that or less"
+                )
 
 
 def level_set(palm: Palm, points: ArrayLike) -> Floats:

@@ -178,9 +178,7 @@ class Body:
     @property
     def palm(self) -> Palm:
         """The palm that outline and relief describe."""
-        return Palm(
-            breadth=self.width, length=self.height, thickness=self.depth, **vars(self.relief)
-        )
+        return self.relief.of(self.width, self.height, self.depth)
 
     @property
     def bending_stiffness(self) -> float:

@@ -39,6 +39,7 @@ SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
 # default size they grow by its third root, because a row of boxes is as fine from side to side, and
 # 2 mm would take 560,000 dofs, where 230,000 are within 0.3 %.
 CELL = 0.85
+LOWER, ROUNDER = (0.6, 0.3, 0.0), (0.6, 0.9)  # shares of lengths of a relief that are tried
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -53,8 +54,33 @@ def discretise(body: Body, h: float) -> Discretised:
     try:
         mesh = mapped_palm(body.palm, *body_lines(body, h))
     except MeshError:  # a relief that a structured mesh cannot follow
-        mesh = palm_mesh(body.palm, h, sizing=_sizes(h, _coarsest(body, h)))
+        try:
+            mesh = palm_mesh(body.palm, h, sizing=_sizes(h, _coarsest(body, h)))
+        except MeshError as error:
+            raise MeshError(
+                f"this palm has no mesh: its relief is too steep; {_cure(body, h)}"
+            ) from error
     return _supported(body, h, mesh)
+
+
+def _cure(body: Body, h: float) -> str:
+    """The first key of a palm's relief with another value of which it has a mesh."""
+    palm = body.palm
+    heights = ("thenar_height", "hypothenar_height", "pad_height", "cup_depth")
+    half = min(palm.breadth, palm.length) / 2
+    trials = [
+        *({name: part * getattr(palm, name)} for name in heights for part in LOWER),
+        *({"corner_radius": max(palm.edge_radius, part * half)} for part in LOWER),
+        *({"edge_radius": part * min(palm.thickness / 2, palm.corner_radius)} for part in ROUNDER),
+        dict.fromkeys(heights, 0.0),
+    ]
+    for values in trials:
+        try:
+            mapped_palm(replace(palm, **values), *body_lines(body, h))
+        except MeshError:
+            continue
+        return "take " + " and ".join(f"{name}_mm = {1e3 * x:.3g}" for name, x in values.items())
+    return "take a mesh from a file"
 
 
 def on_lines(body: Body, lines: Lines) -> Discretised:
@@ -111,6 +137,12 @@ def check_morph(thinnest: Body, thickest: Body, h: float) -> None:
     ValueError
         If the layers of a palm are no coat.
     """
+    if replace(thinnest.palm, thickness=thickest.depth) != thickest.palm:
+        raise ValueError(
+            f"the relief of a palm that is {1e3 * thinnest.depth:g} mm thick is lower than that of "
+            f"one of {1e3 * thickest.depth:g} mm unless it is given; give all lengths of "
+            "[body.relief], such as edge_radius_mm"
+        )
     for each in (thinnest, thickest):
         if len(meshed_strata(each, h)) > 1:
             *_, (layers, _) = strata = each.strata
@@ -139,7 +171,7 @@ def _coarsest(body: Body, h: float) -> float:
     """Largest element: larger ones do not follow the rim, where waves reflect and the base's
     support ends.
     """
-    return max(SURFACE * h, min(COARSEST * h, RIM * body.relief.edge_radius))
+    return max(SURFACE * h, min(COARSEST * h, RIM * body.palm.edge_radius))
 
 
 def body_lines(body: Body, h: float) -> Lines:
@@ -192,7 +224,7 @@ PALM = register(
             lines=body_lines,
             discretise=on_lines,
             cells=cells,
-            coarsest=lambda body: body.relief.edge_radius,
+            coarsest=lambda body: body.palm.edge_radius,
             has=lambda body: not body.layers,
         ),
         default_size=lambda body: min(body.depth / 2, hand_size(body)),

@@ -43,15 +43,34 @@ class Layer:
 @dataclass(frozen=True, kw_only=True)
 class Relief:
     """Relief of a palm, in metre, as in `meshes.Palm`; with all heights 0 a slab with rounded
-    edges.
+    edges. What is not given, None, is an adult's where that fits the palm, or else lower.
     """
 
-    cup_depth: float = Palm.cup_depth
-    thenar_height: float = Palm.thenar_height
-    hypothenar_height: float = Palm.hypothenar_height
-    pad_height: float = Palm.pad_height
-    corner_radius: float = Palm.corner_radius
-    edge_radius: float = 0.007  # soft tissue on bone is thinner than a whole hand
+    cup_depth: float | None = None
+    thenar_height: float | None = None
+    hypothenar_height: float | None = None
+    pad_height: float | None = None
+    corner_radius: float | None = None
+    edge_radius: float | None = None
+
+    def of(self, breadth: float, length: float, thickness: float) -> Palm:
+        """The palm of a size in metre with this relief."""
+        thin = min(1.0, thickness / (2 * EDGE_RADIUS))
+        corner = min(Palm.corner_radius, ROUNDEST * min(breadth, length) / 2)
+        usual = {
+            "cup_depth": thin * Palm.cup_depth,
+            "thenar_height": thin * Palm.thenar_height,
+            "hypothenar_height": thin * Palm.hypothenar_height,
+            "pad_height": thin * Palm.pad_height,
+            "corner_radius": corner,
+            "edge_radius": min(thin * EDGE_RADIUS, self.corner_radius or corner),
+        }
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        return Palm(breadth=breadth, length=length, thickness=thickness, **(usual | given))
+
+
+EDGE_RADIUS = 7e-3  # m: soft tissue on bone is thinner than a whole hand
+ROUNDEST = 0.95  # of half the shorter side: rounder outlines have no straight side to mesh
 
 
 PLAIN = Relief()

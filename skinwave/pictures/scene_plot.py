@@ -69,7 +69,7 @@ def draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
         return
     width, height = 1e3 * body.width, 1e3 * body.height
     rounded = "relief" in body.of_kind.keys
-    radius = 1e3 * body.relief.corner_radius if rounded else 0.0
+    radius = 1e3 * body.palm.corner_radius if rounded else 0.0
     shape = f"round,pad=0,rounding_size={radius}" if rounded else "square,pad=0"
     outline = FancyBboxPatch(
         (-width / 2, -height / 2), width, height, shape, facecolor=BODY if not symmetry else "none",

@@ -16,7 +16,7 @@ from simple_model.drive import PUBLISHED, beyond_published
 from simple_model.material import PRESETS, Material, PronyTerm
 from skinwave.bodies.sheet import check_alike
 from skinwave.planning.estimates import response_spectrum
-from skinwave.scene import BODIES, FLAT, Body, Layer, Relief, Scene, solid_of
+from skinwave.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
 
 ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",
@@ -69,7 +69,7 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         "one material": slab
         and (bool(body.layers) or sum(x.thickness for x in LAYERS) < body.depth),
         # The palm that stands for a hand has mounds, which a thin body has no room for.
-        "flat": slab and body.placement == FLAT and body.relief.thenar_height < body.depth < np.inf,
+        "flat": slab and body.placement == FLAT and body.depth < np.inf,
         "small deflection": sheet and body.sides == "clamped",
     }
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
@@ -213,9 +213,8 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
     elif body.of_kind.is_layer:
         changes["layers"] = ()
     if "flat" in dropped:
-        rim = min(Relief().edge_radius, 0.45 * body.depth)
         width = min(body.width, BODIES["palm"].width)
-        changes |= {"kind": "palm", "width": width, "relief": Relief(edge_radius=rim)}
+        changes |= {"kind": "palm", "width": width}
     return replace(body, **changes)  # type: ignore[arg-type]
 
 

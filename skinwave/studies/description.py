@@ -134,10 +134,12 @@ def _body(runs: list[Run]) -> str:
 
 def above(body: Body) -> str:
     """The layers of a body, and how it lies under the device."""
-    text = ""
-    for thickness, material in ((layer.thickness, layer.material) for layer in body.layers):
-        of = material if isinstance(material, str) else _material(material)
-        text += f"; above it {1e3 * thickness:g} mm of {of}"
+    layers = [
+        f"{1e3 * layer.thickness:g} mm of "
+        + (layer.material if isinstance(layer.material, str) else _material(layer.material))
+        for layer in body.layers
+    ]
+    text = f"; on it, from the surface down: {', '.join(layers)}" if layers else ""
     for name, material in body.regions:
         of = material if isinstance(material, str) else _material(material)
         text += f"; its region {name} of {of}"
