@@ -13,7 +13,7 @@ from skinwave.reports.scene_report import _asked_rows
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.studies.claims import evaluate
-from skinwave.studies.description import modelled, unresolved
+from skinwave.studies.description import above, modelled, unresolved
 from skinwave.studies.study_page import caption, write_single
 from skinwave.sweeps.measures import measured
 
@@ -35,7 +35,11 @@ def run(body, drive="pressure_squared", **tacton):
     [
         (BODIES["palm"], "Left out: layers.", "sheet"),
         (BODIES["skin-slab"], "Left out: layers and curvature.", "sheet"),
-        (Body(layers=LAYERS), "; above it 1 mm of dermis. Left out: curvature.", "layers"),
+        (
+            Body(layers=LAYERS),
+            "; on it, from the surface down: 1 mm of dermis. Left out: curvature.",
+            "layers",
+        ),
         (BODIES["paper-sheet"], "The mesh is a thicker sheet", "curvature"),
     ],
 )
@@ -173,9 +177,16 @@ def test_a_page_says_how_a_body_lies_and_what_lies_above():
     place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
     body = Body(layers=LAYERS, placement=place)
     said = (
-        "; above it 1 mm of dermis; tilted by 10 degrees about x and 0 degrees about y"
+        "; on it, from the surface down: 1 mm of dermis; tilted by 10 degrees about x and 0 degrees about y"
         "; moved by (0, 5, 2) mm"
     )
     one = run(body)
     assert dict(_asked_rows(one.scene))["body"].endswith(said)
     assert said in modelled([one])[0]
+
+
+def test_a_page_lists_layers_from_the_surface_down():
+    words = above(BODIES["palm-layers"])
+    assert words == (
+        "; on it, from the surface down: 0.27 mm of epidermis, 1 mm of dermis, 4 mm of fat"
+    )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from meshes import Palm
 from simple_model import MovingPressure, Trajectory
 from simple_model.drive import PUBLISHED, beyond_published
 from simple_model.material import PRESETS, Material, PronyTerm
@@ -69,7 +70,7 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         "one material": slab
         and (bool(body.layers) or sum(x.thickness for x in LAYERS) < body.depth),
         # The palm that stands for a hand has mounds, which a thin body has no room for.
-        "flat": slab and body.placement == FLAT and body.depth < np.inf,
+        "flat": slab and body.placement == FLAT and Palm.thenar_height < body.depth < np.inf,
         "small deflection": sheet and body.sides == "clamped",
     }
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
