@@ -30,6 +30,9 @@ def run(body, drive="pressure_squared", **tacton):
     return Run(tacton="one", body=body.kind, scene=scene, response=response)
 
 
+ABOVE = "; on it, from the surface down: 1 mm of dermis"
+
+
 @pytest.mark.parametrize(
     ("body", "stated", "absent"),
     [
@@ -176,10 +179,7 @@ def test_a_page_says_all_that_was_commanded(tacton, row, said):
 def test_a_page_says_how_a_body_lies_and_what_lies_above():
     place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
     body = Body(layers=LAYERS, placement=place)
-    said = (
-        "; on it, from the surface down: 1 mm of dermis; tilted by 10 degrees about x and 0 degrees about y"
-        "; moved by (0, 5, 2) mm"
-    )
+    said = f"{ABOVE}; tilted by 10 degrees about x and 0 degrees about y; moved by (0, 5, 2) mm"
     one = run(body)
     assert dict(_asked_rows(one.scene))["body"].endswith(said)
     assert said in modelled([one])[0]
