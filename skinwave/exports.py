@@ -21,12 +21,13 @@ IN_NAMES = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # of file
 
 
 def write_probes(stem: Path, response: Response) -> None:
-    """`stem`.csv, a column a probe with its unit and place in the header, and `stem`.npz with
-    `t` s, `probes` m and, by the name of its quantity, the values (t, p) in its unit.
+    """`stem`.csv, a column a probe with its place in mm and its unit in the header, and `stem`.npz
+    with `t` s, `probes` m and, by the name of its quantity, the values (t, p) in its unit.
+    `skinwave.measurements.reading.read` takes both.
     """
     kind = response.quantity
-    places = [f"({1e3 * x:g}, {1e3 * y:g}) mm" for x, y in response.probes]
-    header = ["time, s", *(f"{kind} at {p}, {response.unit}" for p in places)]
+    places = [f"({1e3 * x:g},{1e3 * y:g})" for x, y in response.probes]
+    header = ["t [s]", *(f"{kind}{place} [{response.unit}]" for place in places)]
     table = waveform_table(header, [response.times, *response.values.T])
     stem.with_suffix(".csv").write_bytes(table)
     arrays = {"t": response.times, "probes": response.probes, kind: response.values}

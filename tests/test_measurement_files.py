@@ -8,6 +8,8 @@ import pytest
 from measurement_files import DRIVE, MM_S, PLACES_MM, RATE, UM, F, T
 from scipy.io import savemat
 
+from simple_model import Response
+from skinwave.exports import write_probes
 from skinwave.measurements import Measurement, skinsource
 from skinwave.measurements.reading import places_of, read
 from skinwave.measurements.units import per_unit, plain, quantity_of
@@ -265,3 +267,26 @@ def test_places_are_pairs_in_millimetre(tmp_path):
     for wrong in ("", "5", "a,b", "1,2,3", "nan,0"):
         with pytest.raises(ValueError, match="mm"):
             places_of(wrong)
+
+
+@pytest.mark.parametrize("quantity", ["displacement", "velocity"])
+def test_exported_responses_are_read_as_they_were(tmp_path, quantity):
+    response = Response(
+        model="fem", times=np.arange(40) / 1e4, probes=np.array([[0, 0], [7.5e-3, -3e-3]]),
+        values=1e-6 * np.random.default_rng(0).normal(size=(40, 2)), quantity=quantity,
+    )  # fmt: skip
+    write_probes(tmp_path / "probes", response)
+    arrays = {"t": response.times, "probes": response.probes, quantity: response.values}
+    np.savez(tmp_path / "responses.npz", **arrays, fem=response.values)
+    for name in ("probes.csv", "probes.npz", "responses.npz"):
+        found = read(tmp_path / name)
+        assert found.quantity == quantity
+        assert found.places == pytest.approx(response.probes)
+        assert found.mean == pytest.approx(response.values, rel=1e-8, abs=1e-18)
+
+
+def test_a_kernels_pressure_is_no_motion(tmp_path):
+    arrays = {"t": np.arange(4) / 1e3, "probes": np.zeros((1, 2)), "displacement": np.ones((4, 1))}
+    np.savez(tmp_path / "responses.npz", **arrays, **{"point-kernel": np.ones((4, 1))})
+    with pytest.raises(ValueError, match="no motion"):
+        read(tmp_path / "responses.npz")

@@ -336,11 +336,11 @@ def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch)
 
 def test_tables_have_units_and_places_in_their_headers(page):
     rows = (page / "data/skin-slab_probes.csv").read_text().splitlines()
-    assert rows[0].startswith('"time, s","displacement at (0, 0) mm, m"')
+    assert rows[0].startswith('t [s],"displacement(0,0) [m]"')
     values = np.loadtxt(rows[1:], delimiter=",")
     kept = np.load(page / "data/skin-slab_probes.npz")
     np.testing.assert_allclose(values[:, 1:], kept["displacement"], rtol=1e-7, atol=1e-18)
-    assert '"pressure at (0, 0) mm, Pa"' in (page / "data/point-kernel_probes.csv").read_text()
+    assert '"pressure(0,0) [Pa]"' in (page / "data/point-kernel_probes.csv").read_text()
 
 
 def test_a_sound_has_the_scale_in_its_name(seen, page):
