@@ -274,6 +274,24 @@ def test_intervals_hold_the_truth_however_close_the_lines_and_steep_the_noise(co
     assert 0.6 < min(ratios) < max(ratios) < 1.5
 
 
+def test_a_short_record_has_errors_and_no_lines_where_there_are_none():
+    """0.1 s in which a load has 41 lines, 1.4 resolutions apart, and the motion two of them."""
+    rate, f = 1e4, 18.59 * np.arange(1, 42)
+    times = np.arange(1000) / rate
+    moving = np.zeros((41, 1))
+    moving[[6, 13], 0] = 1.0, 0.1
+    rng = np.random.default_rng(16)
+    record = Measurement(
+        quantity="velocity", places=np.zeros((1, 2)), times=times,
+        values=(waveforms(moving, f, times) + 0.01 * rng.normal(size=(1000, 1)))[None],
+    )  # fmt: skip
+    found = lines_of(record, f)
+    assert np.isfinite(found.variance).all()
+    assert np.flatnonzero(holm(significances(found.mean, found))[:, 0] < 0.05).tolist() == [6, 13]
+    white = np.sqrt(found.variance / (4 * 0.01**2 / 750))
+    assert 0.8 < np.median(white) < 2.5
+
+
 def test_a_gain_that_changes_between_repetitions_is_in_the_errors():
     rng = np.random.default_rng(15)
     record = noisy(rng, SPACED[5.0], "white", 3)

@@ -95,6 +95,38 @@ def test_errors_are_larger_beside_what_is_no_steady_line():
     assert abs(found[0].frequency - 60) < 3 * found[0].error
 
 
+@pytest.mark.parametrize("seconds", [0.1, 0.5])
+@pytest.mark.parametrize("decay", [0.005, 0.02, 0.1])
+def test_lines_of_a_motion_from_rest_are_within_their_errors(seconds, decay):
+    """Two lines, and a free vibration of as much that starts them from rest."""
+    t = np.arange(round(1e4 * seconds)) / 1e4
+    own = np.cos(2 * np.pi * 118 * t) + 0.3 * np.sin(2 * np.pi * 61 * t)
+    x = (
+        np.cos(2 * np.pi * 130 * t)
+        + 0.1 * np.cos(2 * np.pi * 260 * t + 1)
+        - own * np.exp(-t / decay)
+    )
+    found = spectral_lines(x[None, :, None], 1e4)
+    assert found.begun >= (0.025 if decay < 0.1 or seconds > 0.1 else 0.0)
+    assert [line.frequency for line in found.lines] == pytest.approx([130, 260], abs=20)
+    for line, true in zip(found.lines, (130, 260), strict=True):
+        assert np.isfinite(line.error)
+        assert abs(line.frequency - true) < 2 * line.error
+
+
+def test_round_off_has_no_lines():
+    """A harmonic rounded to nine digits, and a constant with rounding errors alone."""
+    t = np.arange(1000) / 1e4
+    x = np.cos(2 * np.pi * 130 * t)
+    rounded = np.array([float(f"{value:.9g}") for value in x])
+    (line,) = spectral_lines(rounded[None, :, None], 1e4).lines
+    assert line.frequency == pytest.approx(130, abs=1e-3)
+    assert 0 < line.error < 0.1
+    still = 1e-6 + 1e-22 * np.random.default_rng(0).integers(-2, 3, 1000)
+    still += 1e-21 * np.cos(2 * np.pi * 111 * t)
+    assert not spectral_lines(still[None, :, None], 1e4).lines
+
+
 def lines(*frequencies):
     return [SpectralLine(frequency=f, error=2e-3, amplitudes=np.ones(1), false_alarm=0.0)
             for f in frequencies]  # fmt: skip

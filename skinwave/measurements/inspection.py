@@ -79,6 +79,8 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     kept, samples, said = _kept(measured, constant)
     spectrum = _spectrum(measured, kept, samples, alarm)
     noise = np.full(len(kept), np.nan)
+    if spectrum is not None and spectrum.begun:
+        said.append(f"the first {spectrum.begun:.3g} s are not steady and left out of the lines")
     if spectrum is not None:
         noise = np.sqrt(np.median(spectrum.floor[LOWEST:-1], axis=0))
     return Inspection(
@@ -154,7 +156,7 @@ def _origins(measured: Measurement, spectrum: LineSpectrum | None, samples: int)
     if spectrum is None:
         return ()
     driven: tuple[SpectralLine, ...] = ()
-    duration = samples / measured.rate if not measured.is_spectrum else np.inf
+    duration = samples / measured.rate - spectrum.begun if not measured.is_spectrum else np.inf
     if len(measured.drive) >= samples and not measured.is_spectrum and np.ptp(measured.drive) > 0:
         driven = spectral_lines(
             measured.drive[None, :samples, None], measured.rate, alarm=ALARM

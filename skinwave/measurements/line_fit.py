@@ -15,7 +15,8 @@ from scipy.optimize import minimize_scalar
 
 from simple_model.trajectory import Floats
 
-STEPS = 3  # of Gauss and Newton
+STEPS = 12  # of Gauss and Newton, at most
+SMALL = 0.01  # of a standard error, or of the farthest step: a step that is the last
 FARTHEST = 0.5  # 1/T, of a step
 BLOCKS = 64  # that a waveform is averaged in, turned back by a line's frequency
 MOST = 32  # waveforms that a first frequency is read from
@@ -79,9 +80,11 @@ def fitted(x: Floats, start: Floats, rate: float, noise: Floats, fresh: int = 0)
     for k in range(len(found) - fresh, len(found)):
         found[k] = _nearest_peak(rest, own[k], found[k], rate, 1 / noise[k])
     for _ in range(STEPS):
-        step, _, _ = _step(x, found, rate, noise)
+        step, errors, _ = _step(x, found, rate, noise)
         limit = FARTHEST * rate / len(x)
         found = np.clip(found + np.clip(step, -limit, limit), limit, rate / 2 - limit)
+        if (np.abs(step) < SMALL * np.minimum(errors, limit)).all():
+            break
     _, errors, last = _step(x, found, rate, noise)
     rest = without(x, found, last, rate)
     return LineFit(frequencies=found, errors=errors, amplitudes=_complex(last), rest=rest)

@@ -28,6 +28,7 @@ Complex = np.ndarray
 
 DISAGREES = 1e-3  # chance below which repetitions of a line vary by other than the noise floor
 BESIDE = 2  # bins of a spectrum beside a line, which may have some of it
+FEWEST_CLEAR = 4  # bins of a spectrum without lines, of which a noise is told
 POOLED = 4.0  # degrees of freedom that the mean over places counts as where there is no floor
 FEWEST_BINS = 16  # of a spectrum, fewer are single lines
 NEAREST = 1.0  # Hz, within which a spectrum must have a line
@@ -251,11 +252,11 @@ def _of_spectra(
     """The same of the nearest bins of spectra, with a floor where they are equally spaced."""
     axis, values = measurement.frequencies, measurement.values
     nearest = np.abs(frequencies[:, None] - axis).argmin(axis=1)
-    shape = len(frequencies), values.shape[2]
-    if not bin_width(measurement):
-        return values[:, nearest], np.full(shape, np.nan), np.ones(shape[0]), None
     kept = np.ones(len(axis))
-    kept[np.abs(np.arange(len(axis))[:, None] - nearest).min(axis=1) <= BESIDE] = 0.0
+    kept[np.abs(np.arange(len(axis))[:, None] - nearest).min(axis=1, initial=9) <= BESIDE] = 0.0
+    if not bin_width(measurement) or kept[1:].sum() < FEWEST_CLEAR:
+        unknown = np.full((len(frequencies), values.shape[2]), np.nan)
+        return values[:, nearest], unknown, np.ones(len(frequencies)), None
     floor = floor_of((np.abs(values) ** 2).mean(axis=0), len(values), kept)
     return (
         values[:, nearest], floor[nearest] / len(values), freedom(len(values), kept)[nearest], None

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.special import fdtrc, gammaincinv, gammaln
 
 from simple_model.trajectory import Floats
@@ -53,8 +54,9 @@ def freedom(runs: int, kept: Floats) -> Floats:
 
 
 def _telling(kept: Floats) -> np.ndarray:
-    """Bins with enough of the noise, of which there are at least half of all."""
-    return 1 + np.flatnonzero(kept[1:] >= min(LEAST_KEPT, float(np.median(kept[1:]))))
+    """Bins with enough of the noise, of which there are at least half of those about any."""
+    least = np.minimum(LEAST_KEPT, median_filter(kept, 2 * FEWEST + 1))
+    return 1 + np.flatnonzero((kept[1:] >= least[1:]) & (kept[1:] > 0))
 
 
 def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
