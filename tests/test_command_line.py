@@ -4,14 +4,12 @@ import csv
 import json
 import os
 import re
-import signal
-import subprocess
 import sys
 from argparse import Namespace
 
 import numpy as np
 import pytest
-from corpus import GOOD, SILENT_GROUND, SMALL
+from corpus import GOOD, SMALL
 
 from skinwave.cli import main, parser
 from skinwave.commands.common import progress_of
@@ -187,26 +185,21 @@ def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal)
         ]  # fmt: skip
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
-def test_ctrl_c_leaves_what_is_finished(tmp_path, monkeypatch):
-    """Kernels on no body first, then paper and skin: the second is interrupted."""
-    monkeypatch.setenv("SKINWAVE_CACHE", "")  # or no body is left to reduce
-    (tmp_path / "none.toml").write_text(SILENT_GROUND)
-    command = [sys.executable, "-m", "skinwave", "compare", "none.toml", "--h", "8"]
-    command += ["--out", str(tmp_path / "cut")]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
-        assert process.stderr is not None
-        for line in process.stderr:  # phases are named, a line each
-            if line.startswith("skin-slab: assemble"):
-                process.send_signal(signal.SIGINT)
-                break
-        process.stderr.read()
-    assert process.returncode == 1
-    page = (tmp_path / "cut/index.html").read_text()
-    assert "Interrupted: 2 of 4 runs" in page
-    found = sorted((tmp_path / "cut").glob("*/*/responses.npz"))
+@pytest.mark.usefixtures("in_one_process")
+def test_ctrl_c_leaves_what_is_finished(scene, monkeypatch, capsys):
+    """Both kernels are finished before the body is reduced."""
+    scene.write_text(CLAMPED)
+    monkeypatch.setattr("skinwave.studies.study.prepare", interrupted)
+    assert main(["compare", str(scene), "--h", "8", "--out", "cut", "--quiet"]) == 1
+    page = (scene.parent / "cut/index.html").read_text()
+    assert "Interrupted: 2 of 3 runs" in page
+    found = sorted((scene.parent / "cut").glob("*/*/responses.npz"))
     assert [path.parent.name for path in found] == ["point-kernel", "point-kernel-published"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut", "none.toml"]
+    assert sorted(path.name for path in scene.parent.iterdir()) == ["cut", "short.toml"]
+
+
+def interrupted(*given, **options):
+    raise KeyboardInterrupt
 
 
 def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, monkeypatch):

@@ -6,13 +6,15 @@ import json
 import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
-import time
+from itertools import count, cycle
+from pathlib import Path
+from pkgutil import resolve_name
 
 import corpus
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from meshes import cache
@@ -24,9 +26,9 @@ from skinwave.scene import BODIES
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(sys.platform == "win32", reason="signals and limits differ"),
+    pytest.mark.skipif(sys.platform == "win32", reason="no fork, other limits"),
 ]
-BEGUN = ("*/*/responses.npz", "figures")  # what is there when a comparison is killed
+HERE = (Path(__file__).parent, Path(__file__).parents[1])
 PLANNED = Plan(model="flat-body", body=BODIES["skin-slab"])
 COMPARE = [sys.executable, "-m", "skinwave", "compare", "good.toml", "--h", "6", "--out", "out"]
 
@@ -50,54 +52,151 @@ def opens(folder):
         elif path.suffix == ".csv":
             rows = list(csv.reader(path.read_text().splitlines()))
             assert len(rows) > 1
-            assert {len(row) for row in rows} == {len(rows[0])}
+            assert {len(row) for row in rows if row[0][:1] != "#"} == {len(rows[-1])}
         elif path.suffix == ".html":
             assert path.read_text().rstrip().endswith("</html>")
         elif path.suffix == ".toml":
             read(path)
+        elif path.suffix == ".parquet":
+            assert pq.read_table(path).num_rows == 1
         else:
             assert path.read_bytes().endswith(b"IEND\xaeB`\x82"), path
     return bool(files)
 
 
-def finished(partial):
-    """Folders of the runs that were finished before a kill."""
-    return [p for p in partial.glob("*/*") if p.is_dir() and ".partial-" not in p.name]
+KERNEL = ["--model", "point-kernel", "--quiet"]
+RUN = ["run", "good.toml", *KERNEL, "--tolerance", "0.9"]
+SWEEP = ["sweep", "good.toml", *KERNEL, "--vary", "tacton.am_frequency_hz=100,150,200",
+         "--scheduler", "threads", "--out", "out"]  # fmt: skip
+# Commands, and at which call of what their process dies, by the folder in which it does.
+DEATHS = {
+    "half a file": ([*RUN, "--out", "out"], "pathlib.Path.write_text", 1),
+    "between renames": ([*RUN, "--out", "over", "--overwrite"], "pathlib.Path.rename", 2),
+    "after three runs": ([*COMPARE[3:], "--quiet"], "csv.writer", 4),
+    "a row": (SWEEP, "os.link", 2),
+}
+# Each in a process of its own, which has loaded what all of them need.
+DIE = """
+import json, os, sys
+from pkgutil import resolve_name
+import skinwave.studies.study as study
+from conftest import Here
+from contextlib import nullcontext
+from skinwave.cli import main
 
+def die(inner, last, calls=[]):
+    def called(*given, **options):
+        calls.append(given)
+        if len(calls) < last:
+            return inner(*given, **options)
+        if inner.__name__ == "write_text":
+            inner(given[0], given[1][: len(given[1]) // 2])
+        os._exit(9)
+    return called
 
-def started(**where):
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    return subprocess.Popen([*COMPARE, "--overwrite"], **quiet, **where)
+study.helper = lambda: nullcontext(Here())
+for folder, (words, what, last) in json.loads(sys.argv[1]).items():
+    if not (child := os.fork()):
+        os.chdir(folder)
+        owner, _, name = what.rpartition(".")
+        setattr(resolve_name(owner), name, die(resolve_name(what), last))
+        main(words)
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9, folder
+"""
 
 
 @pytest.mark.usefixtures("in_one_process")
-def test_a_killed_comparison_leaves_whole_parts_and_runs_again(folder, monkeypatch):
-    rng = random.Random(corpus.SEED)
-    monkeypatch.setenv("SKINWAVE_CACHE", str(folder / "cache"))
-    marked(folder / "out")
-    for sign in BEGUN:
-        shutil.rmtree(folder / "cache", ignore_errors=True)
-        if sign == BEGUN[-1]:  # nothing there before
-            shutil.rmtree(folder / "out", ignore_errors=True)
-        before = (folder / "out").exists()
-        with started() as process:
-            while process.poll() is None and not [*folder.glob(f"out.partial-*/{sign}")]:
-                time.sleep(0.01)
-            time.sleep(rng.uniform(0.0, 0.2))
-            process.send_signal(signal.SIGKILL)
-        if (folder / "out").exists():
-            assert opens(folder / "out")
-            assert (folder / "out/index.html").exists()
-        elif before:  # between two renames, and whole
-            (kept,) = folder.glob("out.replaced-*/out")
-            assert opens(kept)
-            kept.rename(folder / "out")
-        for left in folder.glob("out.partial-*"):
-            assert all(map(opens, finished(left)))
-            shutil.rmtree(left)
-    assert main([*COMPARE[3:], "--overwrite", "--quiet"]) == 0
-    assert opens(folder / "out")
-    assert not [*folder.glob("out.partial-*")]
+def test_a_process_that_dies_leaves_whole_parts_and_runs_again(folder, monkeypatch):
+    for name in DEATHS:
+        (folder / name).mkdir()
+        (folder / name / "good.toml").write_text(corpus.GOOD)
+        marked(folder / name / "over")
+    earlier = corpus.contents(folder / "a row/over")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([*map(str, HERE), *sys.path])}
+    words = [sys.executable, "-c", DIE, json.dumps(DEATHS)]
+    subprocess.run(words, check=True, env=environment)
+    for name, (command, _, _) in DEATHS.items():
+        monkeypatch.chdir(folder / name)
+        place = folder / name
+        if name == "between renames":
+            (kept,) = place.glob("over.replaced-*/over")
+            kept.rename(place / "over")
+        assert {p.relative_to(place) for p in (place / "over").rglob("*")} == {
+            p.relative_to(folder / "a row") for p in earlier
+        }
+        assert opens(place / "over")
+        # Of a command that writes at its end nothing has its name; a sweep has its finished rows.
+        assert (place / "out").exists() == (name == "a row")
+        runs = [
+            left
+            for left in place.glob("out.partial-*/*/*")
+            if left.is_dir() and ".partial-" not in left.name
+        ]
+        assert len(runs) == (3 if name == "after three runs" else 0)
+        assert all(map(opens, runs))
+        assert main(command) == 0
+        assert opens(place / command[command.index("--out") + 1])
+    assert len(list((folder / "a row/out/rows").glob("part-*.parquet"))) == 3
+
+
+ENDED = {
+    "run": [*RUN, "--out", "out"],
+    "run over": [*RUN, "--out", "over", "--overwrite"],
+    "convert": ["convert", "good.toml", "out.csv", "--quiet"],
+    "sweep": [*SWEEP, "--csv"],
+}
+WRITES = ("numpy.savez", "os.replace", "os.link", "pathlib.Path.rename", "pathlib.Path.mkdir",
+          "pathlib.Path.write_text", "csv.writer")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ENDED)
+def test_what_ends_a_command_as_it_writes_leaves_its_result_whole_or_absent(
+    folder, monkeypatch, name
+):
+    """Ctrl-C or SIGTERM at the first, second, ... call of each function that writes."""
+    (folder / "notes.partial").mkdir()
+    (folder / "notes.partial/note.txt").write_text("mine")
+    ends = cycle([(KeyboardInterrupt, 1), (SystemExit, None)])
+    for what in WRITES:
+        inner = resolve_name(what)
+        for last in count(1):
+            shutil.rmtree(folder / "over", ignore_errors=True)
+            marked(folder / "over")
+            before, calls, (raised, code) = corpus.contents(folder), [], next(ends)
+
+            def ended(*given, inner=inner, calls=calls, last=last, raised=raised, **options):
+                calls.append(given)
+                if len(calls) == last:
+                    raise raised
+                return inner(*given, **options)
+
+            with monkeypatch.context() as patch:
+                patch.setattr(what, ended)
+                try:
+                    found = main(ENDED[name])
+                except SystemExit as error:
+                    found = error.code
+            if len(calls) < last:
+                assert found == 0
+            else:
+                assert found == code
+            now = corpus.contents(folder)
+            kept = {path: now.get(path) for path in before}
+            if kept != before:  # the new result is there, and whole
+                assert name == "run over"
+                assert (folder / "over/responses.npz").exists()
+            assert opens(folder / "over")
+            for path in {path for path in folder.iterdir() if path not in before}:
+                assert raised is KeyboardInterrupt or path.name in ("out", "out.csv")
+                if path.is_dir():
+                    opens(path)
+                    shutil.rmtree(path)
+                else:
+                    assert path.stat().st_size
+                    path.unlink()
+            if len(calls) < last:
+                break
 
 
 def test_a_killed_run_leaves_nothing_that_stops_the_next(folder, capsys):

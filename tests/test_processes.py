@@ -1,4 +1,4 @@
-"""Hostile working folders have no effect on commands; and processes end with those they serve."""
+"""Hostile working folders have no effect on commands; functions in processes of their own."""
 
 import os
 import shutil
@@ -6,23 +6,23 @@ import signal
 import subprocess
 import sys
 import sysconfig
-import time
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import corpus
+import numpy as np
 import pytest
-from test_ended_anywhere import hand
 from threadpoolctl import ThreadpoolController, threadpool_info
 
+import meshes
 import skinwave
 from meshes import subprocess_call
+from meshes.shapes import palm
 from skinwave.effort import one_thread
-from skinwave.processes import as_part, ended_by_signals, environment, pool, side_by_side
+from skinwave.processes import ended_by_signals, environment, side_by_side
 from skinwave.sweeps import engine
 
 ROOT = Path(skinwave.__file__).parents[1]
@@ -31,19 +31,30 @@ THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich",
          "trame", "trame_pyvista", "packaging", "pooch", "tornado", "aiohttp")  # fmt: skip
 OURS = ("fem", "meshes", "simple_model")
 MARK = "with open({0!r}, 'a') as file:\n    file.write(__name__ + chr(10))\n"
-# An extension: the program itself, as it was started, does these commands before its own.
+# An extension: the program itself, as it was started, does these commands before its own. Those
+# that take minutes are interrupted once a process that they start has loaded its libraries.
 IN_TURN = """
 import os
 import sys
+from contextlib import contextmanager
+from skinwave import processes
 from skinwave.cli import main
+from skinwave.sweeps import engine
 del os.environ["SKINWAVE_EXTENSIONS"]
+whole = processes.pool
+
+@contextmanager
+def interrupted(*given):
+    with whole(*given) as executor:
+        executor.submit(exec, "import skinwave.simulation").result()
+        raise KeyboardInterrupt
+
 for words, code in {0!r}:
+    processes.pool = engine.pool = interrupted if code == 1 else whole
     assert main(words) == code, words
     assert os.getcwd() not in map(os.path.abspath, sys.path), words
 """
-QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
-LOOKED_UP = pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="looks processes up")
 
 
 def loaded_before_us():
@@ -75,38 +86,19 @@ def hostile(request, tmp_path):
     return command, place, ran
 
 
-def run_there(hostile, *arguments, code=0, threads="1", until=None):
-    """Output of a command there; it may be told to end when one of these processes works."""
+def run_there(hostile, *arguments, threads="1"):
+    """Output of a command there."""
     command, place, ran = hostile
     env = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), threads)
     env |= {"TMPDIR": str(place.parent)}
-    process = subprocess.Popen(
+    ended = subprocess.run(
         [*command, *arguments], cwd=place, env=env, stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE, text=True,
+        stderr=subprocess.PIPE, text=True, check=False,
     )  # fmt: skip
-    if until is not None and works(process, until):
-        process.terminate()
-        code = 143
-    said = process.communicate()[1]
-    assert process.returncode == code, said
+    assert ended.returncode == 0, ended.stderr
     assert not ran.exists(), ran.read_text()
-    return said
-
-
-def itself(number):
-    return [number]
-
-
-def works(process, which):
-    """Wait until one of a command's processes has loaded its libraries; False if it has ended."""
-    while process.poll() is None:
-        for number in which(process.pid):
-            with suppress(OSError):
-                if "_sparsetools" in Path(f"/proc/{number}/maps").read_text():  # of scipy
-                    time.sleep(1)
-                    return True
-        time.sleep(0.05)
-    return False
+    assert "no_such_key" not in ended.stderr
+    return ended.stderr
 
 
 def settle(hostile):
@@ -118,29 +110,35 @@ def settle(hostile):
 def test_nothing_of_a_hostile_folder_is_imported_or_set(hostile):
     settle(hostile)
     run_there(hostile, "--version")
-    said = run_there(hostile, "compare", "small.toml", "--h", "10", "--out", "both", "--quiet")
-    assert "no_such_key" not in said
+    run_there(hostile, "run", "small.toml", "--h", "10", "--out", "out", "--quiet")
+
+
+def hand(path):
+    """Write the surface of a palm, m."""
+    import pyvista
+
+    found = palm.surface(meshes.Palm(), 6e-3)
+    corners = np.insert(found.triangles, 0, 3, axis=1)
+    pyvista.PolyData(found.points, corners.ravel()).save(path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hostile", [as_module], indirect=True)
 def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_path, monkeypatch):
-    """Those that take minutes, or are run to their end by another test, are told to end when a
-    process of their own works; those that start none are in one process.
+    """All in one process, but for those that they start. `validate` and `verify` start none, and
+    take minutes.
     """
     from skinwave.cli import COMMANDS
 
     settle(hostile)
-    run_there(hostile, "--version")
     (beside := tmp_path / "beside").mkdir()
     small = ["small.toml", "--h", "10", "--quiet"]
-    hand(hostile[1] / "body.stl", 6e-3)
+    hand(hostile[1] / "body.stl")
     (hostile[1] / "wave.csv").write_text("t [s], v(0,0) [m/s]\n0, 1\n1, 2\n")
     asked = {
         "run": [*small, "--out", "out"],
         "plan": ["small.toml"],
         "same": ["out", "out"],
-        "rerun": ["out", "--quiet"],
         "compare": [*small, "--out", "both"],
         "sweep": [*small, "--vary", "tacton.am_frequency_hz=100,150", "--model", "fem", "--out",
                   "swept", "--workers", "1"],
@@ -158,28 +156,19 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_pat
         "dispersion": ["small.toml", "--quiet"],
         "map": ["small.toml", "--step", "10", "--quiet"],
         "tradeoff": ["small.toml", "--quiet"],
-        "verify": ["--quick", "--quiet"],
-        "validate": ["--quiet"],
     }  # fmt: skip
-    assert set(COMMANDS) == {*asked, "web"}  # which has a test of its own
-    until = {
-        "compare": below, "rerun": below, "infer": itself, "relax": below, "tradeoff": below,
-        "validate": itself, "verify": itself,
-    }  # fmt: skip
-    refused = ("film", "fit")  # no report is there, and no motion measured
-    in_turn = [([name, *asked[name]], 2 if name in refused else 0)
-               for name in asked if name not in until]  # fmt: skip
+    assert set(COMMANDS) == {*asked, "rerun", "validate", "verify", "web"}
+    codes = dict.fromkeys(("compare", "infer", "relax", "tradeoff"), 1)
+    codes |= {"film": 2, "fit": 2}  # no report is there, and no motion measured
+    in_turn = [([name, *words], codes.get(name, 0)) for name, words in asked.items()]
     in_turn.append((["run", "nothing.toml"], 2))
-    monkeypatch.setenv("SKINWAVE_EXTENSIONS", "in_turn")
-    monkeypatch.setenv("PYTHONPATH", str(beside), prepend=os.pathsep)
     (beside / "in_turn.py").write_text(IN_TURN.format(in_turn))
-    said = run_there(hostile, "doctor")
-    monkeypatch.undo()
-    assert "no_such_key" not in said
-    for name, end in until.items():
-        threads = "2" if name == "rerun" else "1"  # which then needs a process of its own
-        said = run_there(hostile, name, *asked[name], threads=threads, until=end)
-        assert "no_such_key" not in said, name
+    with monkeypatch.context() as patch:
+        patch.setenv("SKINWAVE_EXTENSIONS", "in_turn")
+        patch.setenv("PYTHONPATH", str(beside), prepend=os.pathsep)
+        run_there(hostile, "doctor")
+    # With as many threads as its record does not have, in a process of its own.
+    run_there(hostile, "rerun", "out", "--quiet", threads="2")
 
 
 def test_a_script_elsewhere_starts_processes_without_the_working_folder(tmp_path):
@@ -217,25 +206,10 @@ def test_a_program_finds_these_packages_and_says_what_it_printed(tmp_path):
         "import meshes, os; print(meshes.__file__, os.environ['A'])"
     )
     said = subprocess_call.run(
-        tmp_path / "script.py", folder=tmp_path, timeout=60,
+        tmp_path / "script.py", folder=tmp_path, timeout=600,
         environment={"PYTHONPATH": "", "A": "one"},
     )  # fmt: skip
     assert said == f"{subprocess_call.__file__.replace('subprocess_call', '__init__')} one\n"
-
-
-def test_a_pool_ends_its_own_processes_only():
-    """A page computes a response while it has a report drawn."""
-    with pool(1, as_part) as other:
-        number = other.submit(os.getpid).result()
-        beside = get_context("spawn").Process(target=time.sleep, args=(60,), daemon=True)
-        beside.start()
-    try:
-        assert beside.is_alive()
-        with pytest.raises(ProcessLookupError):
-            os.kill(number, 0)
-    finally:
-        beside.kill()
-        beside.join()
 
 
 def test_calls_side_by_side_are_apart_and_wait_for_what_they_must():
@@ -296,20 +270,6 @@ def test_a_signal_ends_all_whatever_it_is_taken_for(raised):
 
 
 @POSIX
-def test_a_signal_that_is_lost_comes_again(monkeypatch):
-    monkeypatch.setattr("skinwave.processes.AGAIN", 0.05)
-    went_on = []
-
-    def work():
-        taken_for(None)
-        time.sleep(10)
-        went_on.append(True)
-
-    assert ended(work) == 143
-    assert not went_on
-
-
-@POSIX
 def test_an_ignored_signal_stays_ignored():
     """As under nohup."""
     handled = signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -319,128 +279,6 @@ def test_an_ignored_signal_stays_ignored():
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, handled)
-
-
-def below(process):
-    """Numbers of the processes that a process has started, and of those that they have."""
-    try:
-        folders = Path(f"/proc/{process}/task").iterdir()
-        found = [int(n) for folder in folders for n in (folder / "children").read_text().split()]
-    except OSError:
-        return []
-    return found + [n for child in found for n in below(child)]
-
-
-def alive(number):
-    try:
-        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
-def gone(numbers, patience=10.0):
-    """Wait for the end of these processes; those that are left after a while."""
-    last = time.monotonic() + patience
-    while (left := [n for n in numbers if alive(n)]) and time.monotonic() < last:
-        time.sleep(0.05)
-    return left
-
-
-def works_at(process, what):
-    """Wait until a script with this name runs below a process; all that run there."""
-    last = time.monotonic() + 90
-    while time.monotonic() < last and process.poll() is None:
-        numbers = below(process.pid)
-        for number in numbers:
-            try:
-                if what in Path(f"/proc/{number}/cmdline").read_text():
-                    return numbers
-            except OSError:
-                pass
-        time.sleep(0.05)
-    raise AssertionError(f"{what} never ran; {process.poll()}")
-
-
-MESHING = "import meshes; meshes.palm_mesh(meshes.Palm(), 3e-3)"
-ASIDE = (
-    "from skinwave.processes import {0}, ended_by_signals\n"
-    "import meshes\nif __name__ == '__main__':\n    with ended_by_signals():\n        {1}"
-)
-CALLS = {
-    "here": ASIDE.format("apart", "meshes.palm_mesh(meshes.Palm(), 3e-3)"),
-    "apart": ASIDE.format("apart", "apart(meshes.palm_mesh, meshes.Palm(), 3e-3)"),
-    "helper": ASIDE.format("helper", "with helper() as aside:\n            "
-                           "aside.submit(meshes.palm_mesh, meshes.Palm(), 3e-3).result()"),
-    "side_by_side": ASIDE.format(
-        "side_by_side",
-        "call = functools.partial(meshes.palm_mesh, meshes.Palm(), 3e-3)\n        "
-        "list(side_by_side([call], bool, bool))",
-    ).replace("import meshes", "import functools, meshes"),
-}  # fmt: skip
-# Processes of `apart` and of `helper` begin and end alike, by `as_part`.
-ENDS = [
-    ("here", signal.SIGTERM),
-    ("here", signal.SIGINT),
-    ("here", signal.SIGKILL),
-    ("apart", signal.SIGINT),
-    ("helper", signal.SIGTERM),
-    ("side_by_side", signal.SIGINT),
-    ("helper", signal.SIGKILL),
-]
-
-
-@pytest.fixture
-def interruptible():
-    """Interrupts are not ignored, as they are in a background job and what it starts."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.slow
-@LOOKED_UP
-@pytest.mark.usefixtures("interruptible")
-@pytest.mark.parametrize(("call", "number"), ENDS)
-def test_a_mesher_ends_with_what_asked_for_it(tmp_path, call, number):
-    places = [tmp_path / name for name in ("work", "temporary")]
-    for place in places:
-        place.mkdir()
-    (tmp_path / "script.py").write_text(CALLS[call])
-    env = os.environ | {"SKINWAVE_CACHE": "", "TMPDIR": str(places[1])}
-    words = [sys.executable, str(tmp_path / "script.py")]
-    with subprocess.Popen(words, cwd=places[0], env=env, **QUIET) as parent:
-        numbers = works_at(parent, "tetwild_child.py")
-        time.sleep(1)
-        parent.send_signal(number)
-        code = parent.wait(30)
-    assert not gone(numbers)
-    assert code == {signal.SIGTERM: 143, signal.SIGINT: -2, signal.SIGKILL: -9}[number]
-    if number != signal.SIGKILL:
-        assert not list(places[1].iterdir())
-
-
-@pytest.mark.slow
-@LOOKED_UP
-@pytest.mark.usefixtures("interruptible")
-def test_a_rerun_hands_on_what_ends_it(tmp_path):
-    """In a process with as many threads as the record has."""
-    (tmp_path / "good.toml").write_text(corpus.GOOD)
-    words = [sys.executable, "-m", "skinwave"]
-    run = ["run", "good.toml", "--h", "3", "--model", "fem-transient", "--quiet", "--no-cache"]
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    asked = os.environ | threads | {"TMPDIR": str(tmp_path / "temporary")}
-    (tmp_path / "temporary").mkdir()
-    subprocess.run([*words, *run, "--out", "out"], cwd=tmp_path, env=asked, check=True, **QUIET)
-    asked |= dict.fromkeys(threads, "2")
-    before = sorted(tmp_path.rglob("*"))
-    for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 1)):
-        with subprocess.Popen([*words, "rerun", "out"], cwd=tmp_path, env=asked, **QUIET) as again:
-            numbers = works_at(again, "rerun")
-            time.sleep(1.5)
-            again.send_signal(number)
-            assert again.wait(30) == code
-        assert not gone(numbers)
-        assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_threads_that_limit_linear_algebra_leave_it_as_it_was():

@@ -55,6 +55,8 @@ def run(options: argparse.Namespace) -> int:
     files.refuse_changed(options.out)
     table.enter_command(options.out, command)
     outcomes = _computed(options)
+    if not any(each.found + each.done + each.failed for each in outcomes.values()):
+        raise KeyboardInterrupt
     rows = files.write(options.out)
     said = conclusions(rows, stretched_table.read(options.out, rows))
     found, stretched = outcomes[table.HYPERCUBE], outcomes.get(stretched_table.PHASE)
