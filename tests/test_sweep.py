@@ -1,13 +1,12 @@
-"""Sweeps: which runs, each once, in one table, whatever runs them and whatever is killed."""
+"""Sweeps: which runs, each once, in one table, whatever runs them and whatever ends."""
 
 import csv
 import json
 import os
-import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ import pytest
 import fem.affine_solution
 import fem.reduced
 from simple_model import MovingPressure, Tacton
-from skinwave import extensions
 from skinwave.cli import main
 from skinwave.models.free_keys import free_keys, with_values
 from skinwave.pictures.styles import style
@@ -32,7 +30,6 @@ from skinwave.sweeps.variation import cases, cases_of, combinations, parse
 THREADS = ["--scheduler", "threads", "--quiet"]
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
 FOREARM = Path(__file__).parent.parent / "examples/speed-on-forearm.toml"
-not_on_windows = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 
 
 def varied(*texts):
@@ -566,41 +563,16 @@ def same(first, second):
                 assert row[name] == other[name], name
 
 
-def environment():
-    """Workers find this checkout, whatever is installed, and the model that waits."""
-    here = Path(__file__).parent
-    path = os.pathsep.join(map(str, (here.parent, here)))
-    own = {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", extensions.VARIABLE: "waiting"}
-    return os.environ | own
+@pytest.fixture
+def address(monkeypatch):
+    """The address of a Dask scheduler with two workers, each a process."""
+    from distributed import LocalCluster
 
-
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory):
-    """The address of a Dask scheduler with two workers, each a process, and these. A test that
-    kills one leaves the other.
-    """
-    folder = tmp_path_factory.mktemp("cluster")
-    file = folder / "scheduler.json"
-    named = ["--scheduler-file", str(file), "--no-dashboard"]
-
-    def start(program, *arguments):
-        command = [sys.executable, "-m", f"distributed.cli.{program}", *named, *arguments]
-        return subprocess.Popen(
-            command, env=environment(), cwd=folder, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-
-    started = [start("dask_scheduler", "--port", "0")]
-    while not file.exists() or not file.stat().st_size:
-        assert started[0].poll() is None
-        time.sleep(0.1)
-    started += [start("dask_worker", "--no-nanny", "--nthreads", "1") for _ in range(2)]
-    try:
-        yield json.loads(file.read_text())["address"], started[1:]
-    finally:
-        for process in started[::-1]:
-            process.kill()
-            process.wait()
+    path = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
+    monkeypatch.setenv("PYTHONPATH", path)  # workers find this checkout, whatever is installed
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        yield cluster.scheduler_address
 
 
 VARY = ["--vary", "tacton.speed_m_per_s=4,6", "tacton.am_frequency_hz=0,100"]
@@ -609,63 +581,62 @@ FEM = [*SMALL, "--model", "fem", "--h", "10", "--quiet"]
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Dask's own event loop
-def test_processes_and_a_cluster_give_the_same_table(scene, cluster, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", environment()["PYTHONPATH"])
+def test_processes_and_a_cluster_give_the_same_table(scene, address):
     sweep = ["sweep", "short.toml", *VARY, *FEM]
     assert main([*sweep, "--out", "here"]) == 0
-    assert main([*sweep, "--out", "there", "--scheduler", cluster[0]]) == 0
+    assert main([*sweep, "--out", "there", "--scheduler", address]) == 0
     same(dataset.read(Path("here")), dataset.read(Path("there")))
     short = replace(read(scene), body=Body(width=0.04, height=0.04, sides="clamped"))
-    with engine.mapped_on(cluster[0]) as mapped:
+    with engine.mapped_on(address) as mapped:
         spread = compute(short, "fem-harmonic", h=0.015, mapped=mapped).displacement
     here = compute(short, "fem-harmonic", h=0.015).displacement
     np.testing.assert_allclose(spread, here, rtol=1e-10, atol=1e-10 * abs(here).max())
-
-
-# A model that waits: how many rows there are when a process is killed depends on no load.
-RUNS = ["--vary", "tacton.speed_m_per_s=3:8:16", "--model", "waiting"]
-
-
-def driver(*arguments):
-    command = [sys.executable, "-m", "skinwave", "sweep", "short.toml", *RUNS, "--quiet",
-               "--out", "cut", *arguments]  # fmt: skip
-    return subprocess.Popen(command, env=environment(), stderr=subprocess.DEVNULL)
-
-
-def wait_for_rows(process, count):
-    while len(list(Path("cut/rows").glob("part-*.parquet"))) < count:
-        assert process.poll() is None
-        time.sleep(0.02)
 
 
 def whole(rows, count):
     assert len(rows) == len({row["key"] for row in rows}) == count
     assert len({row["tacton.speed_m_per_s"] for row in rows}) == count
     assert {row["status"] for row in rows} == {"done"}
-    parts = Path("cut/rows").glob("part-*.parquet")
+    parts = Path("short-sweep/rows").glob("part-*.parquet")
     assert sum(pq.read_metadata(part).num_rows for part in parts) == count
 
 
-@pytest.mark.slow
-@not_on_windows
-def test_killed_workers_and_drivers_lose_no_row_and_double_none(scene, cluster):
-    address, workers = cluster
-    with driver("--scheduler", address) as process:
-        wait_for_rows(process, 2)
-        workers[0].kill()
-        wait_for_rows(process, 4)
-        process.kill()
-    before = len(dataset.names(Path("cut")))
-    assert 4 <= before < 16
-    with driver("--workers", "2") as process:
-        wait_for_rows(process, before + 2)
-        process.send_signal(signal.SIGINT)
-        assert process.wait() == 1
-    between = len(dataset.names(Path("cut")))
-    assert before < between < 16
-    with driver("--scheduler", "threads") as process:
-        assert process.wait() == 0
-    whole(dataset.read(Path("cut")), 16)
+def test_an_interrupted_sweep_goes_on_without_a_row_lost_or_doubled(scene, monkeypatch, capsys):
+    """Ctrl-C as the fourth row is written."""
+    command = ["--vary", "tacton.speed_m_per_s=3:8:7", "--model", "point-kernel"]
+    inner, written = dataset.append, []
+
+    def interrupted(*given):
+        if len(written) == 3:
+            raise KeyboardInterrupt
+        written.append(given)
+        inner(*given)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(dataset, "append", interrupted)
+        assert main(["sweep", "short.toml", *command, *THREADS]) == 1
+    assert "interrupted; 4 runs are missing" in capsys.readouterr().err
+    whole(dataset.read(Path("short-sweep")), 3)
+    whole(swept(*command), 7)
+
+
+DYING = """
+import os
+def work(mark, item):  # the second item ends the process when it is first computed
+    if item == 1 and not mark.exists():
+        mark.touch()
+        os._exit(9)
+    return item
+"""
+
+
+def test_what_a_worker_was_at_when_it_died_is_done_again(tmp_path, monkeypatch):
+    (tmp_path / "dying.py").write_text(DYING)
+    monkeypatch.syspath_prepend(tmp_path)
+    work = partial(import_module("dying").work, tmp_path / "died")
+    found = {}
+    engine.run_all(work, range(4), "processes", 1, found.__setitem__)
+    assert found == {k: k for k in range(4)}
 
 
 def test_keys_of_0_2_are_varied_by_todays_names():
