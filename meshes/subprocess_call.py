@@ -15,7 +15,7 @@ from meshes.reading import on_disk
 from meshes.tetmesh import MeshError
 
 # Limits of what reads a file: of every megabyte that it takes on the disk, beside those of any.
-LEAST_SECONDS, SECONDS = 20.0, 1.0
+LEAST_SECONDS, SECONDS = 60.0, 1.0
 LEAST_BYTES, BYTES = 800_000_000, 20
 LARGEST = 2_000_000_000  # bytes of a file
 REFUSED = 3  # code of a script that said what is wrong with a file

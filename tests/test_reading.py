@@ -74,7 +74,8 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
     path.write_text(f"{node}*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n")
     with pytest.raises(MeshError, match="a.inp cannot be read"):
         meshes.read(path)
-    monkeypatch.setattr(subprocess_call, "LEAST_SECONDS", 0.05)
+    for name in ("LEAST_SECONDS", "SECONDS"):
+        monkeypatch.setattr(subprocess_call, name, 0.0)
     with pytest.raises(MeshError, match="reading it took longer than 0 s"):
         meshes.read(path)
     monkeypatch.setattr(subprocess_call, "LARGEST", 10)
@@ -86,8 +87,8 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
 def test_the_limit_of_memory_holds(tmp_path):
     (tmp_path / "hungry.py").write_text("x = bytearray(2_000_000_000)\n")
     with pytest.raises(MeshError, match="MemoryError"):
-        subprocess_call.run(tmp_path / "hungry.py", folder=tmp_path, timeout=60, memory=500e6)
-    subprocess_call.run(tmp_path / "hungry.py", folder=tmp_path, timeout=60, memory=4e9)
+        subprocess_call.run(tmp_path / "hungry.py", folder=tmp_path, timeout=600, memory=500e6)
+    subprocess_call.run(tmp_path / "hungry.py", folder=tmp_path, timeout=600, memory=4e9)
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def body_from_file(
     inner: Sequence[PathLike] = (),
     clip: Sequence[float] | None = None,
     sizing: Sizing | None = None,
-    timeout: float = 120.0,
+    timeout: float = 600.0,
     say: Say = _unsaid,
     progress: Progress = _unsaid,
 ) -> TetMesh:

@@ -18,7 +18,7 @@ def palm_mesh(
     h: float,
     *,
     sizing: Callable[[Floats], Floats] | None = None,
-    timeout: float = 120.0,
+    timeout: float = 600.0,
 ) -> TetMesh:
     """Ten-node tetrahedra of a palm whose boundary nodes lie on its true surface.
 

@@ -52,7 +52,7 @@ def tetrahedralise(
     *,
     inner: Mapping[str, Surface] = MappingProxyType({}),
     sizing: Sizing | None = None,
-    timeout: float = 120.0,
+    timeout: float = 600.0,
     epsilon: float | None = None,
 ) -> TetMesh:
     """Four-node tetrahedra that fill a closed surface, with facets in the surfaces inside it.

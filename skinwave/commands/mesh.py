@@ -24,7 +24,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="keep this patch, mm from the middle of the palm",
     )  # fmt: skip
     add_size(parser, default=4.0, help="element size, mm (4)")
-    parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="of the mesher")
+    parser.add_argument("--timeout", type=float, default=600.0, metavar="S", help="of the mesher")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.vtu", help="file to write")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
