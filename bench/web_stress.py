@@ -20,9 +20,9 @@ from typing import Any
 
 import aiohttp
 
+from bench.page_client import Client, Refused, browser, opened
 from bench.web_soak import COMMAND, family, held, read
 from skinwave.web.controls import CHOICES, NUMBERS, presets
-from tests.page_client import Client, Refused, browser, opened
 
 WARM = 0.3  # of the time, after which the server may not grow
 MOST = 50.0  # MB that it grows by at most

@@ -5,12 +5,10 @@ import json
 import re
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from queue import Queue
-from unittest.mock import AsyncMock, Mock
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -70,14 +68,6 @@ def nothing(phase, fraction):
     pass
 
 
-def ended(pid):
-    """Whether a process has ended, or only waits to be told so."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
-    except OSError:
-        return True
-
-
 @pytest.fixture(scope="module")
 def scene():
     """A short Tacton of AM and STM on the slab."""
@@ -90,47 +80,6 @@ def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch, capsys
         check_extra()
     assert main(["web"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no list of processes here")
-@pytest.mark.parametrize("way", ["cancel", "parent ends"])
-def test_what_is_cancelled_ends_with_all_that_it_has_started(way):
-    """A mesher, say, that the process waits for; also if the page's own process is killed."""
-    code = """
-import multiprocessing, subprocess, sys, time
-from skinwave.web import worker
-def busy(pipe):
-    worker.end_with_parent()
-    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-    print(child.pid, flush=True)
-    child.wait()
-worker.answer_forever = busy
-if __name__ == "__main__":
-    one = worker.Worker(print)
-    multiprocessing.set_start_method("fork")
-    worker.multiprocessing.get_context = lambda _: multiprocessing
-    one.ask(1, None)
-    sys.stdin.readline()
-    one.cancel()
-    sys.stdin.readline()
-"""
-    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE,
-                               stdout=subprocess.PIPE, text=True)  # fmt: skip
-    try:
-        child = int(process.stdout.readline())
-        assert not ended(child)
-        if way == "cancel":
-            process.stdin.write("now\n")
-            process.stdin.flush()
-        else:
-            process.kill()
-        until = time.monotonic() + 20
-        while not ended(child):
-            assert time.monotonic() < until, "it goes on"
-            time.sleep(0.05)
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def test_help_and_import_load_no_page():
@@ -687,29 +636,6 @@ def test_frames_resolve_the_fastest_motion_however_long_the_pattern(am, envelope
     assert (seen.period == pytest.approx(whole)) == (whole < 0.1)
 
 
-def test_the_process_answers_the_newest_question_and_can_be_cancelled(scene):
-    told = Queue()
-    asked = Worker(lambda *content: told.put(content))
-    try:
-        for number in range(1, 5):
-            asked.ask(number, scene)
-        answered = []
-        while 4 not in answered:
-            what, number, _ = told.get(timeout=60)
-            answered += [number] if what == "answer" else []
-        assert answered[-1] == 4
-        assert len(answered) <= 2
-        asked.ask(5, replace(scene, body=BODIES["palm"]))
-        while told.get(timeout=60)[:2] != ("progress", 5):
-            pass
-        asked.cancel()
-        asked.ask(6, scene)
-        while (last := told.get(timeout=60))[:2] != ("answer", 6):
-            assert last[0] != "answer"
-    finally:
-        asked.close()
-
-
 @pytest.mark.parametrize(
     ("error", "said"),
     [
@@ -747,25 +673,6 @@ def test_a_full_disk_fails_one_question_and_the_next_is_answered(monkeypatch, er
     assert sent[0][:2] == ("failed", 1)
     assert said in sent[0][2]
     assert sent[1:] == [("answer", 2, "found")]
-
-
-def test_the_process_gives_memory_back_when_nothing_is_asked(monkeypatch):
-    given_back, rests = Mock(), iter([True, False, True])
-
-    class Pipe:
-        poll, send = staticmethod(lambda seconds: next(rests)), Mock()
-
-        def recv(self):
-            if given_back.called:
-                raise EOFError
-            return 1, None, False, (), None
-
-    monkeypatch.setattr(waves.BodyResponses, "__call__", lambda *_: given_back.assert_not_called())
-    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
-    monkeypatch.setattr(worker.os, "nice", lambda _: None)
-    monkeypatch.setattr(worker, "give_back", given_back)
-    worker.answer_forever(Pipe())
-    assert given_back.call_count == 1
 
 
 def test_curves_are_drawn_before_what_is_beside_them(session):
@@ -821,23 +728,6 @@ def test_the_process_tells_the_step_it_is_at(monkeypatch):
         tell(phase, 0.0)
     assert [content.number for _, _, content in sent] == [1, 2, 3, 4, 5]
     assert {(what, number, content.of) for what, number, content in sent} == {("progress", 7, 5)}
-
-
-@pytest.mark.parametrize(("load", "threads"), [(0.4, 4), (2.9, 2), (9.0, 1)])
-def test_the_process_computes_on_the_cores_that_are_idle(monkeypatch, load, threads):
-    for name in worker.THREADS:
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("MKL_NUM_THREADS", "3")
-    monkeypatch.setattr(worker.os, "cpu_count", lambda: 4)
-    monkeypatch.setattr(worker.os, "getloadavg", lambda: (load, 0.0, 0.0))
-    seen, context = {}, Mock(Pipe=lambda: (Mock(recv=Mock(side_effect=EOFError)), Mock()))
-    context.Process().start = lambda: seen.update({n: worker.os.environ[n] for n in worker.THREADS})
-    monkeypatch.setattr(worker.multiprocessing, "get_context", lambda _: context)
-    Worker(print)._start()
-    assert seen.pop("MKL_NUM_THREADS") == "3", "what the user said stays"
-    assert seen.pop("OPENBLAS_NUM_THREADS") == "1", "its threads keep cores busy as they wait"
-    assert set(seen.values()) == {str(threads)}
-    assert "OMP_NUM_THREADS" not in worker.os.environ
 
 
 @pytest.mark.parametrize("waits", [False, True])
@@ -1457,89 +1347,6 @@ def test_what_of_a_scene_is_beyond_its_control_is_left_out_and_said(request):
     assert session.values == given | {"am": 90.0}
     assert "x: 150 mm is outside -50 to 50 mm" in session.state.problem
     assert "speed: 45 m/s is outside 0 to 40 m/s" in session.state.problem
-
-
-@pytest.mark.parametrize("says", [b"ready\n", b"", None])
-def test_a_session_that_does_not_start_or_that_no_page_claims_is_ended(monkeypatch, tmp_path, says):
-    web = pytest.importorskip("aiohttp.web")
-    from skinwave.web import front, processes
-    from skinwave.web.processes import PageProcess
-
-    ends = []
-
-    async def line():
-        return says if says is not None else await asyncio.sleep(60)
-
-    def made():
-        process, over = Mock(returncode=None), asyncio.Event()
-
-        def end():
-            ends.append(True)
-            process.returncode = 0
-            over.set()
-
-        process.stdin.drain = AsyncMock()
-        process.stdout.readline, process.wait = line, over.wait
-        process.stdin.close = end
-        return PageProcess(process=process, port=1, password="secret", folder=str(tmp_path / "x"))
-
-    async def started(_):
-        return made()
-
-    async def opened():
-        one, asked = front.Front(), Mock(query={})
-        asked.text = AsyncMock(return_value='{"am": "77"}')
-        one._spare = asyncio.create_task(started(""))
-        answer = await one.open(asked)
-        assert isinstance(answer, web.Response)
-        assert answer.status == (200 if says else 503)
-        # The spare process, and the one that is started instead of it.
-        assert (len(one._unclaimed), len(ends)) == ((1, 0) if says else (0, 2))
-        assert (one.turns.opening, one.turns.there) == (0, 1 if says else 0)
-        await asyncio.sleep(0.3)
-        assert (len(one._unclaimed), len(ends)) == (0, 1 if says else 2)
-        assert one.turns.there == 0, "its place is free"
-
-    monkeypatch.setattr(front, "started", started)
-    monkeypatch.setattr(front, "PATIENCE", 0.1)
-    monkeypatch.setattr(processes, "PATIENCE", 0.1)
-    monkeypatch.setattr(processes.os, "killpg", Mock())
-    asyncio.run(opened())
-
-
-def test_a_session_takes_only_its_own_password(tmp_path):
-    pytest.importorskip("trame")
-    import aiohttp
-    import msgpack
-    from wslink.chunking import UnChunker, generate_chunks
-
-    from skinwave.web import processes
-
-    async def greeted(port, password):
-        hello = {"wslink": "1.0", "id": "system:c0:0", "method": "wslink.hello",
-                 "args": [{"secret": password}], "kwargs": {}}  # fmt: skip
-        async with (
-            aiohttp.ClientSession() as client,
-            client.ws_connect(f"ws://127.0.0.1:{port}/ws") as page,
-        ):
-            for chunk in generate_chunks(msgpack.packb(hello), 2**20):
-                await page.send_bytes(chunk)
-            return UnChunker().process_chunk((await page.receive(timeout=20)).data)
-
-    async def both():
-        page = await processes.started(str(tmp_path))
-        try:
-            return (
-                await greeted(page.port, "wslink-secret"),
-                await greeted(page.port, page.password),
-            )
-        finally:
-            processes.kill(page.process)
-            await processes.gone(page)
-
-    refused, taken = asyncio.run(both())
-    assert "error" in refused
-    assert "result" in taken
 
 
 def test_a_body_of_ones_own_comes_back_with_its_address_or_is_missed(request):

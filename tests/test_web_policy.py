@@ -1,22 +1,13 @@
-"""Pages that wait or are refused, as a browser shows them, and no text becomes a script."""
-
-import re
-import stat
-import subprocess
-import sys
-import time
-from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
+"""No text becomes a script, in a browser."""
 
 import pytest
-from in_browser import ended, served
+from in_browser import settled
 from test_web_page import (
     PATIENCE,
     READY,
     opened,
     pytestmark,  # noqa: F401
     query_has,
-    state,
 )
 
 from skinwave.web.controls import KEYS
@@ -27,13 +18,6 @@ SCRIPTS = (
     "{{ constructor.constructor('window.ran=1')() }}",
     "'\"><svg onload=window.ran=1>",
 )
-FEW = """
-from skinwave.web import turns
-turns.MOST, turns.AT_ONCE = 2, 1
-from skinwave.cli import main
-main(["web", "--port", "0", "--samples", "0"])
-"""
-WAITING = "() => document.querySelector('#sw-waiting')?.innerText.includes('as many as')"
 RAN = "() => [window.ran, document.querySelectorAll('[onerror], [onload], img[src=x]').length]"
 
 
@@ -43,66 +27,8 @@ def page(browser, address):
 
 
 def never_ran(page):
-    page.wait_for_timeout(300)
+    settled(page)
     assert page.evaluate(RAN) == [None, 0]
-
-
-def next_open(pages):
-    """The page that opens first and the other; one that is kept from asking loses its turn."""
-    for _ in range(PATIENCE // 200):
-        for page, other in (pages, pages[::-1]):
-            if page.evaluate(READY):
-                return page, other
-        pages[0].wait_for_timeout(200)
-    raise AssertionError("no page opens when another is closed")
-
-
-def test_pages_open_one_after_the_other_and_beyond_the_most_when_another_is_closed(
-    browser,
-):
-    process = subprocess.Popen([sys.executable, "-c", FEW], stderr=subprocess.PIPE, text=True)
-    address = re.search(r"http://\S+", process.stderr.readline())[0]
-    context = browser.new_context()
-    pages = [context.new_page() for _ in range(4)]
-    for two, awaited in ((pages[:2], READY), (pages[2:], WAITING)):
-        for page in two:
-            page.set_default_timeout(2 * PATIENCE)
-            page.goto(address + "&body=none", wait_until="commit")
-        for page in two:
-            page.wait_for_function(awaited)
-    assert pages[2].locator("#sw-waiting").is_visible()
-    pages[0].close()
-    opened_by_itself, waits = next_open(pages[2:])
-    assert opened_by_itself.locator("#sw-waiting").count() == 0
-    assert "as many as" in waits.locator("#sw-waiting").inner_text()
-    context.close()
-    ended(process)
-
-
-def test_a_page_without_its_token_says_what_to_open(browser, address):
-    page = browser.new_page()
-    assert page.goto(address.partition("?")[0]).status == 403
-    assert "open the address that `skinwave web` has printed" in page.inner_text("body")
-    page.close()
-
-
-def test_the_token_leaves_the_address_and_reloads_and_links_go_on(browser, address):
-    context = browser.new_context()
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE)
-    page.goto(address + "&body=none&am=71")
-    page.wait_for_function(READY)
-    assert "token" not in page.url
-    page.locator("#am-field").fill("72")
-    query_has(page, "am=72")
-    page.reload()
-    page.wait_for_function(READY)
-    assert state(page, "am") == 72
-    page.goto(address.partition("?")[0] + "?body=none&am=73")
-    page.wait_for_function(READY)
-    assert (state(page, "am"), state(page, "body")) == (73, "none")
-    assert page.evaluate("document.cookie") == "", "no script reads it"
-    context.close()
 
 
 def test_the_policy_is_there_and_keeps_scripts_from_running(page):
@@ -118,7 +44,7 @@ def test_the_policy_is_there_and_keeps_scripts_from_running(page):
         "document.body.setAttribute('onclick', 'window.ran=1'); document.body.click()",
     ):
         page.evaluate(tried)
-    page.wait_for_timeout(300)
+    settled(page)
     assert page.evaluate("() => window.ran") is None
     page.evaluate("() => document.querySelectorAll('img[src=x]').forEach(e => e.remove())")
     assert page.evaluate(
@@ -189,28 +115,3 @@ def test_a_script_in_an_address_never_runs(browser, address):
     assert len(asked) >= len(SCRIPTS)
     assert all(url.startswith(own.replace("http", "ws")) for url in asked), asked
     context.close()
-
-
-def test_the_token_is_not_on_the_command_line_of_the_browser(browser, tmp_path, monkeypatch):
-    told = tmp_path / "told"
-    opener = tmp_path / "opener"
-    opener.write_text(f'#!/bin/sh\necho "$@" > {told}.new\nmv {told}.new {told}\n')
-    opener.chmod(0o700)
-    monkeypatch.setenv("BROWSER", str(opener))
-    scene = tmp_path / "none.toml"
-    scene.write_text("[body]\nkind = 'none'\n")
-    process, address = served("--port", "0", "--samples", "0", "--open", str(scene))
-    for _ in range(PATIENCE // 100):
-        if told.exists():
-            break
-        time.sleep(0.1)
-    given = told.read_text().strip()
-    assert parse_qs(urlsplit(address).query)["token"][0] not in given
-    assert stat.S_IMODE(Path(urlsplit(given).path).parent.stat().st_mode) == 0o700
-    page = browser.new_context().new_page()
-    page.set_default_timeout(PATIENCE)
-    page.goto(given)
-    page.wait_for_function(READY)
-    page.context.close()
-    ended(process)
-    assert not Path(urlsplit(given).path).parent.exists()
