@@ -36,6 +36,25 @@ def chromium() -> Iterator[Any]:
     playwright.Page.wait_for_function = wait
 
 
+def frames(page: Any, count: int) -> None:
+    """Wait until a page has drawn so many frames."""
+    page.evaluate(
+        "count => new Promise(done => { const next = () => count-- ? requestAnimationFrame(next)"
+        " : done(); next() })",
+        count,
+    )
+
+
+def settled(page: Any) -> None:
+    """Wait until a page has drawn what was changed, has its pictures and changes no style."""
+    frames(page, 2)
+    page.wait_for_function(
+        "() => document.readyState === 'complete' && [...document.images].every(i => i.complete)"
+        " && document.getAnimations().every(a => a.playState !== 'running'"
+        " || a.effect.getComputedTiming().iterations === Infinity)"
+    )
+
+
 def served(*arguments: str) -> tuple[Any, str]:
     """A server in a process of its own, and its address."""
     command = [sys.executable, "-m", "skinwave", "web", *arguments]
@@ -49,5 +68,5 @@ def served(*arguments: str) -> tuple[Any, str]:
 def ended(process: Any) -> None:
     """End a server, which must say nothing of a fault."""
     process.terminate()
-    said = process.communicate(timeout=20)[1]
+    said = process.communicate(timeout=600)[1]
     assert "Traceback" not in said, said

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
-from in_browser import needs_browser
+from in_browser import needs_browser, settled
 
 import skinwave
 from simple_model import Effort, Response
@@ -140,7 +140,7 @@ def opened(browser, path, obeyed=False):
     tab.on("console", lambda message: said.append(message.text))
     tab.on("pageerror", lambda error: said.append(str(error)))
     tab.goto(f"file://{path}")
-    tab.wait_for_timeout(300)
+    settled(tab)
     yield tab, said
     context.close()
 

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from in_browser import needs_browser
+from in_browser import needs_browser, settled
 from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
@@ -436,17 +436,16 @@ def test_the_page_opens_in_a_browser_without_a_network(page, browser):
     tab.on("pageerror", lambda error: said.append(str(error)))
     tab.route(re.compile("^(https?|wss?)://"), lambda r: (asked.append(r.request.url), r.abort()))
     tab.goto(f"file://{page / 'index.html'}")
-    tab.wait_for_timeout(2500)
+    settled(tab)
+    for frame in tab.frames[1:]:
+        frame.wait_for_function("() => document.querySelector('canvas')")
     broken = tab.evaluate("[...document.images].filter(i => !i.naturalWidth).length")
-    drawn = [frame.evaluate("document.querySelectorAll('canvas').length")
-             for frame in tab.frames[1:]]  # fmt: skip
     ARTEFACTS.mkdir(parents=True, exist_ok=True)
     tab.screenshot(path=ARTEFACTS / "report.png", full_page=True)
     tab.close()
     assert broken == 0
     assert [text for text in said if "favicon" not in text and "ERR_FAILED" not in text] == []
     assert all("favicon" in url for url in asked), asked
-    assert all(drawn)
 
 
 NO_GL = Renderer(found=False, said="missing; apt install libegl1 libgl1-mesa-dri")

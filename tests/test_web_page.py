@@ -2,23 +2,21 @@
 
 import json
 import re
-import statistics
 from pathlib import Path
 
 import numpy as np
 import pytest
-from in_browser import ended, needs_browser, served
+from in_browser import ended, frames, needs_browser, served, settled
 
 from simple_model import spectrum
 from skinwave.scene_file import loads
 from skinwave.simulation import compute
 from skinwave.web import controls, model, scenes
 from skinwave.web.controls import NUMBERS, STARTS
-from skinwave.web.history import TOGETHER
 
 ARTEFACTS = Path(__file__).parent.parent / ".ci" / "artefacts"
 READY = "() => window.trame?.utils?.plots?.shown?.spectrum_plot?.figure"
-PATIENCE = 60_000  # ms; other work on the machine may take most of it
+PATIENCE = 600_000  # ms, after which a test that hangs is ended
 pytestmark = [pytest.mark.slow, needs_browser]
 for name in ("playwright", "trame", "trame_vuetify"):
     pytest.importorskip(name)
@@ -85,37 +83,6 @@ def query_has(page, part):
 def drawn(page, plot):
     """The curves that a canvas shows."""
     return page.evaluate("plot => window.trame.utils.plots.shown[plot].figure.data", plot)
-
-
-def latencies(page, key, count, until):
-    """Seconds from each of `count` key presses on a slider until plots are on the screen in which
-    `until`, an expression of their `data`, is true.
-    """
-    found = page.evaluate(
-        """async ([key, count, until]) => {
-        const slider = document.querySelector(`.sw-row:has(#${key}-field) [role=slider]`);
-        const plot = window.trame.utils.plots.shown.spectrum_plot;
-        const good = new Function('data', 'return ' + until), times = [];
-        slider.focus();
-        for (let k = 0; k < count; k++) {
-          const before = JSON.stringify(plot.figure.data[0].y), start = performance.now();
-          const done = new Promise(resolve => {
-            const look = () => {
-              if (JSON.stringify(plot.figure.data[0].y) !== before && good(plot.figure.data)) {
-                plot.canvas.removeEventListener('drawn', look);
-                requestAnimationFrame(() => setTimeout(() => resolve(performance.now() - start)));
-              }
-            };
-            plot.canvas.addEventListener('drawn', look);
-          });
-          slider.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}));
-          times.push(await done);
-          await new Promise(resolve => setTimeout(resolve, 100));
-        }
-        return times }""",
-        [key, count, until],
-    )
-    return np.array(found) / 1e3
 
 
 def ink(page, canvas):
@@ -252,7 +219,7 @@ def drawn_by(page, selector, dx):
     page.mouse.down()
     for part in (0.3, 0.7, 1):
         page.mouse.move(x + part * dx, y)
-        page.wait_for_timeout(80)
+        frames(page, 2)
     page.mouse.up()
 
 
@@ -300,7 +267,8 @@ def test_the_rhythm_is_edited_on_its_timeline(bare):
     state_becomes(page, "stale", False)
     page.locator("#rhythm-on-0").press("Delete")
     query_has(page, "pulses=110/150")
-    page.wait_for_timeout(1000 * TOGETHER + 100)
+    page.locator("#ramp-field").fill("10")  # or the next is one move with the last
+    query_has(page, "ramp=10")
     page.locator("#pulse-remove").click()
     state_becomes(page, "pulses", "")
     assert page.locator("#pulse-remove").is_disabled()
@@ -399,7 +367,7 @@ def at_rest(element):
     """Where an element is once it stays there: lines above it come and go."""
     before, now = None, element.bounding_box()
     while now != before:
-        element.page.wait_for_timeout(500)
+        settled(element.page)
         before, now = now, element.bounding_box()
     return now
 
@@ -551,7 +519,7 @@ def test_text_stands_out_from_what_is_behind_it(page, theme):
     page.locator("#pin").click()
     page.locator("#size-field").fill("900")
     page.wait_for_selector("#size-error")
-    page.wait_for_timeout(500)  # colours change little by little
+    settled(page)
     faint = page.evaluate(TOLD)
     if theme == "the other":
         photographed(page, "dark")
@@ -628,7 +596,7 @@ def test_the_body_moves_in_three_dimensions(page):
     assert re.fullmatch(r"\d+\.\d\d of \d+\.\d\d ms", now.inner_text())
     stopped = ink(page, "body-view")
     assert len(stopped) > 50, "next to nothing is drawn"
-    page.wait_for_timeout(200)
+    frames(page, 12)
     assert ink(page, "body-view") == stopped
     page.locator("#body-time").fill("500")
     half = float(now.inner_text().split()[0])
@@ -667,7 +635,7 @@ def test_a_page_opens_with_moving_waves_and_one_button_that_stops_them(browser, 
     play.click()
     assert play.inner_text() == "▶ Play"
     rest = now.inner_text()
-    page.wait_for_timeout(300)
+    frames(page, 12)
     assert now.inner_text() == rest
     assert logs.errors == []
     page.close()
@@ -677,7 +645,7 @@ def test_nothing_moves_by_itself_where_less_motion_is_asked_for(browser, address
     page, _ = opened(browser, address)
     page.wait_for_function("() => document.getElementById('body-now')?.textContent.length > 3")
     rest = page.locator("#body-now").inner_text()
-    page.wait_for_timeout(500)
+    frames(page, 12)
     assert page.locator("#body-now").inner_text() == rest
     assert page.locator("#play").inner_text() == "▶ Play"
     page.close()
@@ -754,7 +722,7 @@ def test_maps_of_both_bodies_are_seen_at_once(page):
     state_becomes(page, "waves_stale", False)
     page.locator("#pin").click()
     page.locator("#pinned-map").wait_for()
-    page.wait_for_timeout(300)
+    settled(page)
     a, b = (page.locator(f"#{name}-map").bounding_box() for name in ("pinned", "wave"))
     assert abs(a["y"] - b["y"]) < 2
     assert a["x"] >= b["x"] + b["width"] - 1
@@ -805,19 +773,16 @@ def test_what_is_saved_opens_again(bare, tmp_path):
 def test_plots_follow_a_slider_and_waves_come_with_a_body(page):
     choose(page, "body", "none")
     query_has(page, "body=none")
-    kernel = latencies(page, "am", 8, "true")
     choose(page, "body", "skin-slab")
     state_becomes(page, "waves_stale", False)
     page.wait_for_function("() => window.trame.state.get('wave_map').picture")
     shown = drawn(page, "waveform_plot")
     assert [curve["name"] for curve in shown] == ["kernel, same load, Pa", "waves (flat-body), µm"]
-    current = "data.some(d => d.name === 'waves (flat-body), µm')"
-    overlay = latencies(page, "am", 8, current)
+    page.locator(".sw-row:has(#am-field) [role=slider]").press("ArrowRight")
+    query_has(page, "am=141")
+    state_becomes(page, "waves_stale", False)
+    assert len(drawn(page, "waveform_plot")) == 2
     photographed(page, "waves")
-    for what, times in (("kernel", kernel), ("waves", overlay)):
-        print(f"{what}: median {statistics.median(times):.3f} s, largest {times.max():.3f} s")
-    assert statistics.median(kernel) < 3  # other work may have most of the machine
-    assert statistics.median(overlay) < 5
 
 
 def test_themes_about_and_a_tablet(page):
@@ -826,12 +791,12 @@ def test_themes_about_and_a_tablet(page):
     page.wait_for_function("d => window.trame.state.get('dark') !== d", arg=before)
     page.locator("#about").click()
     page.get_by_text("Detection thresholds differ", exact=False).first.wait_for(state="attached")
-    page.wait_for_timeout(400)
+    settled(page)
     photographed(page, "about")
     page.locator("#close-about").click()
     page.locator("#theme").click()
     page.set_viewport_size({"width": 820, "height": 1180})
-    page.wait_for_timeout(600)
+    settled(page)
     wide = page.evaluate("document.documentElement.scrollWidth")
     photographed(page, "tablet")
     page.set_viewport_size({"width": 1280, "height": 720})
@@ -939,8 +904,8 @@ def test_on_a_narrow_screen_all_of_the_bar_is_there_and_the_panel_is_not(page):
 
 @pytest.mark.parametrize("query", ["", "pulses=10/20&foci=2&paths=point/0/9/9,+line/9/0/0"])
 def test_what_can_be_turned_has_a_name_for_a_screen_reader(page, query):
-    page.evaluate("q => window.trame.trigger('restart', [q])", query)
-    page.wait_for_timeout(300)
+    begun(page, query)
+    settled(page)
     nameless = page.evaluate(
         """() => [...document.querySelectorAll(
           'button, select, [role=slider], input:not([type=hidden])')]
@@ -956,7 +921,7 @@ def test_axe_finds_no_serious_violation(page):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
 
     def violations():
-        page.wait_for_timeout(400)  # colours and lists come little by little
+        settled(page)
         found = axe.run(page, options={"resultTypes": ["violations"], "preload": False})
         return [
             (each["id"], each["nodes"][0]["target"])
@@ -997,21 +962,3 @@ def test_two_pages_do_not_disturb_each_other_and_ask_nothing_of_the_network(
         assert log.errors == []
         elsewhere = [url for url in log.asked if not url.startswith((own, "data:", "blob:"))]
         assert elsewhere == []
-
-
-def test_a_lost_connection_is_said_and_comes_back(browser):
-    process, address = served("--port", "0", "--samples", "0")
-    context = browser.new_context()
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE)
-    page.goto(address + "&am=71&body=none")
-    page.wait_for_function(READY)
-    ended(process)
-    page.wait_for_selector("#sw-lost")
-    again, new = served("--port", re.search(r":(\d+)/", address)[1], "--samples", "0")
-    page.get_by_text("open the address that `skinwave web` has printed").wait_for()
-    context.new_page().goto(new)  # as --open does: it brings the new token
-    page.wait_for_function(READY)
-    assert state(page, "am") == 71
-    context.close()
-    ended(again)
