@@ -347,7 +347,8 @@ def in_turn(calls, may_begin, begun):
         yield k, future
 
 
-def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch):
+def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch, tmp_path):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
     small = Body(width=0.03, height=0.03, depth=0.004)
     monkeypatch.setattr(
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")

@@ -5,7 +5,6 @@ import multiprocessing
 import os
 import subprocess
 import sys
-import time
 
 import hostile
 import numpy as np
@@ -100,7 +99,7 @@ def test_a_pipe_in_the_place_of_an_entry_is_a_miss(home):
     home.mkdir()
     os.mkfifo(home / f"{NAMES[0]}.npz")
     said = f"from meshes import cache; assert cache.load({NAMES[0]!r}) is None"
-    subprocess.run([sys.executable, "-c", said], check=True, timeout=20)
+    subprocess.run([sys.executable, "-c", said], check=True, timeout=600)
 
 
 def left(home):
@@ -157,8 +156,7 @@ def fill(seed):
     """Store and load at random within a small limit; how many loads were neither right nor none."""
     rng, wrong = np.random.default_rng(seed), 0
     cache.LIMIT = 30_000
-    last = time.monotonic() + 1.5
-    while time.monotonic() < last:
+    for _ in range(300):
         name = NAMES[rng.integers(len(NAMES))]
         if (entry := cache.load(name)) is None:
             stored(name, 8000)

