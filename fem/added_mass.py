@@ -44,14 +44,9 @@ UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AddedMass:
-    """Added mass `M` (n_free, n_free) of a fluid in kg, and `rate` in 1/s of the damping rate M u'.
-
-    Rayleigh damping is fitted to a loss factor for the mass of the body alone; with added mass its
-    mass-proportional part must grow as well, or the loss factor would fall.
-    """
+    """Added mass `M` (n_free, n_free) of a fluid in kg."""
 
     M: LinearOperator
-    rate: float = 0.0
 
 
 def added_mass(
@@ -62,7 +57,6 @@ def added_mass(
     axes: Floats = FLAT,
     mirrored: str = "",
     facets: str | Ints = "top",
-    rate: float = 0.0,
 ) -> AddedMass:
     """Added mass of the fluid on both sides of a sheet in a baffle, without loss of its own.
 
@@ -75,7 +69,6 @@ def added_mass(
     mirrored : those of "xy" in whose positive half the mesh lies, the motion being the same in the
         other half; M is then of the part that is meshed
     facets : a facet set's name or nodes (e, a), of the sheet
-    rate : float, 1/s, of the sheet's own Rayleigh damping by mass
 
     Returns
     -------
@@ -111,7 +104,7 @@ def added_mass(
     M = LinearOperator(
         (n, n), dtype=np.float64, matmat=apply, matvec=lambda u: apply(u.reshape(n, 1))
     )
-    return AddedMass(M=M, rate=rate)
+    return AddedMass(M=M)
 
 
 def near_field(

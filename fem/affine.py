@@ -1,12 +1,11 @@
 """Operators of a body as sums over its materials, of matrices that no modulus or density changes.
 
     K = sum_r mu_r K_r + held S,   M = sum_r rho_r M_r
-    C = sum_r (viscosity_r + lag_r mu_r) K_r + rate_r rho_r M_r + sqrt(mu_r rho_r) R_r
-        + drag rho_r D_r
+    C = sum_r viscosity_r K_r + sqrt(mu_r rho_r) R_r + drag rho_r D_r
 
-with the Rayleigh damping (rate, lag) of a loss factor, springs S and dashpots R at surfaces, and
-the absorbing layer D. The added mass F of a fluid, which can only be applied, joins M, and rate_1 F
-joins C (`added_mass`). Poisson's ratios are fixed, so that the dynamic stiffness
+with springs S and dashpots R at surfaces, and the absorbing layer D. The added mass F of a fluid,
+which can only be applied, joins M (`added_mass`). Poisson's ratios are fixed, so that the dynamic
+stiffness
 
     A(s) = sum_q w_q(s) A_q
 
@@ -18,7 +17,6 @@ are smooth in it, and interpolated between those of a few geometries (`interpola
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -29,10 +27,9 @@ from fem.added_mass import AddedMass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, springs
 from fem.coat import Coat
-from fem.materials import Material, rayleigh_damping
+from fem.materials import Material
 from fem.maxwell import MaxwellBranch
 from fem.products import product
-from fem.viscoelastic import LOSS_BAND
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
 
@@ -56,8 +53,7 @@ class AffineOperators:
     """Matrices (n, n), sparse or projected, of each material (r,) or none of a kind that is not
     there: `stiffness` per shear modulus, `mass` per density, `dashpots` per impedance
     sqrt(mu rho), absorbing `layer` per density; and one matrix or none of `springs`, and of the
-    added mass of a `fluid` in kg, a LinearOperator until it is projected, which is damped at the
-    rate of the first material.
+    added mass of a `fluid` in kg, a LinearOperator until it is projected.
 
     `free` (n_free,) and `n_dofs` as of `Operators`.
     """
@@ -123,19 +119,21 @@ def assemble_affine(
 
 
 def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
-    """Operators of materials without modulus laws of their own; with a fluid, projected ones."""
-    terms = [[term for term in m.prony if term.modulus] for m in solids.materials]
-    damping = [rayleigh_damping(m.loss_factor, LOSS_BAND) for m in solids.materials]
+    """Operators of materials without modulus laws of their own; with a fluid, projected ones.
+
+    Impedances of dashpots are those of the moduli that materials are given by.
+    """
+    materials = [m.without_loss_factor() for m in solids.materials]
+    terms = [[term for term in m.prony if term.modulus] for m in materials]
     mu, rho, eta = (
-        np.array([getattr(m, name) for m in solids.materials])
+        np.array([getattr(m, name) for m in materials])
         for name in ("shear_modulus", "density", "viscosity")
     )
-    rate, lag = np.array(damping).T
-    R = _sum(affine.dashpots, np.sqrt(mu * rho)) + _sum(affine.layer, solids.drag * rho)
+    impedance = [m.density * m.shear_speed for m in solids.materials]
+    R = _sum(affine.dashpots, impedance) + _sum(affine.layer, solids.drag * rho)
     K = _sum(affine.stiffness, mu) + _sum(affine.springs, [solids.springs])
     M = _sum(affine.mass, rho) + _sum(affine.fluid, [1.0])
-    by_mass = _sum(affine.mass, rate * rho) + _sum(affine.fluid, rate)
-    C = _sum(affine.stiffness, eta + lag * mu) + by_mass + R
+    C = _sum(affine.stiffness, eta) + R
     branches = [
         MaxwellBranch(K=_sum(affine.stiffness, shares), time=time)
         for time in sorted({term.time for each in terms for term in each})
@@ -152,9 +150,9 @@ def in_vacuum(affine: AffineOperators) -> AffineOperators:
     return replace(affine, fluid=())
 
 
-def fluid_of(affine: AffineOperators, solids: Solids) -> AddedMass | None:
+def fluid_of(affine: AffineOperators) -> AddedMass | None:
     """Added mass of a fluid apart from `operators_of` the body in vacuum; None without any."""
-    return next((AddedMass(M=F, rate=_rate(solids.materials[0])) for F in affine.fluid), None)
+    return next((AddedMass(M=F) for F in affine.fluid), None)
 
 
 def weights(affine: AffineOperators, solids: Solids, frequencies: ArrayLike) -> NDArray[Any]:
@@ -173,25 +171,14 @@ def weights(affine: AffineOperators, solids: Solids, frequencies: ArrayLike) -> 
     s = 2j * np.pi * np.asarray(frequencies, np.float64)
     each = solids.materials
     columns = [
-        *(modulus(m, s) for m, _ in zip(each, affine.stiffness, strict=True)),
-        *(m.density * (s**2 + s * _rate(m)) for m, _ in zip(each, affine.mass, strict=True)),
-        *(s * sqrt(m.shear_modulus * m.density) for m, _ in zip(each, affine.dashpots)),  # noqa: B905
+        *(m.complex_modulus(s.imag) for m, _ in zip(each, affine.stiffness, strict=True)),
+        *(m.density * s**2 for m, _ in zip(each, affine.mass, strict=True)),
+        *(s * m.density * m.shear_speed for m, _ in zip(each, affine.dashpots)),  # noqa: B905
         *(s * solids.drag * m.density for m, _ in zip(each, affine.layer)),  # noqa: B905
         *(np.full_like(s, solids.springs) for _ in affine.springs),
-        *(s**2 + s * _rate(m) for m, _ in zip(each, affine.fluid)),  # noqa: B905
+        *(s**2 for _ in affine.fluid),
     ]
     return np.stack(columns, axis=-1)
-
-
-def modulus(material: Material, s: Any) -> Any:
-    """Complex modulus in Pa at s = i w in rad/s, as reduced models have it: a loss factor stands as
-    Rayleigh damping.
-    """
-    if material.law is not None:
-        return material.complex_modulus(s.imag)
-    _, lag = rayleigh_damping(material.loss_factor, LOSS_BAND)
-    lasting = material.shear_modulus * (1 + lag * s) + material.viscosity * s
-    return lasting + material.relaxing_modulus(s.imag)
 
 
 def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
@@ -254,10 +241,6 @@ def _alone(materials: Sequence[Material], r: int) -> tuple[Material, ...]:
 def _present(matrices: Sequence[Any]) -> tuple[Any, ...]:
     """The matrices, or none if all are 0."""
     return tuple(matrices) if any(abs(A).sum() > 0 for A in matrices) else ()
-
-
-def _rate(material: Material) -> float:
-    return rayleigh_damping(material.loss_factor, LOSS_BAND)[0]
 
 
 def _sum(matrices: Sequence[Any], factors: Sequence[float] | Floats) -> Any:

@@ -2,14 +2,15 @@
 
     K_ab,ij = int lam N_a,i N_b,j + mu (N_a,j N_b,i + delta_ij N_a,k N_b,k) dV
     M_ab,ij = delta_ij int rho N_a N_b dV
-    C       = (viscosity/mu) K + Rayleigh damping for the loss factor
+    C       = (viscosity/mu) K
               + R, the damping of the absorbing boundaries and layers:
     R       = int rho (c_p n n + c_s (1 - n n)) N_a N_b dA on absorbing facets
                 (Lysmer and Kuhlemeyer, ASCE EM4, 1969)
               + int drag rho N_a N_b dV in an absorbing (sponge) layer before them
     K      += int k delta_ij N_a N_b dA where a surface rests on springs of k per area
     K_j     = (mu_j/mu) K of the elements with a Prony term of one relaxation time: the stiffness
-              of a generalised Maxwell branch, see `maxwell`
+              of a generalised Maxwell branch, see `maxwell`; a loss factor is such terms, see
+              `constant_loss`
     and likewise of thin layers at a surface, see `coat`; K of a sheet that is orthotropic or in
     tension has further parts, see `plane_stiffness`
 
@@ -52,7 +53,7 @@ from fem.sparsity import (
     selected,
     slabs,
 )
-from fem.viscoelastic import Matrices, property_of, rayleigh_rates, together, viscoelastic
+from fem.viscoelastic import Matrices, property_of, together, viscoelastic
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
@@ -171,14 +172,14 @@ def assemble(
     MemoryError
         If there is no memory for the matrices.
     """
-    materials, region = by_region(mesh, material)
+    given, region = _by_region(mesh, material)
+    materials = [m.without_loss_factor() for m in given]
     free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
         raise ValueError("every node is fixed; leave some of the body free to move")
     check_memory(len(free))
     nodes = MovingNodes.of(mesh, free)
 
-    share = tension.share if tension else None
     axes = SIDES if axes is None else axes
     volume = _volume(mesh, nodes, materials, region, axes, stiffener)
     beside = R = sparse.csr_array((len(free), len(free)))  # of K, and of C
@@ -187,20 +188,19 @@ def assemble(
     if tension is not None:
         beside = beside + nodes.on_free(tension_stiffness(mesh, nodes.pattern, tension, axes))
     if absorbing is not None:
-        leaky = dashpots(mesh, facet_set(mesh, absorbing), materials, region)
+        leaky = dashpots(mesh, facet_set(mesh, absorbing), given, region)
         R = R + restricted(leaky, free)
     if support is not None and support.absorbed.any():
-        leaky = dashpots(mesh, support.facets, materials, region, support.absorbed)
+        leaky = dashpots(mesh, support.facets, given, region, support.absorbed)
         R = R + restricted(leaky, free)
     if drag is not None:
         R = R + _drag(mesh, nodes, property_of(materials, "density")[region] * drag)
     if len(materials) == 1 and materials[0].law is None:
         K, M = volume[0](np.ones(1)), volume[1](np.array([materials[0].density]))
         del volume  # whose parts free their memory
-        rates = rayleigh_rates(materials[0], share)
-        found = _of_one_material(materials[0], (K, M), rates, (beside, R), free, mesh.n_dofs)
+        found = _of_one_material(materials[0], (K, M), (beside, R), free, mesh.n_dofs)
     else:
-        K, C, M, branches = viscoelastic(materials, *volume, share)
+        K, C, M, branches = viscoelastic(materials, *volume)
         del volume
         K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
         found = Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
@@ -212,7 +212,6 @@ def assemble(
 def _of_one_material(
     m: Material,
     volume: tuple[sparse.csr_array, sparse.csr_array],
-    rates: tuple[float, float],
     surfaces: tuple[sparse.csr_array, sparse.csr_array],
     free: Ints,
     n_dofs: int,
@@ -222,7 +221,7 @@ def _of_one_material(
     """
     (K, M), (beside, R) = volume, surfaces
     K = K + beside if beside.nnz else K
-    laws, times = proportional(m, rates, surfaces)
+    laws, times = proportional(m, surfaces)
     each = zip(laws.branches, times, strict=True)
     return Operators(
         K=K, C=laws.damping.of(K, M), M=M, R=R, free=free, n_dofs=n_dofs, laws=laws,
@@ -339,7 +338,16 @@ def _drag(mesh: TetMesh, nodes: MovingNodes, rate: Floats) -> sparse.csr_array:
 def by_region(
     mesh: TetMesh, material: Material | Mapping[int, Material]
 ) -> tuple[list[Material], Ints]:
-    """The materials of a mesh, and the index (e,) of each element's."""
+    """The materials of a mesh, their loss factors as Prony terms, and the index (e,) of each
+    element's.
+    """
+    materials, region = _by_region(mesh, material)
+    return [m.without_loss_factor() for m in materials], region
+
+
+def _by_region(
+    mesh: TetMesh, material: Material | Mapping[int, Material]
+) -> tuple[list[Material], Ints]:
     if isinstance(material, Material):
         return [material], np.zeros(len(mesh.tets), np.int64)
     if not isinstance(material, Mapping):

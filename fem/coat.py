@@ -369,7 +369,7 @@ def coat_operators(
     """
     surface, layers = surface_of(mesh, coat, fixed), len(coat.materials)
     behind = region[owners(mesh, facet_set(mesh, coat.facets))]
-    all_of_them = [*coat.materials, *materials]
+    all_of_them = [*(m.without_loss_factor() for m in coat.materials), *materials]
     mu, lam = (property_of(all_of_them, name) for name in ("shear_modulus", "first_lame"))
     lam = 2 * lam * mu / (lam + 2 * mu)
 

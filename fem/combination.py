@@ -1,7 +1,7 @@
 """Damping and relaxing stiffness as combinations of K and M, of which no product has to be formed.
 
-The damping matrix of one material is a K + b M but for what absorbs at the surface, and its Maxwell
-branches are multiples of K but for the springs that it rests on.
+The damping matrix of one material is a multiple of K but for what absorbs at the surface, and so
+are its Maxwell branches but for the springs that it rests on.
 """
 
 from collections.abc import Sequence
@@ -177,15 +177,12 @@ def with_added(laws: Laws, added: tuple[Any, Any, Any], further: Sequence[Any]) 
     return Laws(damping=damping, branches=tuple(branches))
 
 
-def proportional(
-    m: Material, rayleigh: tuple[float, float], rests: tuple[Any, Any]
-) -> tuple[Laws, tuple[float, ...]]:
+def proportional(m: Material, rests: tuple[Any, Any]) -> tuple[Laws, tuple[float, ...]]:
     """Laws of a body of one material, and the relaxation times of its branches.
 
     Parameters
     ----------
-    m : Material, without a modulus law of its own
-    rayleigh : a in 1/s and b in s of its Rayleigh damping
+    m : Material, without a modulus law of its own or a loss factor
     rests : (n, n) each, sparse: what K has beside the stiffness of the material, and C beside its
         damping
 
@@ -198,15 +195,15 @@ def proportional(
     for term in m.prony:
         shares[term.time] = shares.get(term.time, 0.0) + term.modulus / m.shear_modulus
     times = tuple(sorted(time for time, share in shares.items() if share))
-    lag = rayleigh[1] + m.viscosity / m.shear_modulus
+    lag = m.viscosity / m.shear_modulus
 
-    def multiple(share: float, mass: float = 0.0, rest: Any = None) -> Combination:
+    def multiple(share: float, rest: Any = None) -> Combination:
         if springs.nnz and share:
             rest = -share * springs if rest is None else rest - share * springs
-        return Combination(stiffness=share, mass=mass, rest=rest)
+        return Combination(stiffness=share, rest=rest)
 
     laws = Laws(
-        damping=multiple(lag, rayleigh[0], absorbing if absorbing.nnz else None),
+        damping=multiple(lag, absorbing if absorbing.nnz else None),
         branches=tuple(multiple(shares[time]) for time in times),
     )
     return laws, times

@@ -13,8 +13,9 @@ in-plane stress, and tension its forces on the normal displacement, as in `plane
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,10 +24,10 @@ from scipy import sparse
 from fem.assembly import Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
-from fem.materials import Material, rayleigh_damping
+from fem.materials import Material
+from fem.maxwell import MaxwellBranch, with_internal
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
 from fem.sparsity import UPPER, SparsityPattern, restricted, slabs
-from fem.viscoelastic import LOSS_BAND
 from meshes import MeshError, TetMesh
 from meshes.tetmesh import Floats, Ints
 
@@ -34,12 +35,43 @@ LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, whi
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Relaxing:
+    """Maxwell branches at large displacement, of j relaxation `times` in s.
+
+    Their springs are stretched by d (j, ...), d' = e' - d / times, of a strain e (...) =
+    `strain(u)` of any kind. `force(u, d)` (n_free,) in N is theirs together, `tangent(u, shares)`
+    (n_free, n_free) in N/m the derivative of that if d is shares (j,) of e, about, and `energy(d)`
+    (j,) what each stores, in J.
+    """
+
+    times: Floats
+    strain: Callable[[Floats], Floats]
+    force: Callable[[Floats, Floats], Floats]
+    tangent: Callable[[Floats, Floats], Any]
+    energy: Callable[[Floats], Floats]
+
+    @staticmethod
+    def linear(branches: Sequence[MaxwellBranch]) -> Relaxing:
+        """Branches whose strain is the displacement."""
+        each = [branch.K for branch in branches]
+
+        def force(u: Floats, d: Floats) -> Floats:
+            return np.asarray(sum(K @ x for K, x in zip(each, d, strict=True)))
+
+        return Relaxing(
+            times=np.array([branch.time for branch in branches]), strain=lambda u: u, force=force,
+            tangent=lambda u, shares: sum(x * K for x, K in zip(shares, each, strict=True)),
+            energy=lambda d: np.array([x @ (K @ x) / 2 for x, K in zip(d, each, strict=True)]),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Elastic:
     """Hyperelastic body: its forces at a large displacement u (n_free,) in metre of its free dofs.
 
-    `internal(u)` (n_free,) in N, its `tangent(u)` (n_free, n_free) in N/m, `viscous(u, v)`
-    (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in J; `operators`
-    is the linearisation at rest.
+    `internal(u)` (n_free,) in N at equilibrium, its `tangent(u)` (n_free, n_free) in N/m,
+    `viscous(u, v)` (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in
+    J; `relaxing` branches beside it; `operators` is the linearisation at rest.
     """
 
     operators: Operators
@@ -47,6 +79,7 @@ class Elastic:
     tangent: Callable[[Floats], sparse.csr_array]
     viscous: Callable[[Floats, Floats], Floats]
     energy: Callable[[Floats], float]
+    relaxing: tuple[Relaxing, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,8 +136,9 @@ def finite_strain(
 ) -> Elastic:
     """Hyperelastic body at large displacement, of tetrahedra and a membrane if there is one.
 
-    Mass and damping of the tetrahedra are those of `assemble`, linear and constant, which holds for
-    small rotations. In a membrane the viscous stress follows the rate of E.
+    Mass, damping and Maxwell branches of the tetrahedra are those of `assemble`, linear and
+    constant, which holds for small rotations. In a membrane the viscous stress follows the rate of
+    E, and branches are stretched by E.
 
     Parameters
     ----------
@@ -121,17 +155,12 @@ def finite_strain(
     ------
     ValueError
         If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock, or a
-        material has Prony terms or a law of its own; else as `assemble`.
+        material has a modulus law of its own; else as `assemble`.
     """
     n = len(mesh.points)
     solid = solid_part(mesh, material)
     operators = assemble(mesh, material, fixed=fixed, tension=tension)
-    if operators.branches:
-        raise ValueError(
-            "Prony terms and other modulus laws are not implemented at large displacement; leave "
-            "them out, or use one of the linear models"
-        )
-    free = operators.free
+    branches, free = with_internal(operators.branches), operators.free
 
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
@@ -145,12 +174,27 @@ def finite_strain(
         tangent=lambda u: restricted(tangent(solid, spread(u)), free) + T,
         viscous=lambda u, v: operators.C @ v,
         energy=lambda u: stored_energy(solid, spread(u)) + float(u @ (T @ u)) / 2,
+        relaxing=(Relaxing.linear(branches),) if branches else (),
     )
     if membrane is None:
         return body
     part, lag = membrane_part(mesh, membrane), stress_lag(membrane.material)
+    shares, times = relaxing_shares(membrane.material)
     K = restricted(tangent(part, np.zeros((n, 3))), free)
-    at_rest = replace(operators, K=operators.K + K, C=operators.C + lag * K, laws=None)
+    at_rest = replace(
+        operators, K=operators.K + K, C=operators.C + lag * K, laws=None,
+        branches=(*branches, *(
+            MaxwellBranch(K=x * K, time=time)
+            for x, time in zip(shares.tolist(), times.tolist(), strict=True)
+        )),
+    )  # fmt: skip
+    stretched = Relaxing(
+        times=times,
+        strain=lambda u: deformation(part, spread(u))[1],
+        force=lambda u, d: stress_force(part, spread(u), np.tensordot(shares, d, 1)).ravel()[free],
+        tangent=lambda u, x: shares @ x * restricted(tangent(part, spread(u)), free),
+        energy=lambda d: shares * np.array([strain_energy(part, e) for e in d]),
+    )
     return Elastic(
         operators=at_rest,
         internal=lambda u: body.internal(u) + internal_force(part, spread(u)).ravel()[free],
@@ -159,13 +203,25 @@ def finite_strain(
             body.viscous(u, v) + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
         ),
         energy=lambda u: body.energy(u) + stored_energy(part, spread(u)),
+        relaxing=(*body.relaxing, stretched) if len(times) else body.relaxing,
     )
 
 
 def stress_lag(material: Material) -> float:
-    """Viscous over elastic stress in s, at a rate of strain equal to the strain per second."""
-    rate = rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
-    return rate + material.viscosity / material.shear_modulus
+    """Viscous over elastic stress at rest in s, at a rate of strain equal to the strain per
+    second.
+    """
+    solid = material.without_loss_factor()
+    return solid.viscosity / solid.shear_modulus
+
+
+def relaxing_shares(material: Material) -> tuple[Floats, Floats]:
+    """Moduli (j,) of the Maxwell branches of a material over that at rest, and their times (j,) in
+    s.
+    """
+    solid = material.without_loss_factor()
+    shares = np.array([term.modulus / solid.shear_modulus for term in solid.prony])
+    return shares, np.array([term.time for term in solid.prony])
 
 
 def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Part:
@@ -200,7 +256,7 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
     MeshError
         If its triangles do not lie in one horizontal plane, seen anticlockwise from above.
     """
-    nodes, m = membrane.triangles, membrane.material
+    nodes, m = membrane.triangles, membrane.material.without_loss_factor()
     corners = mesh.points[nodes[:, :3]]
     edges = corners[:, 1:, :2] - corners[:, :1, :2]  # (e, d, k)
     area = np.linalg.det(edges) / 2
@@ -225,6 +281,13 @@ def internal_force(part: Part, u: Floats) -> Floats:
     return spread_stress(part, stress(part, E) @ F)
 
 
+def stress_force(part: Part, u: Floats, strain: Floats) -> Floats:
+    """Nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at the displacement u (n, 3)
+    in metre.
+    """
+    return spread_stress(part, stress(part, strain) @ deformation(part, u)[0])
+
+
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
     """Rate of nodal forces: those of the stress of the rate of E.
 
@@ -239,12 +302,16 @@ def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
     """
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
-    return spread_stress(part, stress(part, (rate + rate.swapaxes(2, 3)) / 2) @ F)
+    return stress_force(part, u, (rate + rate.swapaxes(2, 3)) / 2)
 
 
 def stored_energy(part: Part, u: Floats) -> float:
     """Strain energy in J of a part at the displacement u (n, 3) in metre."""
-    E = deformation(part, u)[1]
+    return strain_energy(part, deformation(part, u)[1])
+
+
+def strain_energy(part: Part, E: Floats) -> float:
+    """Energy in J of a part at the strain E (e, q, k, l)."""
     return float((part.volume[..., None, None] * stress(part, E) * E).sum() / 2)
 
 

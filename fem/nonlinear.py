@@ -1,10 +1,11 @@
-"""Nonlinear statics and dynamics at large displacement: M u'' + f_int(u, u') = f(t, u).
+"""Nonlinear statics and dynamics at large displacement: M u'' + f_int(u, u', d) = f(t, u).
 
 Statics by Newton's method with a line search, in load steps if need be. Dynamics by the
 generalized-alpha method of `transient` with the internal force weighted between the ends of a step,
 
     M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
 
+with the stretches d of Maxwell branches, which follow by the trapezoidal rule, at their ends
 (Chung and Hulbert, J Appl Mech 60:371 (1993); Newton in time: Belytschko, Liu and Moran, Nonlinear
 Finite Elements for Continua and Structures (2000), chapter 6). One factorisation serves as many
 steps as Newton's method converges with it (modified Newton). Average acceleration conserves energy
@@ -136,7 +137,9 @@ def _line_search(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Now:
-    """Free components of a state, with the load and the elastic and viscous force."""
+    """Free components of a state, with the load and the internal force; the strain and stretch of
+    each kind of Maxwell branches.
+    """
 
     t: float
     u: Floats
@@ -144,6 +147,8 @@ class _Now:
     a: Floats
     force: Floats
     internal: Floats
+    strain: tuple[Floats, ...]
+    stretch: tuple[Floats, ...]
 
 
 def dynamic(
@@ -173,7 +178,7 @@ def dynamic(
     Yields
     ------
     State
-        At 0, dt, 2 dt, ...
+        At 0, dt, 2 dt, ..., with the stretches (j, ...) of each of `body.relaxing`.
 
     Raises
     ------
@@ -186,9 +191,14 @@ def dynamic(
     free, start = body.operators.free, initial or at_rest(body.operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
     f, internal = force(start.time, start.displacement)[free], body.internal(u)
-    viscous = body.viscous(u, v)
-    a = acceleration(body.operators, f - viscous - internal)
-    now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal + viscous)
+    strain = tuple(part.strain(u) for part in body.relaxing)
+    stretch = start.stretch or tuple(
+        np.zeros((len(part.times), *e.shape)) for part, e in zip(body.relaxing, strain, strict=True)
+    )
+    internal = internal + body.viscous(u, v) + _relaxing_force(body, u, stretch)
+    a = acceleration(body.operators, f - internal)
+    now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal,
+               strain=strain, stretch=stretch)  # fmt: skip
     march = _March(body=body, force=force, scheme=scheme, tolerance=tolerance, solver=solver)
     factors: dict[float, Factor] = {}
     for step in count(1):
@@ -237,19 +247,24 @@ def _step(
     body, (a_m, a_f, beta, gamma) = march.body, march.scheme
     C, M, free = body.operators.C, body.operators.M, body.operators.free
     dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
+    shares = [2 * part.times / (dt + 2 * part.times) for part in body.relaxing]
     predicted = now.u + dt * now.v + dt**2 * (0.5 - beta) * now.a
     for _ in range(MOST_ITERATIONS):
         u = predicted + dt**2 * beta * a
         v = now.v + dt * ((1 - gamma) * now.a + gamma * a)
         f = march.force(until, body.operators.expand(u))[free]
-        internal = body.internal(u) + body.viscous(u, v)
+        _, stretch = _relaxed(body, now, u, shares)
+        internal = body.internal(u) + body.viscous(u, v) + _relaxing_force(body, u, stretch)
         load = (1 - a_f) * f + a_f * now.force
         r = load - M @ ((1 - a_m) * a + a_m * now.a) - (1 - a_f) * internal - a_f * now.internal
         residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
         if not np.isfinite(residual):
             break
         if halvings not in factors:
-            system = (1 - a_m) * M + (1 - a_f) * dt * (gamma * C + beta * dt * body.tangent(u))
+            K = body.tangent(u)
+            for part, share in zip(body.relaxing, shares, strict=True):
+                K = K + part.tangent(u, share)
+            system = (1 - a_m) * M + (1 - a_f) * dt * (gamma * C + beta * dt * K)
             try:
                 factors[halvings] = factorise(system, backend=march.solver)
             except ValueError:
@@ -265,25 +280,48 @@ def _step(
             # an old tangent, a small part of it. The balance of forces stands for it.
             u, v = u + dt**2 * beta * change, v + dt * gamma * change
             internal = (load - M @ ((1 - a_m) * a + a_m * now.a) - a_f * now.internal) / (1 - a_f)
-            return _Now(t=until, u=u, v=v, a=a, force=f, internal=internal)
+            strain, stretch = _relaxed(body, now, u, shares)
+            return _Now(t=until, u=u, v=v, a=a, force=f, internal=internal,
+                        strain=strain, stretch=stretch)  # fmt: skip
         if left > SLOW * before:
             factors.pop(halvings)
         before = left
     raise _Stuck(residual)
 
 
+def _relaxed(
+    body: Elastic, now: _Now, u: Floats, shares: list[Floats]
+) -> tuple[tuple[Floats, ...], tuple[Floats, ...]]:
+    """Strains and stretches of the branches at the end of a step, at a displacement u."""
+    strain = tuple(part.strain(u) for part in body.relaxing)
+    each = zip(shares, now.stretch, now.strain, strain, strict=True)
+    return strain, tuple(
+        np.multiply.outer(2 * x - 1, np.ones_like(new)) * d + np.multiply.outer(x, new - old)
+        for x, d, old, new in each
+    )
+
+
+def _relaxing_force(body: Elastic, u: Floats, stretch: tuple[Floats, ...]) -> Floats:
+    each = zip(body.relaxing, stretch, strict=True)
+    return sum((part.force(u, d) for part, d in each), np.zeros_like(u))
+
+
 def _state(body: Elastic, now: _Now) -> State:
     expand = body.operators.expand
     return State(
-        time=now.t, displacement=expand(now.u), velocity=expand(now.v), acceleration=expand(now.a)
-    )
+        time=now.t, displacement=expand(now.u), velocity=expand(now.v), acceleration=expand(now.a),
+        stretch=now.stretch,
+    )  # fmt: skip
 
 
 def total_energy(body: Elastic, state: State) -> float:
     """Kinetic and stored energy of a state in J."""
     free = body.operators.free
     v = state.velocity[free]
-    return float(v @ (body.operators.M @ v)) / 2 + body.energy(state.displacement[free])
+    stretched = zip(body.relaxing, state.stretch, strict=bool(state.stretch))
+    springs = sum(float(part.energy(d).sum()) for part, d in stretched)
+    moving = float(v @ (body.operators.M @ v)) / 2
+    return moving + body.energy(state.displacement[free]) + springs
 
 
 def with_energy_balance(
@@ -309,6 +347,10 @@ def with_energy_balance(
         moved = (state.displacement - before.displacement)[free]
         middle = (state.displacement + before.displacement)[free] / 2
         dt = state.time - before.time
-        return EnergyBalance(dissipated=float(moved @ body.viscous(middle, moved)) / dt)
+        dissipated = float(moved @ body.viscous(middle, moved)) / dt
+        both = zip(body.relaxing, before.stretch, state.stretch, strict=True)
+        for part, old, new in both:
+            dissipated += dt * float((2 / part.times) @ part.energy((old + new) / 2))
+        return EnergyBalance(dissipated=dissipated)
 
     return with_losses(states, force, free, lost)

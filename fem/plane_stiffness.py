@@ -13,7 +13,7 @@ of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,15 +30,10 @@ SIDES = np.eye(3)[:2]  # unit vectors (2, 3) along the sides x and y of a sheet 
 
 @dataclass(frozen=True, kw_only=True)
 class Tension:
-    """Uniform in-plane tension of a sheet, `x` and `y` in N/m along its sides.
-
-    It has no loss. `share`, if given, is the elastic share (f,) of the stiffness of bending waves
-    at angular frequencies (f,) in rad/s, which the damping is fitted to.
-    """
+    """Uniform in-plane tension of a sheet, `x` and `y` in N/m along its sides. It has no loss."""
 
     x: float
     y: float
-    share: Callable[[Floats], Floats] | None = None
 
 
 def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:

@@ -398,14 +398,13 @@ def _converged(
 def _expansion(
     operators: Operators, added: AddedMass | None, band: float
 ) -> tuple[float, Operators]:
-    """Expansion point in rad/s, and the operators with an added mass, of which C and M can only be
+    """Expansion point in rad/s, and the operators with an added mass, of which M can only be
     applied.
     """
     if added is None:
         relaxing = 2 * np.pi * RELAXING_POINT * band
         return relaxing if operators.branches else EXPANSION_POINT, operators
-    C, M = aslinearoperator(operators.C), aslinearoperator(operators.M)
-    return 0.0, replace(operators, C=C + added.rate * added.M, M=M + added.M, laws=None)
+    return 0.0, replace(operators, M=aslinearoperator(operators.M) + added.M)
 
 
 def _independent(start_vectors: Floats) -> Floats:

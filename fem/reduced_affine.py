@@ -25,7 +25,6 @@ from fem.affine import (
     fluid_of,
     in_vacuum,
     interpolated,
-    modulus,
     operators_of,
     project,
     weights,
@@ -36,7 +35,7 @@ from fem.line_basis import FAINT, Complex, line_errors
 from fem.reduced import reduce
 from meshes.tetmesh import Floats
 
-LOSS_AT = 2j * np.pi * 200.0  # rad/s, where losses are compared
+LOSS_AT = 2 * np.pi * 200.0  # rad/s, where losses are compared
 NESTED = 3 / 4  # of the moments: a smaller basis, from which the change is taken
 CHECKED = 2  # materials of which the full body is solved, one line each
 MOST_BASES = 6
@@ -131,7 +130,7 @@ def reduce_affine(
         full = training[t].geometry()
         model = reduce(
             operators_of(in_vacuum(full.affine), training[t].solids), full.probes, band,
-            tolerance / 2, loads=full.loads, added=fluid_of(full.affine, training[t].solids),
+            tolerance / 2, loads=full.loads, added=fluid_of(full.affine),
             solver=solver,
             progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
         )  # fmt: skip
@@ -270,7 +269,7 @@ def _fluid_share(model: AffineModel, variant: Variant, frequencies: Floats, line
 
 def _mass(affine: AffineOperators, solids: Solids) -> LinearOperator:
     """Mass (n, n) of the full body, with that of a fluid."""
-    own, fluid = operators_of(in_vacuum(affine), solids).M, fluid_of(affine, solids)
+    own, fluid = operators_of(in_vacuum(affine), solids).M, fluid_of(affine)
     return aslinearoperator(own) + fluid.M if fluid else aslinearoperator(own)
 
 
@@ -291,7 +290,7 @@ def _joined(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
 
 def _loss(solids: Solids) -> float:
     """Sum of the loss tangents of all materials."""
-    moduli = np.array([modulus(m, np.array(LOSS_AT)) for m in solids.materials])
+    moduli = np.array([m.complex_modulus(LOSS_AT) for m in solids.materials])
     return float((moduli.imag / moduli.real).sum())
 
 

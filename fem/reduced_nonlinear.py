@@ -15,7 +15,7 @@ Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -29,13 +29,17 @@ from fem.finite_strain import (
     Elastic,
     Membrane,
     Part,
+    Relaxing,
     membrane_part,
+    relaxing_shares,
     spread_stress,
     stress,
     stress_lag,
     tangent,
 )
 from fem.linear_solver import factorise
+from fem.materials import Material
+from fem.maxwell import with_internal
 from fem.sheet_reading import SheetReading, modal_slopes
 from fem.sparsity import restricted
 from fem.static import modes
@@ -97,10 +101,8 @@ def stretching_modes(
         If the modes do not converge.
     """
     hz, shapes = modes(operators, n, solver=solver)
-    damping: Any = 0.0
     if added is not None:
         hz, shapes = _with_added(operators, added, hz, shapes)
-        damping = added.rate * _projected(added.M, shapes[operators.free])
     part = membrane_part(mesh, membrane)
     w = shapes.reshape(-1, 3, n)[:, 2]
     slopes = (part.D @ w).reshape(*part.G.shape[:3], n)  # (e, q, k, m)
@@ -115,12 +117,16 @@ def stretching_modes(
             progress(k / len(states))
     modal = Operators(
         K=sparse.diags_array((2 * np.pi * hz) ** 2).tocsr(),
-        C=sparse.csr_array(_projected(operators.C, shapes[operators.free]) + damping),
+        C=sparse.csr_array(_projected(operators.C, shapes[operators.free])),
         M=sparse.eye_array(n).tocsr(), R=sparse.csr_array((n, n)), free=np.arange(n), n_dofs=n,
+        branches=tuple(
+            replace(branch, K=sparse.csr_array(_projected(branch.K, shapes[operators.free])))
+            for branch in operators.branches
+        ),
     )  # fmt: skip
     return StretchingModes(
         basis=shapes, hz=hz, H=H, left_out=left_out,
-        elastic=modal_elastic(modal, H, stress_lag(membrane.material)),
+        elastic=modal_elastic(modal, H, membrane.material),
     )  # fmt: skip
 
 
@@ -137,14 +143,14 @@ def _projected(A: Any, shapes: Floats) -> Floats:
     return np.asarray(shapes.T @ (A @ shapes))
 
 
-def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
+def modal_elastic(modal: Operators, H: Floats, material: Material) -> Elastic:
     """Strain energy of a sheet in its modal coordinates z, and its derivatives.
 
     Parameters
     ----------
     modal : Operators, diagonal K in 1/s2, of r modes
     H : (k, r, r) float, geometric stiffness of each state of stress
-    lag : s, viscosity over modulus, as of `stress_lag`
+    material : Material, of the sheet as it stretches
 
     Returns
     -------
@@ -152,7 +158,9 @@ def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
         In coordinates (r,).
     """
     squares, n = modal.K.diagonal(), len(modal.free)
-    stacked = H.reshape(-1, n)
+    stacked, lag = H.reshape(-1, n), stress_lag(material)
+    shares, times = relaxing_shares(material)
+    branches = with_internal(modal.branches)
 
     @lru_cache(maxsize=2)
     def product(z: bytes) -> Floats:
@@ -174,9 +182,18 @@ def modal_elastic(modal: Operators, H: Floats, lag: float) -> Elastic:
         y = product(z.tobytes()) @ z / 2
         return float(squares @ z**2 + y @ y) / 2
 
-    return Elastic(
-        operators=modal, internal=internal, tangent=stiffness, viscous=viscous, energy=energy
+    stretched = Relaxing(
+        times=times,
+        strain=lambda z: product(z.tobytes()) @ z / 2,
+        force=lambda z, d: shares @ d @ product(z.tobytes()),
+        tangent=lambda z, x: shares @ x * sparse.csr_array(stiffness(z) - modal.K),
+        energy=lambda d: shares * (d**2).sum(axis=1) / 2,
     )
+    relaxing = ((branches, Relaxing.linear(branches)), (shares.tolist(), stretched))
+    return Elastic(
+        operators=modal, internal=internal, tangent=stiffness, viscous=viscous, energy=energy,
+        relaxing=tuple(part for some, part in relaxing if some),
+    )  # fmt: skip
 
 
 def in_plane_matrices(

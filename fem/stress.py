@@ -26,10 +26,9 @@ from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
-from fem.materials import Material, rayleigh_damping
+from fem.materials import Material
 from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
-from fem.viscoelastic import LOSS_BAND
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
 from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke
@@ -105,17 +104,17 @@ def stress_operator(
 
 
 def relaxation(material: Material, s: Any) -> Any:
-    """Complex modulus of the assembled equations over that at rest, at complex frequencies s in
-    rad/s: a loss factor is in them as the viscosity of Rayleigh's damping. A branch that is as fast
-    as s, which moves no displacement, counts as 0.
+    """Complex modulus of a material over its `shear_modulus`, at complex frequencies s in rad/s. A
+    branch that is as fast as s, which moves no displacement, counts as 0.
     """
     mu = material.shear_modulus
     if material.law is not None:
         return material.complex_modulus(np.real_if_close(-1j * np.asarray(s))) / mu
-    lag = material.viscosity / mu + rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
+    solid = material.without_loss_factor()
     with np.errstate(divide="ignore", invalid="ignore"):
-        branches = material.relaxing_modulus(-1j * np.asarray(s)) / mu
-    return 1 + s * lag + np.where(np.isfinite(branches), branches, 0.0)
+        branches = solid.relaxing_modulus(-1j * np.asarray(s))
+    branches = np.where(np.isfinite(branches), branches, 0.0)
+    return (solid.shear_modulus + s * solid.viscosity + branches) / mu
 
 
 def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
@@ -124,7 +123,7 @@ def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
 
     Parameters
     ----------
-    stress : (t, ...) float, Pa, by the moduli at rest
+    stress : (t, ...) float, Pa, by the `shear_modulus` of the material
     dt : float, s, between samples, the first of which is at rest
     material : Material
 
@@ -142,9 +141,9 @@ def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
 
     if material.law is not None:
         raise ValueError(NO_INTERNAL)
-    mu = material.shear_modulus
-    lag = material.viscosity / mu + rayleigh_damping(material.loss_factor, LOSS_BAND)[1]
-    found = stress
+    mu, material = material.shear_modulus, material.without_loss_factor()
+    lag = material.viscosity / mu
+    found = material.shear_modulus / mu * stress
     if lag:
         rate = CubicSpline(np.arange(len(stress)) * dt, stress).derivative()
         found = found + lag * rate(np.arange(len(stress)) * dt)
@@ -166,7 +165,7 @@ def materials_at(
 
     Returns
     -------
-    p materials
+    p materials, their loss factors as Prony terms
     """
     materials, region = by_region(mesh, material)
     return tuple(materials[r] for r in region[locate(mesh, points)[0]])

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from fem.materials import Material, rayleigh_damping
+from fem.materials import Material
 from fem.maxwell import Branch, DispersiveBranch, MaxwellBranch
 from meshes.tetmesh import Floats
 
-LOSS_BAND = (50.0, 600.0)  # Hz, the lines that a Tacton makes
 Matrices = tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]
 
 
@@ -19,34 +18,24 @@ def property_of(materials: list[Material], name: str) -> Floats:
     return np.array([getattr(m, name) for m in materials], np.float64)
 
 
-def rayleigh_rates(
-    material: Material, share: Callable[[Floats], Floats] | None = None
-) -> tuple[float, float]:
-    """`rayleigh_damping` of a material over the lines that a Tacton makes."""
-    return rayleigh_damping(material.loss_factor, LOSS_BAND, share)
-
-
 def viscoelastic(
     materials: list[Material],
     stiffness: Callable[[Floats], sparse.csr_array],
     mass: Callable[[Floats], sparse.csr_array],
-    share: Callable[[Floats], Floats] | None = None,
 ) -> Matrices:
     """K, C, M and the branches of all materials.
 
     Parameters
     ----------
-    materials : list of Material, r
+    materials : list of Material, r, without loss factors
     stiffness : shares (r,) of each material's moduli -> their stiffness, linear in the shares
     mass : densities (r,) in kg/m3 -> their mass, linear in them
-    share : elastic share of the stiffness, as of `rayleigh_damping`
 
     Returns
     -------
     K in N/m, C in N s/m, M in kg, and branches
     """
     rho, mu = (property_of(materials, name) for name in ("density", "shear_modulus"))
-    mass_rate, hysteretic_lag = np.array([rayleigh_rates(m, share) for m in materials]).T
     K, M = stiffness(np.ones(len(materials))), mass(rho)
 
     def portion(share: Floats) -> sparse.csr_array:
@@ -57,11 +46,7 @@ def viscoelastic(
         summed.eliminate_zeros()
         return summed
 
-    C = portion(hysteretic_lag + property_of(materials, "viscosity") / mu)
-    if np.ptp(mass_rate):
-        C = C + mass(mass_rate * rho)
-    elif mass_rate[0]:
-        C = C + mass_rate[0] * M
+    C = portion(property_of(materials, "viscosity") / mu)
     return K, C, M, _branches(materials, portion)
 
 

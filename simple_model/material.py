@@ -2,14 +2,14 @@
 
 The complex shear modulus (time exp(+i w t)) is
 
-    mu(w) = mu (1 + i loss_factor) + i w viscosity + sum_j mu_j i w tau_j / (1 + i w tau_j)
+    mu(w) = mu h(w) + i w viscosity + sum_j mu_j i w tau_j / (1 + i w tau_j)
 
-With viscosity alone that is the Kelvin-Voigt model, with Prony terms a generalised Maxwell solid
-(Simo and Hughes, Computational Inelasticity (1998), chapter 10), with one of them the standard
-linear solid (C. Zener, Elasticity and Anelasticity of Metals, 1948): mu in slow and mu + sum mu_j
-in fast motion. A `law` replaces all of it, and models that need internal variables take its Prony
-series. Poisson's ratio is constant, so that the whole stiffness scales with mu; that of an
-orthotropic sheet is of its isotropic mean.
+where h is 1, or with a loss factor that of `constant_loss`. With viscosity alone that is the
+Kelvin-Voigt model, with Prony terms a generalised Maxwell solid (Simo and Hughes, Computational
+Inelasticity (1998), chapter 10), with one of them the standard linear solid (C. Zener, Elasticity
+and Anelasticity of Metals, 1948): mu in slow and mu + sum mu_j in fast motion. A `law` replaces all
+of it, and models that need internal variables take its Prony series. Poisson's ratio is constant,
+so that the whole stiffness scales with mu; that of an orthotropic sheet is of its isotropic mean.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simple_model.constant_loss import LARGEST_LOSS_FACTOR, constant_loss
 from simple_model.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
 from simple_model.orthotropy import Orthotropy
 from simple_model.prony import (
@@ -57,10 +58,12 @@ class Material:
     Parameters
     ----------
     density : float, kg/m3
-    shear_modulus : float, Pa, at equilibrium: fully relaxed
+    shear_modulus : float, Pa, at equilibrium: fully relaxed; with a loss factor, the storage
+        modulus at 150 Hz without viscosity and Prony terms
     poisson : float, -1 < poisson < 0.5
     viscosity : float, Pa s, Kelvin-Voigt: shear stress per shear rate
-    loss_factor : float, hysteretic loss, the same at every frequency
+    loss_factor : float, loss over storage modulus, nearly constant from 10 Hz to 2 kHz, as of
+        `constant_loss`
     prony : Prony terms, each with the modulus that it adds in fast motion, and its time
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa, in place of all
         other terms, or None: a record of `modulus_laws`, or any function that is analytic at
@@ -93,6 +96,11 @@ class Material:
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
+        if self.loss_factor > LARGEST_LOSS_FACTOR:
+            raise ValueError(
+                f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "
+                "more liquid than solid; give a viscosity instead"
+            )
         if not -1 < self.poisson < 0.5:
             raise ValueError(
                 f"poisson = {self.poisson} is outside -1 < poisson < 0.5; "
@@ -152,16 +160,17 @@ class Material:
 
     def complex_modulus(self, omega: ArrayLike) -> Any:
         """Complex shear modulus (...) in Pa of motion exp(+i w t), at w (...) in rad/s, which may
-        be complex; not below 0 with a loss factor, whose loss has one sign.
+        be complex.
         """
         omega = np.asarray(omega)
         if self.law is not None:
             return self.law(omega)
-        lasting = self.shear_modulus * (1 + 1j * self.loss_factor) + 1j * omega * self.viscosity
-        return lasting + self.relaxing_modulus(omega)
+        solid = self.without_loss_factor()
+        lasting = solid.shear_modulus + 1j * omega * solid.viscosity
+        return lasting + solid.relaxing_modulus(omega)
 
     def relaxing_modulus(self, omega: ArrayLike) -> Any:
-        """The part (...) in Pa of the complex modulus that Prony terms add."""
+        """The part (...) in Pa of the complex modulus that the given Prony terms add."""
         return sum((term(omega) for term in self.prony), np.zeros((), np.complex128))
 
     def series(self, tolerance: float = FIT_TOLERANCE) -> PronySeries:
@@ -174,9 +183,11 @@ class Material:
         return fit_prony(self.law, rest=self.shear_modulus, tolerance=tolerance)
 
     def relaxing(self, tolerance: float = FIT_TOLERANCE) -> Material:
-        """The material with internal variables: its law's Prony series in place of the law."""
+        """The material with internal variables alone: Prony series in place of its law or its loss
+        factor.
+        """
         if self.law is None:
-            return self
+            return self.without_loss_factor()
         series = self.series(tolerance)
         return replace(
             self,
@@ -184,6 +195,21 @@ class Material:
             viscosity=series.viscosity,
             prony=series.terms,
             law=None,
+        )
+
+    def without_loss_factor(self) -> Material:
+        """The same material with its loss factor as Prony terms."""
+        if not self.loss_factor:
+            return self
+        factor = constant_loss(self.loss_factor)
+        series = factor.scaled(self.shear_modulus)
+        return replace(
+            self,
+            shear_modulus=series.shear_modulus,
+            viscosity=self.viscosity + series.viscosity,
+            loss_factor=0.0,
+            prony=(*self.prony, *series.terms),
+            orthotropy=self.orthotropy and self.orthotropy.scaled(factor.shear_modulus),
         )
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> Material:

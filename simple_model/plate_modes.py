@@ -12,19 +12,23 @@ are their own, and products that would move it are left out. Where a plate is th
 of its middle, even and odd modes are found apart. The second term of T is the air on both sides of
 a plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
 
-Tension has no loss, so that of bending couples the modes of a stretched plate, close ones most.
+Tension has no loss, so that the complex modulus of bending couples the modes of a stretched plate,
+close ones most.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, sparse
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from simple_model.compliance import AIR_DENSITY
-from simple_model.material import Complex, Floats
+from simple_model.material import Complex, Floats, ModulusLaw
 from simple_model.plate_air import air_mass
 from simple_model.polynomials import LineBasis, line_basis, piecewise_basis
 
@@ -37,6 +41,7 @@ LAYER = 0.1  # of a clip's radius, beside its sides
 SHIFT = 1e-12  # of the mean squared frequency
 MOST_DOFS = 6000  # of one symmetry: some minutes
 COUPLED = 1.5  # of a line's frequency: modes above it are almost what they are by themselves
+RESIDUAL = 1e-6  # relative, of coupled modes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,71 +202,106 @@ def steady_response(
     frequencies: Floats,
     forces: Complex,
     outputs: Floats,
-    loss_factor: float | Floats,
+    modulus: ModulusLaw,
 ) -> Complex:
     """Steady displacement: the shapes of the modes times their `modal_motion`.
 
     Parameters
     ----------
-    modes, frequencies, forces, loss_factor : as of `modal_motion`
+    modes, frequencies, forces, modulus : as of `modal_motion`
     outputs : (p, m) shapes where it is read, of `PlateModes.at`
 
     Returns
     -------
     (f, p) complex, metre
     """
-    return np.asarray(modal_motion(modes, frequencies, forces, loss_factor) @ outputs.T)
+    return np.asarray(modal_motion(modes, frequencies, forces, modulus) @ outputs.T)
 
 
 def modal_motion(
-    modes: PlateModes, frequencies: Floats, forces: Complex, loss_factor: float | Floats
+    modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Steady modal coordinates q of (diag(w_m^2) + i eta B - w^2) q = force, B the stiffness of
-    bending between the modes; the mean, at 0 Hz, without loss.
+    """Steady modal coordinates q of (diag(w_m^2) + (h - 1) B - w^2) q = force, B the stiffness of
+    bending between the modes and h its relative modulus.
 
     Parameters
     ----------
     modes : PlateModes
     frequencies : (f,) Hz
     forces : (f, m) modal forces in N kg^-1/2
-    loss_factor : eta of bending; one, or one a frequency (f,), the same where these are
+    modulus : angular frequencies (...) in rad/s -> complex modulus (...) over that of the modes
 
     Returns
     -------
     (f, m) complex, metre kg^1/2
+
+    Raises
+    ------
+    ArithmeticError
+        If the coupled modes of a stretched plate are not solved to `RESIDUAL`.
     """
-    w = 2 * np.pi * np.asarray(frequencies)[:, None]
-    loss = np.where(w > 0, np.reshape(loss_factor, (-1, 1)), 0.0)
-    found = np.array(forces / (modes.squared * (1 + 1j * loss * modes.elastic) - w**2))
+    w = 2 * np.pi * np.asarray(frequencies)
+    added = np.broadcast_to(modulus(w) - 1, w.shape)
+    found = modal_motion_apart(modes, frequencies, forces, modulus)
     first = 0
     for family in modes.families:
-        own = slice(first, first := first + len(family.squared))
+        part = slice(first, first := first + len(family.squared))
         if family.bending is not None:
-            found[:, own] = _coupled(family, w[:, 0], loss[:, 0], forces[:, own], found[:, own])
+            lossy = np.flatnonzero(added)
+            found[lossy, part] = _coupled(family, w[lossy], added[lossy], forces[lossy, part])
     return found
 
 
-def _coupled(family: Family, w: Floats, loss: Floats, forces: Complex, apart: Complex) -> Complex:
-    """Modal coordinates (f, m) of a stretched plate: the low ones together, and by one step of
-    Gauss and Seidel with the high ones, which are almost as they are `apart`.
+def modal_motion_apart(
+    modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
+) -> Complex:
+    """Modal coordinates as of `modal_motion`, without the coupling of the modes."""
+    w = 2 * np.pi * np.asarray(frequencies)[:, None]
+    bending = modulus(w) * modes.elastic
+    return np.asarray(forces / (modes.squared * (1 - modes.elastic + bending) - w**2))
+
+
+def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
+    """Modal coordinates (f, m) of a stretched plate, by GMRES: the low modes are solved together
+    before, the high ones are almost what they are apart.
     """
     assert family.bending is not None
-    found, elastic = apart.copy(), family.elastic
-    lossy = np.flatnonzero(loss)
-    _, first, which = np.unique(np.round(w[lossy], 6), return_index=True, return_inverse=True)
-    for each, k in enumerate(lossy[first].tolist()):
-        same = lossy[which == each]  # lines of one frequency, of several loads
+    found, B = np.empty(forces.shape, np.complex128), family.bending
+    _, first, which = np.unique(np.round(w, 6), return_index=True, return_inverse=True)
+    for each, k in enumerate(first.tolist()):
         n = int(np.searchsorted(family.squared, (COUPLED * w[k]) ** 2))
-        if not n:
-            continue
-        between, high = 1j * loss[k] * family.bending[:n, n:], apart[same, n:]
-        dynamic = 1j * loss[k] * family.bending[:n, :n]
-        dynamic[np.diag_indices(n)] += family.squared[:n] - w[k] ** 2
-        right = (forces[same, :n] - high @ between.T).T
-        low = linalg.solve(dynamic, right, assume_a="sym", check_finite=False).T
-        own = family.squared[n:] * (1 + 1j * loss[k] * elastic[n:]) - w[k] ** 2
-        found[same, :n], found[same, n:] = low, high - low @ between / own
+        low = added[k] * B[:n, :n]
+        low[np.diag_indices(n)] += family.squared[:n] - w[k] ** 2
+        factor = linalg.lu_factor(low, check_finite=False) if n else None
+        own = family.squared * (1 + added[k] * family.elastic) - w[k] ** 2
+        of_mode = partial(_low_together, factor, own, n)
+        full = partial(_modal_forces, B, added[k], family.squared - w[k] ** 2)
+        size = len(family.squared)
+        system, before = (
+            LinearOperator((size, size), matvec=f, dtype=np.complex128) for f in (full, of_mode)
+        )
+        for line in np.flatnonzero(which == each).tolist():  # of several loads
+            found[line], failed = gmres(system, forces[line], M=before, rtol=RESIDUAL, maxiter=10)
+            if failed:
+                raise ArithmeticError(
+                    f"the modes of a stretched plate are not solved to a residual of {RESIDUAL:g} "
+                    f"at {w[k] / 2 / np.pi:.4g} Hz; lower its loss"
+                )
     return found
+
+
+def _low_together(factor: Any, own: Complex, n: int, forces: Complex) -> Complex:
+    """Modal coordinates of the n low modes together, and of the others apart."""
+    found = forces / own
+    if n:
+        found[:n] = linalg.lu_solve(factor, forces[:n], check_finite=False)
+    return found
+
+
+def _modal_forces(B: Floats, added: complex, diagonal: Floats, q: Complex) -> Complex:
+    """Modal forces of modal coordinates q (m,)."""
+    bent = B @ np.column_stack([q.real, q.imag])  # real, which is faster
+    return np.asarray(diagonal * q + added * (bent @ [1, 1j]))
 
 
 def _symmetries(plate: Plate) -> tuple[bool, bool]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from simple_model.focus import spot_detail, spot_reach
 from simple_model.load_spectrum import load_lines, path_forces, path_samples
-from simple_model.material import Complex, Floats
+from simple_model.material import Complex, Floats, ModulusLaw
 from simple_model.plate_modes import PlateModes, steady_response
 from simple_model.pressure import MovingPressure
 
@@ -49,7 +49,7 @@ def plate_lines(
     modes: PlateModes,
     pressure: MovingPressure,
     probes: ArrayLike,
-    loss_factor: float,
+    modulus: ModulusLaw,
     *,
     middle: Sequence[float] = MIDDLE,
     path: Complex | None = None,
@@ -61,7 +61,7 @@ def plate_lines(
     modes : PlateModes
     pressure : MovingPressure
     probes : (p, 2) metre, in the scene
-    loss_factor : of bending
+    modulus : of bending, as of `modal_motion`
     middle : (2,) metre, of the plate in the scene
     path : (n, m) of `modal_path_forces`, if they are known
 
@@ -73,7 +73,7 @@ def plate_lines(
     path = modal_path_forces(modes, pressure, middle) if path is None else path
     frequencies, forces = load_lines(pressure).gather(path)
     outputs = modes.at(np.asarray(probes, np.float64) - middle)
-    return frequencies, steady_response(modes, frequencies, forces, outputs, loss_factor)
+    return frequencies, steady_response(modes, frequencies, forces, outputs, modulus)
 
 
 def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:

@@ -13,7 +13,7 @@ Least Squares Problems (1974), chapter 23).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isfinite
 from typing import Any
@@ -92,6 +92,15 @@ class PronySeries:
         lasting = self.shear_modulus + 1j * np.asarray(omega) * self.viscosity
         return sum((term(omega) for term in self.terms), lasting)
 
+    def scaled(self, factor: float) -> PronySeries:
+        """The series with all its moduli multiplied by a factor."""
+        return replace(
+            self,
+            shear_modulus=factor * self.shear_modulus,
+            viscosity=factor * self.viscosity,
+            terms=tuple(replace(term, modulus=factor * term.modulus) for term in self.terms),
+        )
+
     @property
     def words(self) -> str:
         """Terms, error and band, as in a plan."""
@@ -139,7 +148,9 @@ def fit_prony(
     found: list[PronySeries] = []
     for n in range(MOST_TERMS + 1):
         ends = [(w[0] / slow, w[-1] * fast) for slow in BEYOND for fast in BEYOND]
-        fits = [_fitted(w, mu, _times(*end, n), rest, band) for end in ends[: None if n else 1]]
+        fits = [
+            fitted_series(w, mu, _times(*end, n), rest, band) for end in ends[: None if n else 1]
+        ]
         found.append(min(fits, key=lambda series: series.error))
         if found[-1].error <= tolerance:
             return found[-1]
@@ -163,7 +174,7 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
     times = _times(w[0] / 30, w[-1] * 30, 9 + round(3 * np.log10(w[-1] / w[0])))
-    away = np.abs(_fitted(w, moduli, times, None, (0.0, 0.0))(w) - moduli) / np.abs(moduli)
+    away = np.abs(fitted_series(w, moduli, times, None, (0.0, 0.0))(w) - moduli) / np.abs(moduli)
     mean, worst = float(np.sqrt(np.mean(away**2))), int(away.argmax())
     if mean > CAUSAL:
         raise ValueError(
@@ -203,10 +214,23 @@ def _times(slowest: float, fastest: float, n: int) -> Floats:
     return 1 / np.geomspace(slowest, fastest, n)
 
 
-def _fitted(
+def fitted_series(
     w: Floats, mu: Complex, times: Floats, rest: float | None, band: tuple[float, float]
 ) -> PronySeries:
-    """Series of given times, by non-negative least squares of the relative deviation."""
+    """Prony series of given times, by non-negative least squares of the relative deviation.
+
+    Parameters
+    ----------
+    w : (f,) float, rad/s
+    mu : (f,) complex, Pa, the modulus there
+    times : (n,) float, s
+    rest : Pa, the modulus at rest, or None if it is to be found
+    band : Hz, as of `PronySeries`
+
+    Returns
+    -------
+    PronySeries
+    """
     from scipy.optimize import nnls  # which takes long to import
 
     turned = 1j * w[:, None] * times

@@ -1,5 +1,6 @@
 """Dispersion curves beside closed forms, published roots and a determinant that shares no code."""
 
+from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
@@ -213,7 +214,9 @@ def test_bending_waves_of_a_sheet_in_vacuum_and_in_air():
         thin_sheet(paper, 1e-4, air_density=0), [0.02], [280 * pi], WIDTH
     )
     assert abs(sum(m.amplitude(WIDTH, 0.02)[0] for m in bare.modes) / expected - 1) < 1e-6
-    assert bare.modes[0].group_speed[0] == pytest.approx(2 * bare.modes[0].phase_speed[0], rel=1e-6)
+    elastic = replace(paper, loss_factor=0.0)
+    (wave, _) = sheet_curves(elastic, 1e-4, [140.0], air_density=0).modes
+    assert wave.group_speed[0] == pytest.approx(2 * wave.phase_speed[0], rel=1e-6)
     aired, not_aired = (
         sheet_curves(paper, 1e-4, [80.0, 191.0], air_density=air).modes[0].phase_speed
         for air in (1.2, 0.0)

@@ -327,8 +327,7 @@ def bodies(draw):
 @given(bodies(), materials)
 def test_stiffness_and_damping_do_not_feel_a_rigid_motion(mesh, material):
     free = np.zeros(mesh.points.shape, bool)
-    solid = replace(material, loss_factor=0.0)  # whose part that goes with the mass feels one
-    operators = fem.assemble(mesh, solid, fixed=free)
+    operators = fem.assemble(mesh, material, fixed=free)
     x = mesh.points - mesh.points.mean(axis=0)
     axes = np.eye(3)
     motions = [np.ones((len(x), 1)) * axis for axis in axes]

@@ -5,10 +5,13 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.integrate import solve_ivp
 
 import fem
 import meshes
 import skinwave
+from fem.reduced_nonlinear import modal_elastic
 from meshes import cache
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import half_space, slab, thin_sheet
@@ -279,13 +282,60 @@ def test_layers_may_relax_in_a_scene():
     assert found.effort.energy_imbalance < 1e-6
 
 
-def test_large_displacement_is_refused(block):
-    mesh, _, _ = block
-    with pytest.raises(ValueError, match="Prony terms .* linear models"):
-        fem.finite_strain(mesh, replace(ZENER, poisson=0.3))
-    sheet = replace(BODIES["paper-sheet"], material=replace(ZENER, poisson=0.3))
-    for model in ("fem-nonlinear", "fem-nonlinear-transient"):
-        with pytest.raises(
-            ValueError, match=r"Prony terms have moduli of 10000 Pa; .* --model fem"
-        ):
-            compute(replace(SCENE, body=sheet), model)
+@pytest.mark.parametrize("losses", [{}, {"prony": (), "loss_factor": 0.3}])
+def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does(losses):
+    """Tetrahedra and a membrane among their nodes, and the energy balance of both."""
+    solid = replace(ZENER, poisson=0.3, **losses)
+    mesh = meshes.sheet(0.02, 0.02, 0.002, 0.01)
+    layer = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=1e-3, material=solid)
+    body = fem.finite_strain(mesh, solid, fixed="sides", membrane=layer)
+    shape, dt = np.zeros(mesh.n_dofs), 1e-4
+    shape[2::3] = 1e-9
+
+    def force(t):
+        return np.sin(2 * np.pi * 200 * t) * shape
+
+    linear = list(islice(fem.transient(body.operators, force, dt), 60))
+    found = list(islice(fem.nonlinear.with_energy_balance(
+        body, fem.nonlinear.dynamic(body, lambda t, u: force(t), dt, tolerance=1e-9), force), 60,
+    ))  # fmt: skip
+    moved = np.array([[state.displacement, each.displacement]
+                      for each, (state, _) in zip(linear, found, strict=True)])  # fmt: skip
+    assert np.linalg.norm(moved[:, 0] - moved[:, 1]) < 1e-6 * np.linalg.norm(moved[:, 1])
+    state, spent = found[-1]
+    stored = fem.nonlinear.total_energy(body, state)
+    assert spent.dissipated > 0.05 * spent.work
+    assert abs(spent.work - stored - spent.lost) < 1e-6 * spent.work
+
+
+def test_modes_of_a_sheet_relax_as_the_sheet_does():
+    """Its bending and, at large deflection, its stretching."""
+    solid = replace(ZENER, poisson=0.3)
+    modal = fem.Operators(
+        K=sparse.diags_array([4e4, 9e4]).tocsr(), C=sparse.csr_array((2, 2)),
+        M=sparse.eye_array(2).tocsr(), R=sparse.csr_array((2, 2)), free=np.arange(2), n_dofs=2,
+        branches=(fem.MaxwellBranch(K=sparse.diags_array([16e3, 36e3]).tocsr(), time=0.5e-3),),
+    )  # fmt: skip
+    H = np.array([[[3e5, 1e5], [1e5, 2e5]]])
+    body = modal_elastic(modal, H, solid)
+    force, dt = np.array([300.0, 100.0]), 1e-5
+    states = islice(fem.nonlinear.with_energy_balance(
+        body, fem.nonlinear.dynamic(body, lambda t, u: force, dt, tolerance=1e-9), lambda t: force,
+    ), 400)  # fmt: skip
+    # The same equations, by a solver of ordinary differential equations.
+    share = 10e3 / 25e3
+
+    def rate(t, x):
+        z, v, d, q = x[:2], x[2:4], x[4:6], x[6]
+        Hz = H[0] @ z
+        pull = modal.K @ z + modal.branches[0].K @ d + (z @ Hz / 2 + share * q) * Hz
+        return np.concatenate([v, force - pull, v - d / 0.5e-3, [v @ Hz - q / 0.5e-3]])
+
+    exact = solve_ivp(rate, (0, 399 * dt), np.zeros(7), rtol=1e-9, atol=1e-12,
+                      t_eval=np.arange(400) * dt).y[:2].T  # fmt: skip
+    found = list(states)
+    moved = np.array([state.displacement for state, _ in found])
+    assert np.linalg.norm(moved - exact) < 2e-3 * np.linalg.norm(exact)
+    state, spent = found[-1]
+    stored = fem.nonlinear.total_energy(body, state)
+    assert abs(spent.work - stored - spent.lost) < 2e-3 * spent.work

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import fem
-from fem import PRESETS
 from meshes import cache
 from simple_model import Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
@@ -36,7 +35,6 @@ from skinwave.planning.refinement import (
     refined,
 )
 from skinwave.planning.sensitivity import sensitivity
-from skinwave.planning.warnings import damping_misfit
 from skinwave.scene import Body, Layer
 from skinwave.simulation import compute
 from skinwave.studies.paper15 import scenes, tactons
@@ -256,24 +254,6 @@ def test_a_body_that_nothing_holds_is_warned_of():
     )
     steady = compute(scene, "fem-harmonic", h=0.01).displacement
     assert np.abs(steady).max() < 1e-4  # and no mean, which would have no bound
-
-
-def test_a_loss_factor_is_warned_of_where_its_fit_is_far_off():
-    text = "[tacton]\nam_frequency_hz = {}\nduration_s = 0.3\n[body]\nkind = 'sheet'"
-    (said,) = (w for w in plan(loads(text.format(15)), 0.5, h=0.005).warnings if "loss" in w)
-    assert "fitted over 50 to 600 Hz" in said
-    assert not any("loss" in w for w in plan(loads(text.format(200)), 0.5, h=0.005).warnings)
-
-
-def test_a_layers_own_loss_factor_is_warned_of_too():
-    lossy = replace(PRESETS["paper"], loss_factor=0.1)
-    scene = loads(SHORT)
-    layers = (Layer(thickness=1e-3, material=lossy),)
-    layered = replace(scene, body=replace(scene.body, layers=layers))
-    asked = np.array([0.0, 10.0]), np.array([[0.5], [0.5]]), 0.05
-    assert damping_misfit(scene, *asked) == ()
-    (said,) = damping_misfit(layered, *asked)
-    assert "at 10 Hz the loss factor is" in said
 
 
 def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():

@@ -12,10 +12,9 @@ from fem.added_mass import AddedMass, added_mass
 from fem.affine import AffineOperators
 from fem.assembly import Operators
 from fem.finite_strain import Membrane
-from fem.materials import Material, rayleigh_damping
+from fem.materials import Material
 from fem.plane_stiffness import Tension
 from fem.shallow_shell import shell_stiffness
-from fem.viscoelastic import LOSS_BAND
 from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
 from meshes.tetmesh import Floats
@@ -93,24 +92,7 @@ def tension(body: Body) -> Tension | None:
     if not body.mounting.is_stretched:
         return None
     x, y = body.mounting.tension_x, body.mounting.tension_y
-    return Tension(x=x, y=y, share=partial(elastic_share, body))
-
-
-def elastic_share(body: Body, omega: Floats) -> Floats:
-    """Elastic share D k^2 / (D k^2 + T) (f,) of the stiffness of bending waves at angular
-    frequencies (f,) in rad/s, of the means of an infinite sheet's directions.
-    """
-    k = np.array([bending_wavenumber(body, w / 2 / pi) for w in omega.tolist()])
-    bent = body.bending_stiffness * k**2
-    return bent / (bent + body.mounting.mean_tension)
-
-
-def damping(body: Body) -> tuple[float, float]:
-    """Rayleigh damping of a sheet, by mass in 1/s and by stiffness in s."""
-    stretched = tension(body)
-    return rayleigh_damping(
-        body.solid.loss_factor, LOSS_BAND, None if stretched is None else stretched.share
-    )
+    return Tension(x=x, y=y)
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
@@ -240,11 +222,8 @@ def air(body: Body, build: Build, operators: Operators | AffineOperators) -> Add
     if not body.air:
         return None
     refuse_open_air(body)
-    by_mass, _ = damping(body)
     sides = body.placement.rotation.T[:2]
-    return added_mass(
-        build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry, rate=by_mass
-    )
+    return added_mass(build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry)
 
 
 SHEET = register(

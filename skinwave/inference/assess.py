@@ -13,6 +13,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Response
+from simple_model.constant_loss import constant_loss
 from simple_model.load_spectrum import load_lines, synthesise
 from simple_model.material import Complex
 from simple_model.plate_modes import PlateModes, plate_modes, steady_response
@@ -99,7 +100,8 @@ def responses(
     """
     every = [np.concatenate(each) for each in zip(*forces.values(), strict=True)]
     outputs = modes.at(probes(candidate) - middle(candidate))
-    u = steady_response(modes, every[0], every[1], outputs, candidate["loss_factor"])
+    modulus = constant_loss(candidate["loss_factor"])
+    u = steady_response(modes, every[0], every[1], outputs, modulus)
     ends = np.cumsum([len(f) for f, _ in forces.values()])[:-1]
     for (tacton, (f, _)), part in zip(forces.items(), np.split(u, ends), strict=True):
         yield tacton, (f, part)

@@ -122,7 +122,6 @@ FEM = register(
         colour="#0072B2",
         sources=(REDUCTION, ARNOLDI, MACROELEMENTS),
         is_reduced=True,
-        fits_damping=True,
         takes_series=has_own_law,
     )
 )
@@ -152,7 +151,6 @@ TRANSIENT = register(
         colour="#D55E00",
         sources=(ALPHA, MACROELEMENTS),
         is_stepped=True,
-        fits_damping=True,
         takes_series=has_own_law,
     )
 )

@@ -5,30 +5,39 @@ steady state, and from rest.
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.compliance import AIR_DENSITY
+from simple_model.free_modes import free_modes
 from simple_model.load_spectrum import Complex, load_lines, synthesise
-from simple_model.plate_modes import Plate, PlateModes, modal_motion, plate_modes
+from simple_model.plate_modes import (
+    Plate,
+    PlateModes,
+    modal_motion,
+    modal_motion_apart,
+    plate_modes,
+)
 from simple_model.plate_response import modal_path_forces
 from simple_model.sampling import shown
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, register
+from skinwave.models.laws import has_own_law
 from skinwave.models.limits import Limit, of_body, surface_motion
 from skinwave.models.prepared import sample_times
-from skinwave.models.sheet_limits import of_held_sheet, of_one_modulus
+from skinwave.models.sheet_limits import of_held_sheet
 from skinwave.models.sources import PLATES
 from skinwave.scene import Scene
 
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
-EPSILON = 1e-12  # of a mode that is damped to the limit of vibration, which no sheet is
 
 
 def plate_of(body: Body) -> Plate:
@@ -50,13 +59,16 @@ _modes = lru_cache(maxsize=4)(plate_modes)
 def middle_compliance(body: Body) -> float:
     """Static deflection of the middle of a held sheet per force there, m/N."""
     modes = _modes(plate_of(replace(body, air=False)))
-    return float((modes.at([[0.0, 0.0]]) ** 2 / modes.squared).sum())
+    at_rest = relative_modulus(body, 0.0).real
+    stiffness = modes.squared * (1 + (at_rest - 1) * modes.elastic)
+    return float((modes.at([[0.0, 0.0]]) ** 2 / stiffness).sum())
 
 
-def loss_factor(body: Body, frequencies: Floats) -> Floats:
-    """Loss factor (f,) of bending at frequencies (f,) in Hz."""
-    modulus = body.solid.complex_modulus(2 * np.pi * frequencies)
-    return np.asarray(modulus.imag / modulus.real)
+def relative_modulus(body: Body, omega: ArrayLike) -> Any:
+    """Complex modulus of bending (...) at angular frequencies (...) in rad/s, over the one that
+    modes have.
+    """
+    return body.solid.complex_modulus(omega) / body.solid.shear_modulus
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,8 +135,8 @@ def _response(
 
 def _motion(scene: Scene, driven: Driven) -> Complex:
     """Steady modal coordinates (f, m) of all lines."""
-    eta = loss_factor(scene.body, driven.frequencies)
-    return modal_motion(driven.modes, driven.frequencies, driven.forces, eta)
+    modulus = partial(relative_modulus, scene.body)
+    return modal_motion(driven.modes, driven.frequencies, driven.forces, modulus)
 
 
 def _steady(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
@@ -139,18 +151,19 @@ def _amplitudes(scene: Scene, driven: Driven, motion: Complex) -> Complex:
 
 
 def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
-    """Free vibration (t, p) that ends the state of rest before t = 0: of each mode Re a exp(s t),
-    at its pole s = w (i sqrt(1 - (eta/2)^2) - eta/2) with the loss factor that it has at its own
-    frequency.
+    """Free vibration (t, p) that ends the state of rest before t = 0: of each mode apart, and of
+    coupled ones such that all are at rest at t = 0.
     """
-    w = np.sqrt(driven.modes.squared)
-    half = loss_factor(scene.body, w / (2 * np.pi)) * driven.modes.elastic / 2
-    poles = w * (1j * np.sqrt(np.maximum(1 - half**2, EPSILON)) - half)
-    rates = 2j * np.pi * driven.frequencies
-    place, speed = motion.real.sum(axis=0), (rates @ motion).real
-    start = -place + 1j * (speed - poles.real * place) / poles.imag
-    start = start * scene.reading.asked.factor(poles)
-    return fem.exponential_sum(poles, start[:, None] * driven.outputs.T, times)
+    modes, f, forces = driven.modes, driven.frequencies, driven.forces
+    free = free_modes(modes, scene.body.solid)
+    beside = motion - modal_motion_apart(modes, f, forces, partial(relative_modulus, scene.body))
+    speed = (2j * np.pi * f @ beside).real
+    start = free.start(f, forces) - free.impulse(beside.real.sum(axis=0), speed)
+    start *= scene.reading.asked.factor(free.poles)
+    vibrates = free.residues != 0
+    outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
+    amplitudes = start[vibrates][:, None] * outputs[vibrates]
+    return fem.exponential_sum(free.poles[vibrates], amplitudes, times)
 
 
 def _limits(scene: Scene) -> Iterator[Limit]:
@@ -164,7 +177,6 @@ def _limits(scene: Scene) -> Iterator[Limit]:
             why=f"takes a sheet of free faces, not one with the base {body.base}",
             cure='take base = "free"', change=of_body(base="free"),
         )  # fmt: skip
-    yield from of_one_modulus(body)
     yield from surface_motion(scene)
 
 
@@ -188,6 +200,7 @@ FROM_REST = register(
         MODES,
         name="plate-modes-transient",
         from_rest="",
+        takes_series=has_own_law,
         solve=answer_from_rest,
         method="modes of a thin plate by Ritz's method, from rest",
         words="a thin plate from rest, in its modes by Ritz's method",

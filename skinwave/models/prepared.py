@@ -47,7 +47,7 @@ from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = 5  # of what is cached of a body
+FORMAT = 6  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points", "inertia")
 OTHERS = ("relaxing", "relaxation_times", "read", "sag", "carried")

@@ -50,7 +50,7 @@ def sheet_rows(
     """
     seen, asked = _seen(body, build, probes), reading.asked
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
-    heights, solid = body.depth / 2 - below, body.solid
+    heights, solid = body.depth / 2 - below, body.solid.without_loss_factor()
     linear = displacement_rows(seen, heights)
     if asked.field == STRAIN:
         linear = strain_rows(seen, heights, solid.poisson)

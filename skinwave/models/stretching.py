@@ -16,6 +16,7 @@ import numpy as np
 
 import fem
 from fem import nonlinear
+from fem.harmonic import dynamic_stiffness
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
@@ -163,10 +164,9 @@ def unstretched_lines(
     sheet = _reduced(scene.body, h or stretching_size(scene.body, reduced=True), solver)
     hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
     operators = sheet.modes.elastic.operators
-    K, C, one = operators.K.toarray(), operators.C.toarray(), np.eye(len(sheet.modes.hz))
-    w = 2 * pi * hz
-    z = [np.linalg.solve(K + 1j * each * C - each**2 * one, f)
-         for each, f in zip(w, forces, strict=True)]  # fmt: skip
+    K, C, M = (part.toarray() for part in (operators.K, operators.C, operators.M))
+    z = [np.linalg.solve(dynamic_stiffness(K, C, M, operators.branches, s), f)
+         for s, f in zip(2j * pi * hz, forces, strict=True)]  # fmt: skip
     shapes = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
     return hz, np.array(z) @ shapes.T
 

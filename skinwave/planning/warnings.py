@@ -2,22 +2,17 @@
 
 import numpy as np
 
-from fem.materials import rayleigh_damping
-from fem.viscoelastic import LOSS_BAND
-from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.quantities import DISPLACEMENT
-from skinwave.bodies.sheet import tension
 from skinwave.models import Model, named
 from skinwave.models.advice import cures_for, in_words
-from skinwave.planning.estimates import mean_gain, response_spectrum, spot_scale
+from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import Refined, enough
 from skinwave.scene import Scene
 
 NONLINEAR = "fem-nonlinear"
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
-LOSS_ERROR = 0.4  # relative error of a loss factor; that of the fit within its band is up to 0.3
 
 
 def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
@@ -37,7 +32,7 @@ def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
         return of_elements(scene, mesh.h, mesh.error, tolerance)
     size = 1e3 * enough(scene.body, mesh.h, mesh.error, tolerance)
     return (
-        *_of_scene(scene, tolerance),
+        *rigid_body_drift(scene),
         *over_tolerance(
             f"the goal-oriented mesh of {mesh.prepared.effort.dofs:,} dofs", mesh.error, tolerance,
             f"an element size of about {size:.2g} mm is",
@@ -63,16 +58,12 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
     size = 1e3 * enough(scene.body, h, error, tolerance)
     return (
         *error_unknown(error),
-        *_of_scene(scene, tolerance),
+        *rigid_body_drift(scene),
         *over_tolerance(
             f"elements of {1e3 * h:.3g} mm", error, tolerance, f"about {size:.2g} mm is"
         ),
         *under_resolved(h, spot_scale(scene.pressure)),
     )
-
-
-def _of_scene(scene: Scene, tolerance: float) -> tuple[str, ...]:
-    return *rigid_body_drift(scene), *_scene_damping_misfit(scene, tolerance)
 
 
 def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
@@ -123,50 +114,6 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
     return (
         "this body is unconstrained and drifts under a pressure with non-zero mean: only motion "
         f"about the mean counts; clamp its base or its sides{half_space}",
-    )
-
-
-def _scene_damping_misfit(scene: Scene, tolerance: float) -> tuple[str, ...]:
-    if not any(solid.loss_factor for solid in scene.body.solids):
-        return ()  # before the lines are computed
-    return damping_misfit(scene, *response_spectrum(scene, tolerance), tolerance)
-
-
-def damping_misfit(
-    scene: Scene, frequencies: Floats, shares: Floats, tolerance: float
-) -> tuple[str, ...]:
-    """Warning of lines where Rayleigh damping is far from the loss factor that it is fitted to.
-
-    Parameters
-    ----------
-    scene : Scene
-    frequencies : (f,) float, Hz
-    shares : (f, p) float, of the power of each probe's motion
-    tolerance : relative; weaker lines are left out
-
-    Returns
-    -------
-    one sentence, or none
-    """
-    if not any(solid.loss_factor for solid in scene.body.solids):
-        return ()
-    stretched = tension(scene.body)
-    w, share = 2 * np.pi * np.maximum(frequencies, 1e-9), np.ones(len(frequencies))
-    known = stretched.share if stretched else None
-    if known:
-        share = known(np.maximum(w, 2 * np.pi))
-    by_mass, by_stiffness = rayleigh_damping(1.0, LOSS_BAND, known)
-    ratio = by_mass / w / share + by_stiffness * w
-    heard = (frequencies > 0) & (np.sqrt(shares.max(axis=1)) > tolerance)
-    beyond = heard & (abs(ratio - 1) > LOSS_ERROR)
-    if not beyond.any():
-        return ()
-    worst = np.argmax(np.where(beyond, abs(np.log(ratio)), 0))
-    low, high = LOSS_BAND
-    return (
-        f"at {frequencies[worst]:.0f} Hz the loss factor is {ratio[worst]:.2g} times the one asked "
-        f"for, which is fitted over {low:g} to {high:g} Hz: a resonance there is "
-        f"{1 / ratio[worst]:.2g} times as high as it should be in elements",
     )
 
 

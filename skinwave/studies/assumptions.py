@@ -243,7 +243,7 @@ def as_one(layers: Sequence[Layer]) -> Layer:
 
 def with_little_loss(solid: Material, w: float) -> Material:
     """A tenth of the damping, and the same storage modulus at w in rad/s."""
-    if solid.law is not None:
+    if solid.law is not None or solid.loss_factor:
         less = solid.scaled(loss=LOSS_LEFT)
         storage = [float(m.complex_modulus(w).real) for m in (solid, less)]
         return less.scaled(modulus=storage[0] / storage[1])
