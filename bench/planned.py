@@ -4,8 +4,6 @@ For each scene and tolerance: the error of what `plan` chooses against the fines
 that this machine affords, and its time over that of the cheapest candidate within the tolerance,
 which nobody knows beforehand; without and with the time that planning took.
 Absorbing sides stand for a laterally infinite body: the reference's are twice as far away.
-Elements fit Rayleigh damping to a loss factor, and modes of a plate have that itself: where these
-are chosen, both are compared under a viscosity of the same loss at `ALIKE_AT`.
 
 `python -m bench.planned slabs` assesses the slabs whose sides reflect waves among the next seventy
 scenes.
@@ -22,7 +20,6 @@ from fem import Material
 from fem.materials import from_young
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from skinwave.bodies.sizes import default_size
-from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import plan
 from skinwave.scene import Body, Scene
@@ -31,7 +28,6 @@ from skinwave.simulation import compute
 FINEST = 0.7  # of the default element size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
-ALIKE_AT = 140.0  # Hz
 SCENES, FURTHER = 20, 90
 
 
@@ -97,14 +93,6 @@ def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, floa
     return chosen.model, found, seconds, planning - prepared
 
 
-def viscous(scene: Scene) -> Scene:
-    """The scene with a viscosity of the same loss in the place of its material's loss factor."""
-    solid = scene.body.solid
-    lossy = solid.loss_factor * solid.shear_modulus / (2 * np.pi * ALIKE_AT)
-    material = replace(solid, loss_factor=0.0, viscosity=solid.viscosity + lossy)
-    return replace(scene, body=replace(scene.body, material=material))
-
-
 def reflects(seed: int) -> bool:
     """Whether a random scene is a slab whose sides reflect waves."""
     body = scene(seed)[0].body
@@ -123,9 +111,6 @@ def assess(seed: int) -> tuple[bool, bool, bool]:
     reference = compute(far, "fem", h=FINEST * h)
     model, planned, seconds, planning = followed(asked, tolerance)
     wrong = error(planned, reference)
-    if model == FROM_REST.name:
-        alike = viscous(asked)
-        wrong = error(compute(alike, model), compute(alike, "fem", h=FINEST * h))
     good = []
     candidates = [("point-kernel", {}), *(("fem", {"h": h * ratio}) for ratio in COARSER)]
     if body.of_kind.is_layer:

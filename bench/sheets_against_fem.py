@@ -2,7 +2,7 @@
 
     python -m bench.sheets_against_fem [--sheets 0 1 ...] [--cells 48] [--coarser 36]
 
-Prints a row a sheet. Both have the same load, loss (Rayleigh damping, as elements have it) and air:
+Prints a row a sheet. Both have the same load, loss factor and air:
 that in a baffle for frames, none for other supports, which elements take in vacuum only. Errors are
 relative to elements: the largest of natural frequencies below 300 Hz, and that of all lines but the
 mean, of three Tactons at five points, in the L2 norm. Near a resonance the second is many times the
@@ -20,8 +20,9 @@ from unittest import mock
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from simple_model.constant_loss import constant_loss
 from simple_model.load_spectrum import load_lines
-from simple_model.material import Complex, Floats
+from simple_model.material import Complex, Floats, ModulusLaw
 from simple_model.plate_modes import Family, PlateModes, plate_modes
 from simple_model.plate_response import modal_path_forces
 from skinwave.bodies import sheet
@@ -91,31 +92,29 @@ def by_modes(
     candidate: Candidate,
     modes: PlateModes,
     forces: Forces,
-    rates: tuple[float, float],
     stiffer: float = 0.0,
 ) -> Lines:
-    """As `by_elements`, with damping of `rates` a and b, a M + b K of bending, of a sheet whose
-    bending stiffness and tension are larger by a part.
-    """
+    """As `by_elements`, of a sheet whose bending stiffness and tension are larger by a part."""
+    modulus = constant_loss(candidate["loss_factor"])
     outputs = modes.at(probes(candidate) - middle(candidate))
     found = {}
     for name, (f, force) in forces.items():
         ends = np.cumsum([len(family.squared) for family in modes.families])[:-1]
         parts = zip(modes.families, np.split(force, ends, axis=1), strict=True)
-        motion = [damped(family, f, part, rates, stiffer) for family, part in parts]
+        motion = [damped(family, f, part, modulus, stiffer) for family, part in parts]
         found[name] = f, np.hstack(motion) @ outputs.T
     return found
 
 
 def damped(
-    family: Family, f: Floats, forces: Complex, rates: tuple[float, float], stiffer: float
+    family: Family, f: Floats, forces: Complex, modulus: ModulusLaw, stiffer: float
 ) -> Complex:
     """Modal coordinates (f, m) of a family, all of its modes together."""
     bending = np.diag(family.squared) if family.bending is None else family.bending
     each = []
     for w, force in zip(2 * np.pi * f, forces, strict=True):
-        dynamic = 1j * w * rates[1] * (1 + stiffer) * bending
-        own = (1 + stiffer) * family.squared + 1j * w * rates[0] - w**2
+        dynamic = (modulus(w) - 1) * (1 + stiffer) * bending
+        own = (1 + stiffer) * family.squared - w**2
         each.append(np.linalg.solve(dynamic + np.diag(own), force))
     return np.array(each)
 
@@ -153,8 +152,7 @@ def compared(candidate: Candidate, cells: int, coarser: int) -> tuple[float, ...
     """Errors of frequencies and lines, the least one and by which stiffness, that of elements."""
     reduced, modes = of_elements(candidate, cells), of_modes(candidate)
     elements = by_elements(candidate, reduced)
-    rates = sheet.damping(loads(scene_text(candidate)).body)
-    of_part = partial(by_modes, candidate, modes, modal_forces(candidate, modes), rates)
+    of_part = partial(by_modes, candidate, modes, modal_forces(candidate, modes))
     own = line_error(elements, by_elements(candidate, of_elements(candidate, coarser)))
     lines, (least, off) = line_error(elements, of_part(0.0)), backward_error(elements, of_part)
     return frequency_error(reduced, modes), lines, least, off, own

@@ -28,14 +28,12 @@ from bench.sheets_against_fem import (
     modal_forces,
 )
 from fem.linear_solver import factorise
+from simple_model.constant_loss import constant_loss
 from simple_model.load_spectrum import pressure_lines
 from simple_model.material import Floats
 from simple_model.plate_modes import Plate, plate_modes
-from skinwave.bodies import sheet
 from skinwave.inference.assess import finest
 from skinwave.inference.design import Candidate, middle, plate, pressure, probes, sizes
-from skinwave.inference.scenes import scene_text
-from skinwave.scene_file import loads
 from skinwave.studies.paper15 import tactons
 
 FINER = 0.05  # of a clip's radius: elements at its sides, on the coarsest mesh
@@ -123,7 +121,7 @@ def fixed(own: Plate, basis: Any) -> np.ndarray:
     return np.unique(np.concatenate(found))
 
 
-def by_elements(candidate: Candidate, made: Elements, rates: tuple[float, float]) -> Lines:
+def by_elements(candidate: Candidate, made: Elements) -> Lines:
     """Frequencies and lines (f, p) of each Tacton up to 1 kHz."""
     from skfem import LinearForm
 
@@ -131,7 +129,7 @@ def by_elements(candidate: Candidate, made: Elements, rates: tuple[float, float]
     def pushed(v: Any, w: Any) -> Any:
         return w.p * v
 
-    basis, found = made.basis, {}
+    basis, found, modulus = made.basis, {}, constant_loss(candidate["loss_factor"])
     at = middle(candidate)
     read = sparse.csr_array(basis.probes((probes(candidate) - at).T))[:, made.free]
     quadrature = basis.global_coordinates().value
@@ -146,8 +144,7 @@ def by_elements(candidate: Candidate, made: Elements, rates: tuple[float, float]
         for w, p in zip(2 * np.pi * f[kept], pressures[kept], strict=True):
             parts = (p.real, p.imag)
             force = [pushed.assemble(basis, p=q.reshape(quadrature.shape[1:])) for q in parts]
-            dynamic = (1 + 1j * w * rates[1]) * made.bending + made.tension
-            dynamic = dynamic + (1j * w * rates[0] - w**2) * made.mass
+            dynamic = modulus(w) * made.bending + made.tension - w**2 * made.mass
             # Deflections, slopes and twists are of other units.
             scale = 1 / np.sqrt(made.bending.diagonal())
             A = sparse.csr_array(sparse.diags_array(scale) @ dynamic @ sparse.diags_array(scale))
@@ -182,12 +179,11 @@ def main() -> None:
         candidate, (x, y) = all_of[k], sizes(all_of[k])
         own = replace(plate(candidate), air_density=0.0)
         modes = plate_modes(own, finest(candidate))
-        rates = sheet.damping(loads(scene_text(candidate)).body)
-        of_part = partial(by_modes, candidate, modes, modal_forces(candidate, modes), rates)
+        of_part = partial(by_modes, candidate, modes, modal_forces(candidate, modes))
         before: Lines = {}
         for cells in options.cells:
             made = of_elements(own, cells)
-            elements, f = by_elements(candidate, made, rates), frequencies(made)
+            elements, f = by_elements(candidate, made), frequencies(made)
             apart = np.abs(modes.frequencies - f[:, None]).min(axis=1) / f
             lines, (least, off) = (
                 line_error(elements, of_part(0.0)),

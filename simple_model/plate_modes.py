@@ -258,7 +258,8 @@ def modal_motion_apart(
     """Modal coordinates as of `modal_motion`, without the coupling of the modes."""
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     bending = modulus(w) * modes.elastic
-    return np.asarray(forces / (modes.squared * (1 - modes.elastic + bending) - w**2))
+    found = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
+    return np.asarray(found, np.complex128)
 
 
 def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:

@@ -30,6 +30,7 @@ FIT_TOLERANCE = 0.005  # relative deviation that a series may have; near resonan
 MOST_TERMS = 16
 PER_DECADE = 40  # frequencies at which a law is looked at
 BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # times that a series may reach beyond either end of a band
+FAR_BELOW = 1e3  # times the slowest period over 2 pi: the time of a term that is at rest in a band
 NO_BETTER = 1.1  # times the least deviation, with which fewer terms are taken where data are noisy
 LEAST_MODULUS = 1e-3  # at rest, of the first modulus, where a law does not say
 LEAST_LOSS = -1e-9  # of the modulus: round-off of a law without loss
@@ -146,14 +147,17 @@ def fit_prony(
     mu = np.asarray(np.broadcast_to(law(w), w.shape), np.complex128)
     check_modulus(f, mu)
     found: list[PronySeries] = []
-    for n in range(MOST_TERMS + 1):
-        ends = [(w[0] / slow, w[-1] * fast) for slow in BEYOND for fast in BEYOND]
-        fits = [
-            fitted_series(w, mu, _times(*end, n), rest, band) for end in ends[: None if n else 1]
-        ]
-        found.append(min(fits, key=lambda series: series.error))
-        if found[-1].error <= tolerance:
-            return found[-1]
+    ends = [(w[0] / slow, w[-1] * fast) for slow in BEYOND for fast in BEYOND]
+    # A law may relax far below the band, as fractional ones of small exponents do.
+    for further in ([], [FAR_BELOW / w[0]]) if rest else ([],):
+        for n in range(MOST_TERMS + 1):
+            fits = [
+                fitted_series(w, mu, np.append(_times(*end, n), further), rest, band)
+                for end in ends[: None if n else 1]
+            ]
+            found.append(min(fits, key=lambda series: series.error))
+            if found[-1].error <= tolerance:
+                return found[-1]
     enough = NO_BETTER * min(series.error for series in found)
     return next(series for series in found if series.error <= enough)
 

@@ -438,3 +438,30 @@ def test_a_material_of_wrong_keys_is_refused(text, said):
 def test_a_file_of_moduli_of_bad_content_is_refused(text, said):
     with pytest.raises(ValueError, match=said):
         modulus_table(text)
+
+
+@pytest.mark.parametrize("eta", [1e-3, 0.03, 0.4, 2.0])
+def test_a_loss_factor_is_nearly_constant_and_its_law_causal(eta):
+    solid = Material(density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=eta)
+    mu = solid.complex_modulus(2 * np.pi * np.geomspace(10, 2000, 200))
+    np.testing.assert_allclose(mu.imag / mu.real, eta, rtol=0.025)
+    w = 2 * np.pi * 150
+    assert solid.complex_modulus(w).real == pytest.approx(25e3, rel=1e-9)
+    q = 2 / np.pi * np.arctan(eta)  # Kjartansson's constant Q
+    power = np.geomspace(10 / 150, 2000 / 150, 200) ** q
+    np.testing.assert_allclose(mu.real, 25e3 * power, rtol=0.035)
+    # Kramers and Kronig: mu(inf) - mu(0) = 2 / pi int mu''(x) / x dx, without the viscosity.
+    x = 2 * np.pi * np.geomspace(1e-4, 1e8, 20_000)
+    loss = solid.complex_modulus(x).imag - solid.without_loss_factor().viscosity * x
+    slow, fast = solid.complex_modulus(x[[0, -1]]).real
+    assert fast - slow == pytest.approx(2 / np.pi * np.trapezoid(loss, np.log(x)), rel=1e-3)
+
+
+def test_a_body_with_a_loss_factor_moves_after_its_load_and_settles():
+    solid = Material(density=1000, shear_modulus=25e3, poisson=0.4999, loss_factor=0.4)
+    layer, times = slab(solid, 0.015), np.arange(3000) / 1e4
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.3))
+    found = flat_body(layer, load, [[0.0, 0.0]], times).values[:, 0]
+    steady = steady_state(layer, load, [[0.0, 0.0]], times).values[:, 0]
+    assert np.linalg.norm((found - steady)[2000:]) < 1e-3 * np.linalg.norm(steady[2000:])
+    assert abs(found[0]) < 2e-3 * np.abs(found).max()

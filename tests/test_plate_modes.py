@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.constant_loss import constant_loss
+from simple_model.free_modes import free_modes
 from simple_model.load_spectrum import load_lines, reduced_lines
+from simple_model.material import Material, PronyTerm
 from simple_model.plate_air import air_mass
 from simple_model.plate_modes import Plate, plate_modes, steady_response
 from simple_model.plate_response import modal_path_forces, plate_lines
@@ -302,3 +305,54 @@ def test_plates_that_are_none_are_refused(change, said):
 def test_plates_too_large_for_memory_are_refused():
     with pytest.raises(ValueError, match="lower finest"):
         plate_modes(isotropic(1.0, 1.0), 500.0)
+
+
+@pytest.mark.parametrize(
+    "losses",
+    [
+        {},
+        {"loss_factor": 0.3},
+        {"viscosity": 20.0},
+        {"viscosity": 2.0, "prony": (PronyTerm(modulus=5e3, time=1e-3),)},
+    ],
+)
+def test_modes_from_rest_are_those_of_ordinary_differential_equations(losses):
+    """Underdamped, overdamped and relaxing; acceleration at the start is force per mass."""
+    solid = Material(density=1000, shear_modulus=25e3, poisson=0.3, **losses)
+    plate = isotropic(nu=0.3, tension_x=20.0)
+    one = plate_modes(plate, 60.0)
+    free, hertz = free_modes(one, solid), np.array([0.0, 130.0])
+    forces = np.ones((2, len(one.squared)), np.complex128) * [[1.0], [0.5 - 0.3j]]
+    start, t = free.start(hertz, forces), np.linspace(0, 0.03, 301)
+    s = 2j * np.pi * hertz
+    bent = solid.complex_modulus(s.imag) / solid.shear_modulus * one.elastic[0]
+    steady = forces[:, 0] / (s**2 + one.squared[0] * (1 - one.elastic[0] + bent))
+    shown = [(np.exp(np.outer(t, s)) @ (steady * s**k)).real
+             + (np.exp(np.outer(t, free.poles[0])) @ (start[0] * free.poles[0]**k)).real
+             for k in (0, 1, 2)]  # fmt: skip
+    inner = solid.without_loss_factor()
+    mu, W, e = solid.shear_modulus, one.squared[0], one.elastic[0]
+    tau = np.array([term.time for term in inner.prony])
+    g = np.array([term.modulus for term in inner.prony]) / mu
+
+    def rate(t, x):
+        u, v, d = x[0], x[1], x[2:]
+        pull = W * ((1 - e + e * inner.shear_modulus / mu) * u + e * inner.viscosity / mu * v)
+        force = (np.exp(s * t) @ forces[:, 0]).real
+        return np.concatenate([[v, force - pull - W * e * (g @ d)], v - d / tau])
+
+    exact = solve_ivp(rate, (0, t[-1]), np.zeros(2 + len(tau)), "LSODA", t_eval=t, rtol=1e-9,
+                      atol=1e-13).y  # fmt: skip
+    np.testing.assert_allclose(shown[0], exact[0], atol=1e-6 * np.abs(exact[0]).max())
+    np.testing.assert_allclose(shown[1], exact[1], atol=1e-6 * np.abs(exact[1]).max())
+    assert shown[2][0] == pytest.approx(1.5, rel=1e-9)
+
+
+def test_a_critically_damped_mode_answers():
+    squared = plate_modes(isotropic(), 60.0).squared[0]
+    solid = Material(
+        density=1000, shear_modulus=25e3, poisson=0.3, viscosity=2 * 25e3 / np.sqrt(squared)
+    )
+    modes = plate_modes(isotropic(), 60.0)
+    start = free_modes(modes, solid).start(np.zeros(1), np.ones((1, len(modes.squared)), complex))
+    assert start[0].sum().real == pytest.approx(-1 / squared, rel=1e-3)

@@ -20,11 +20,12 @@ from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumb
 from skinwave.models import Request, named
 from skinwave.models.advice import beyond
 from skinwave.models.plate_modes import middle_compliance, plate_of
+from skinwave.models.prepared import prepare
 from skinwave.planning.extent import mean_sag, symmetry
 from skinwave.scene import BODIES, Body, Scene
 from skinwave.studies.assumptions import droppable
 
-PAPER = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03)
+PAPER = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35)
 WIDE, HIGH, DEEP = 0.12, 0.09, 1e-4
 TENSION = (3.0, 1.0)  # N/m, as much as bending in the lowest mode
 SIMPLY = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}
@@ -118,7 +119,7 @@ def test_stiffness_turns_with_the_axes_of_the_sheet():
     )
     np.testing.assert_allclose(fem.modes(other, 3)[0], fem.modes(ops, 3)[0], rtol=1e-6)
     exchanged = orthotropic(
-        density=800, young_x=2.5e9, young_y=5.5e9, poisson_xy=0.35 * 2.5 / 5.5, loss_factor=0.03
+        density=800, young_x=2.5e9, young_y=5.5e9, poisson_xy=0.35 * 2.5 / 5.5
     )
     axes = np.eye(3)[[1, 0]] * [[1], [-1]]
     third = fem.assemble(
@@ -229,7 +230,9 @@ def test_supports_that_are_not_mirrored_have_no_symmetry():
 
 
 def test_steady_motion_by_plate_modes_is_that_of_elements():
-    body = replace(SMALL, mounting=replace(TWO, edges=tuple(EDGES), support="simply"), air=True)
+    lossy = replace(PAPER, loss_factor=0.03)
+    body = replace(SMALL, material=lossy, mounting=replace(TWO, edges=tuple(EDGES),
+                   support="simply"), air=True)  # fmt: skip
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=1.0))
     scene = Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.01, 0.005)))
     request = Request(
@@ -320,14 +323,18 @@ def test_stretched_sheets_at_large_deflection_begin_as_linear_ones():
 
 def test_the_sag_of_any_support():
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=SMALL)
-    square = replace(SMALL, width=0.1, height=0.1, material="paper")
+    elastic = replace(fem.PRESETS["paper"], loss_factor=0.0)
+    square = replace(SMALL, width=0.1, height=0.1, material=elastic)
     simply = replace(square, mounting=Mounting(support="simply"))
     # Timoshenko and Woinowsky-Krieger (1959), tables 23 and 37.
     for body, published in ((square, 0.0056), (simply, 0.0116)):
         found = middle_compliance(body) * body.bending_stiffness / 0.1**2
         assert found == pytest.approx(published, rel=5e-3)
-    sags = [mean_sag(replace(scene, body=b)) for b in (simply, square)]
+    lossy = replace(elastic, loss_factor=0.1)
+    sags = [mean_sag(replace(scene, body=replace(b, material=lossy))) for b in (simply, square)]
     assert sags[0] / sags[1] == pytest.approx(0.0116 / 0.0056, rel=5e-3)
+    softer = lossy.complex_modulus(0.0).real / lossy.shear_modulus
+    assert sags[1] * softer == pytest.approx(mean_sag(replace(scene, body=square)), rel=1e-9)
 
 
 STRETCHED = """
@@ -422,3 +429,33 @@ def test_assumptions_that_a_sheet_keeps_by_its_mounting():
     assert set(droppable(framed)) - set(droppable(scene)) == {"vacuum"}  # without a frame, no air
     with pytest.raises(ValueError, match="orthotropic; use --model fem"):
         droppable(replace(scene, body=SMALL))
+
+
+def test_elements_damp_each_mode_of_a_stretched_sheet_by_its_loss_factor():
+    """Navier's modes: m s^2 + D h(s) k^4 + T k^2 = 0, h the relative modulus of bending."""
+    solid, T = from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.1), 20.0
+    held = Mounting(edges=tuple(EDGES), support="simply", tension_x=T, tension_y=T)
+    body = replace(SMALL, material=solid, mounting=held)
+    found = prepare(body, np.zeros((1, 2)), h=5e-3).body.poles.values
+    k2, D = (np.pi / 0.06) ** 2 + (np.pi / 0.05) ** 2, body.bending_stiffness
+    h = s = 1.0
+    for _ in range(20):
+        s = 1j * np.sqrt((D * h * k2**2 + T * k2) / 0.08)
+        h = solid.complex_modulus(-1j * s) / solid.shear_modulus
+    nearest = found[np.abs(found - s).argmin()]
+    assert nearest.imag == pytest.approx(s.imag, rel=0.01)
+    assert nearest.real == pytest.approx(s.real, rel=0.03)
+
+
+@pytest.mark.parametrize("losses", [{"viscosity": 5e4}, {"loss_factor": 0.3}])
+def test_a_sheet_from_rest_starts_by_pressure_over_mass(losses):
+    solid = from_young(density=800, young=1.3e9, poisson=0.3, **losses)
+    body = replace(SMALL, material=solid, width=0.02, height=0.02, depth=2e-4)
+    scene = Scene(
+        pressure=MovingPressure(tacton=Tacton(duration=0.03)), body=body,
+        probes=((0.0, 0.0), (0.005, 0.0)), quantity="acceleration",
+    )  # fmt: skip
+    request = Request(times=np.arange(300) / 1e4, tolerance=0.05, report=lambda *_: None)
+    found = named("plate-modes-transient").solve(scene, request).values[0]
+    pressed = scene.pressure(np.array([[0.0, 0.0, 0.0], [0.005, 0.0, 0.0]]), 0.0)
+    np.testing.assert_allclose(found, pressed / 0.16, rtol=0.03)

@@ -18,8 +18,8 @@ LARGE = (
     "modulated one with a path if the linear sheet shows the claim, else the one under which its "
     "strongest rival, or multiple, of f_AM is: a claim that fails there fails, and one "
     "that does not is computed under all. Beside it "
-    "the same modes of the same elements without stretching, in the steady state. Elements have "
-    "Rayleigh damping for the loss factor, and curl and clips are left out."
+    "the same modes of the same elements without stretching, in the steady state. Curl and clips "
+    "are left out."
 )
 
 

@@ -83,7 +83,6 @@ class Model:
     from_rest : name of the model that adds the start to it, of a model of the steady state; or ""
     is_stepped : bool, whether its error depends on a time step
     is_nonlinear : bool, whether it has large deflections
-    fits_damping : bool, whether a loss factor becomes Rayleigh damping
     takes_series : whether it takes Prony series for modulus laws of a body
     """
 
@@ -106,7 +105,6 @@ class Model:
     from_rest: str = ""
     is_stepped: bool = False
     is_nonlinear: bool = False
-    fits_damping: bool = False
     takes_series: "Callable[[Body], bool]" = lambda body: False
 
     @property

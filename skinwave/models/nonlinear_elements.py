@@ -5,12 +5,12 @@ from functools import partial
 
 from skinwave.bodies.body import Body
 from skinwave.models import Model, register
+from skinwave.models.laws import has_own_law
 from skinwave.models.limits import Limit, load_limit
 from skinwave.models.linear_elements import of_mesh
 from skinwave.models.sheet_limits import (
     of_air_in_a_frame,
     of_held_sheet,
-    of_one_modulus,
     of_vacuum,
 )
 from skinwave.models.sources import ALPHA, NEWTON
@@ -39,7 +39,6 @@ def _limits(
         return
     yield from of_held_sheet(body)
     yield from of_air(body)
-    yield from of_one_modulus(body)
     yield from of_mesh(body, size(body))
     if not scene.load.is_plain:
         yield load_limit(scene)
@@ -59,6 +58,7 @@ REDUCED = register(
         default_size=REDUCED_SIZE,
         sources=(ALPHA, NEWTON),
         is_nonlinear=True,
+        takes_series=has_own_law,
     )
 )
 FULL = register(
@@ -72,5 +72,6 @@ FULL = register(
         default_size=FULL_SIZE,
         sources=(ALPHA, NEWTON),
         is_nonlinear=True,
+        takes_series=has_own_law,
     )
 )

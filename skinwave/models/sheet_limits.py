@@ -1,4 +1,4 @@
-"""Limits of models of sheets: supports, shapes, air, and materials."""
+"""Limits of models of sheets: supports, shapes and air."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,6 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.sheet import open_air
 from skinwave.models.limits import Limit, of_body, of_material, of_mounting, of_placement
 
-LOSS = 0.03  # loss factor of a material whose law is replaced: that of paper
 
 
 def of_held_sheet(body: Body) -> Iterator[Limit]:
@@ -65,20 +64,3 @@ def of_air_in_a_frame(body: Body) -> Iterator[Limit]:
 
 def _without_air(why: str) -> Limit:
     return Limit(why=why, cure="leave out its air", change=of_body(air=False))
-
-
-def of_one_modulus(body: Body) -> Iterator[Limit]:
-    """Limits of a model of a material that does not relax."""
-    solid = body.solid
-    if solid.prony:
-        yield Limit(
-            why="takes a material that does not relax, not one with Prony terms of "
-            f"{solid.fast_modulus:g} Pa",
-            cure="leave out its Prony terms", change=of_material(prony=()),
-        )  # fmt: skip
-    if solid.law is not None:
-        yield Limit(
-            why="takes a material that does not relax, not one with a modulus law",
-            cure="give it a loss_factor in place of its law",
-            change=of_material(law=None, loss_factor=LOSS),
-        )  # fmt: skip

@@ -11,7 +11,7 @@ from skinwave.bodies.coat import AT, layer_name, thicknesses
 from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import air_mass
-from skinwave.models.plate_modes import middle_compliance
+from skinwave.models.plate_modes import middle_compliance, relative_modulus
 from skinwave.models.symmetry import mirrored_axes
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain, spot_scale
 from skinwave.scene import Body, Scene
@@ -179,7 +179,8 @@ def mean_sag(scene: Scene) -> float:
     body = scene.body
     force = _mean_force(scene)
     if body.mounting == FRAME and body.solid.orthotropy is None:
-        sag = 0.0056 * min(body.width, body.height) ** 2 / body.bending_stiffness
+        at_rest = relative_modulus(body, 0.0).real * body.bending_stiffness
+        sag = 0.0056 * min(body.width, body.height) ** 2 / at_rest
     else:
         sag = middle_compliance(body)
     return float(force * sag)

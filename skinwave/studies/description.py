@@ -179,8 +179,6 @@ def _material(solid: Material) -> str:
 
 def _sheet(runs: list[Run]) -> str:
     text, model = "", named(runs[0].model)
-    if model.fits_damping and runs[0].scene.body.solid.loss_factor:
-        text = "The loss factor is Rayleigh damping that fits it over 50-600 Hz. "
     if model.default_size:
         text += "The mesh is a thicker sheet of the same bending stiffness and mass per area. "
     text += (
