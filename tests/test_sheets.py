@@ -118,9 +118,7 @@ def test_stiffness_turns_with_the_axes_of_the_sheet():
         axes=turn.T[:2],
     )
     np.testing.assert_allclose(fem.modes(other, 3)[0], fem.modes(ops, 3)[0], rtol=1e-6)
-    exchanged = orthotropic(
-        density=800, young_x=2.5e9, young_y=5.5e9, poisson_xy=0.35 * 2.5 / 5.5
-    )
+    exchanged = orthotropic(density=800, young_x=2.5e9, young_y=5.5e9, poisson_xy=0.35 * 2.5 / 5.5)
     axes = np.eye(3)[[1, 0]] * [[1], [-1]]
     third = fem.assemble(
         mesh,

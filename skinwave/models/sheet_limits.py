@@ -7,7 +7,6 @@ from skinwave.bodies.sheet import open_air
 from skinwave.models.limits import Limit, of_body, of_material, of_mounting, of_placement
 
 
-
 def of_held_sheet(body: Body) -> Iterator[Limit]:
     """Limits of a model of a flat sheet that is held at its edges and lies across the beam."""
     if body.sides != "clamped":
