@@ -248,13 +248,8 @@ def with_little_loss(solid: Material, w: float) -> Material:
         storage = [float(m.complex_modulus(w).real) for m in (solid, less)]
         return less.scaled(modulus=storage[0] / storage[1])
     stiffer = (1 - LOSS_LEFT) * float(solid.relaxing_modulus(w).real)
-    return _of_modulus(solid.scaled(loss=LOSS_LEFT), solid.shear_modulus + stiffer)
-
-
-def _of_modulus(solid: Material, shear_modulus: float) -> Material:
-    """Material with another long-term modulus and the same hysteretic loss modulus."""
-    lost = solid.loss_factor * solid.shear_modulus / shear_modulus
-    return replace(solid, shear_modulus=shear_modulus, loss_factor=lost)
+    less = solid.scaled(loss=LOSS_LEFT)
+    return replace(less, shear_modulus=solid.shear_modulus + stiffer)
 
 
 def as_relaxing(solid: Material, w: float) -> Material:
@@ -266,11 +261,15 @@ def as_relaxing(solid: Material, w: float) -> Material:
     loss = w * solid.viscosity
     if not loss or solid.fast_modulus:  # nothing to fit, or fitted already
         return solid
+    solid = solid.without_loss_factor()
     time = min(RELAXATION_TIME, (1 - LEAST_LASTING) * solid.shear_modulus / loss / w)
     turned = w * time
     term = PronyTerm(modulus=loss * (1 + turned**2) / turned, time=time)
-    lasting = _of_modulus(solid, solid.shear_modulus - loss * turned)
-    return replace(lasting, viscosity=0.0, prony=(term,))
+    others = max(solid.viscosity - loss / w, 0.0)  # of the loss factor
+    return replace(
+        solid, shear_modulus=solid.shear_modulus - loss * turned, viscosity=others,
+        prony=(term, *solid.prony),
+    )  # fmt: skip
 
 
 def as_viscous(solid: Material, w: float) -> Material:
@@ -278,8 +277,11 @@ def as_viscous(solid: Material, w: float) -> Material:
     if not w or not solid.fast_modulus:
         return solid
     relaxing = complex(solid.relaxing_modulus(w))
-    stiffer = _of_modulus(solid, solid.shear_modulus + relaxing.real)
-    return replace(stiffer, viscosity=solid.viscosity + relaxing.imag / w, prony=())
+    lasting = replace(solid, prony=()).without_loss_factor()
+    return replace(
+        lasting, shear_modulus=lasting.shear_modulus + relaxing.real,
+        viscosity=lasting.viscosity + relaxing.imag / w,
+    )  # fmt: skip
 
 
 def strongest_line(scene: Scene) -> float:

@@ -86,7 +86,7 @@ def exact_slab() -> Case:
     space = np.array([_half_space(hz, RADII) for hz in FREQUENCIES])
     checks.append(misfit("1 m deep, 20 to 210 Hz, relative L2", deep, space, 1e-3, "um"))
     hz = np.linspace(60, 120, 6001)
-    solid = fem.Material(density=1000, shear_modulus=25e3, poisson=0.0, loss_factor=0.01)
+    solid = fem.Material(density=1000, shear_modulus=25e3, poisson=0.0, viscosity=0.5)
     omega = np.asarray(2 * np.pi * hz[:, None], np.complex128)
     g = np.abs(slab(solid, 0.02)(np.array([1e-3 + 0j]), omega)[:, 0])
     quarter = np.sqrt(2 * 25e3 / 1000) / 4 / 0.02
@@ -252,6 +252,6 @@ def _space(hz: float) -> Kernel:
 
 
 def _paper(hz: float) -> Kernel:
-    stiffness, mass = PAPER["bending_stiffness"] * (1 + 0.03j), PAPER["mass_per_area"]
-    w = 2 * np.pi * hz
+    w, paper, mass = 2 * np.pi * hz, fem.PRESETS["paper"], PAPER["mass_per_area"]
+    stiffness = PAPER["bending_stiffness"] * paper.complex_modulus(w) / paper.shear_modulus
     return partial(references.plate_kernel, w=w, stiffness=stiffness, mass=mass, air=1.2)
