@@ -16,11 +16,12 @@ from scipy.special import hankel2e
 from simple_model.half_space_below import modes_above_half_space, rayleigh_mode
 from simple_model.layers import Stack
 from simple_model.material import Complex, Floats
-from simple_model.mode_tracking import Found, tracked
+from simple_model.mode_tracking import Found, between, merged, tracked
 from simple_model.thin_layers import eigenpairs, outgoing, pencil
 
 KINDS = ("propagating", "backward", "leaky", "evanescent")
 MOST = 6  # modes
+ROUNDS = 4  # of further frequencies between those that are asked for
 CANDIDATES = 3  # roots that are tracked over the modes that are kept
 FASTEST_DECAY = 2 / np.pi  # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length
 SLOWEST_FLUX = 0.05  # of the phase speed: energy of a mode that moves no faster stays where it is
@@ -171,13 +172,39 @@ def dispersion_curves(
     if stack.is_half_space and len(stack.materials) == 1:
         found, depths = rayleigh_mode(stack.materials[0], omega)
         return curves(f, depths, found, ("Rayleigh wave",))
+    most_roots = CANDIDATES * most
+    fine, (found, depths) = omega, _roots(stack, omega, most_roots)
+    for _ in range(ROUNDS):
+        is_bound = np.abs(found.wavenumbers.real) > _leaking(stack, fine)[:, None]
+        is_wave = is_bound & ~_is_evanescent(found.wavenumbers)
+        further = between(found, fine, is_wave, most)
+        if not len(further):
+            break
+        # Layers are cut, and depths are taken, for the ends of the band.
+        other, _ = _roots(stack, np.concatenate([omega[:1], further, omega[-1:]]), most_roots)
+        inner = Found(**{name: values[1:-1] for name, values in vars(other).items()})
+        found, fine = merged(found, fine, inner, further)
+    found = tracked(found, fine, most, np.searchsorted(fine, omega))
+    return curves(f, depths, found, (), _leaking(stack, omega) if stack.is_half_space else None)
+
+
+def _leaking(stack: Stack, omega: Floats) -> Floats:
+    """Wavenumber (f,) in 1/m below which waves leak into the half-space of a stack; 0 without."""
+    if not stack.is_half_space:
+        return np.zeros(len(omega))
+    below = stack.materials[-1]
+    return np.asarray((omega * np.sqrt(below.density / below.complex_modulus(omega))).real)
+
+
+def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Found, Floats]:
+    """Roots of a stack at frequencies (f,) in rad/s, so many of each, and depths of shapes."""
     moduli, slopes = modulus_and_slope(stack, omega)
-    if stack.is_half_space:
-        found, depths = modes_above_half_space(stack, omega, moduli, slopes, CANDIDATES * most)
-        bound = omega * np.sqrt(stack.materials[-1].density / moduli[:, -1])
-        return curves(f, depths, tracked(found, omega, most), (), bound.real)
-    found, depths = _finite(stack, omega, moduli, slopes, CANDIDATES * most)
-    return curves(f, depths, tracked(found, omega, most))
+    solve = modes_above_half_space if stack.is_half_space else _finite
+    return solve(stack, omega, moduli, slopes, most)
+
+
+def _is_evanescent(wavenumbers: Complex) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(wavenumbers.imag) > FASTEST_DECAY * np.abs(wavenumbers.real))
 
 
 def checked_frequencies(frequencies: ArrayLike) -> Floats:
@@ -278,7 +305,7 @@ def curves(
     known = np.isfinite(k)
     with np.errstate(invalid="ignore", divide="ignore"):
         omega = 2 * np.pi * frequencies[:, None]
-        decays = np.abs(k.imag) > FASTEST_DECAY * np.abs(k.real)
+        decays = _is_evanescent(k)
         stays = found.energy_speed < SLOWEST_FLUX * omega / np.abs(k.real)
         leaks = np.zeros(k.shape, bool) if bound is None else np.abs(k.real) < bound[:, None]
         kinds = np.select(

@@ -101,7 +101,8 @@ def modes_above_half_space(
     x = x * np.repeat(np.stack([turned, np.ones_like(k)], axis=-1), len(of.depths), axis=-1)
     k, norm = turned * k, turned * norm
     ks2 = np.asarray(ks**2, np.complex128)
-    reach = np.linspace(0, max(layers.thickness, 2 * np.pi / np.median(ks.real)), SHOWN)
+    longest = 4 * np.pi / float(ks.real[0, 0] + ks.real[-1, 0])  # in the middle of the band
+    reach = np.linspace(0, max(layers.thickness, longest), SHOWN)
     found = Found(
         squared=k**2, slope=slope, wavenumbers=k,
         residues=2 * k * x[..., len(of.depths)] ** 2 / norm,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from legible import illegible, sizes, texts
 
-from simple_model.compliance import half_space, slab, thin_sheet
+from simple_model.compliance import half_space, layered, slab, thin_sheet
 from simple_model.dispersion import dispersion_curves
 from simple_model.layers import Stack
 from simple_model.material import PRESETS, Material
@@ -455,3 +455,31 @@ def test_a_thin_layer_leaves_long_waves_to_the_half_space_below(poisson):
     assert (np.diff(ratio) > 0).all()  # shorter waves have more of it in the stiffer layer
     assert ratio[0] == pytest.approx(1, abs=1e-3)
     assert np.abs(mode.wavenumbers.imag).max() < 1e-9 * mode.wavenumbers.real.max()
+
+
+def bound_speeds(stack, hertz, slowest, fastest):
+    """Speeds of the waves between two, ascending, where the compliance of the surface is infinite:
+    without loss 1/G is real, and each sign of it that changes through 0 is one.
+    """
+    w = 2 * np.pi * hertz
+    k = np.linspace(w / fastest, w / slowest, 20_000)
+    stiff = (1 / layered(stack)(k + 0j, np.array([[w + 0j]])))[0].real
+    size = np.abs(stiff)
+    crossing = np.flatnonzero(stiff[1:-2] * stiff[2:-1] < 0) + 1
+    found = [i for i in crossing if size[i - 1] > size[i] and size[i + 2] > size[i + 1]]
+    return w / k[found][::-1]
+
+
+@pytest.mark.parametrize("depth", [inf, 6.0])
+def test_few_frequencies_lose_no_wave(depth):
+    """Soft ground of 6 m, on a half-space or on a layer with a clamped base, at a few frequencies
+    that are far from each other.
+    """
+    solids = [Material(density=1900, shear_modulus=1900 * c**2, poisson=0.4) for c in (200, 700)]
+    stack = Stack(materials=tuple(solids), thicknesses=(6.0, depth))
+    hertz = np.array([10.0, 20.0, 40.0, 60.0, 100.0])
+    curves = dispersion_curves(stack, hertz, most=4)
+    for j, f in enumerate(hertz):
+        speeds = np.array([mode.phase_speed[j] for mode in curves.modes])
+        for exact in bound_speeds(stack, f, 180.0, 690.0)[:4]:
+            assert np.nanmin(np.abs(speeds / exact - 1)) < 1e-3, (f, exact)
