@@ -10,14 +10,17 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core
 
 import pytest
 from corpus import SMALL
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from in_browser import chromium, ended, served
 
 import meshes
 from skinwave.verify import elements
 
 # The same examples every time, whatever the speed of the machine.
-settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=25)
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, max_examples=25,
+    suppress_health_check=[HealthCheck.too_slow],
+)  # fmt: skip
 settings.load_profile("repeatable")
 
 

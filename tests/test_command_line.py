@@ -6,6 +6,8 @@ import os
 import re
 import sys
 from argparse import Namespace
+from functools import partial
+from itertools import count
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from corpus import GOOD, SMALL
 
 from skinwave.cli import main, parser
 from skinwave.commands.common import progress_of
+from skinwave.steps import follower
 
 CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
 
@@ -170,6 +173,8 @@ def test_wrong_options_exit_with_two(capsys):
 def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
     monkeypatch.setenv("COLUMNS", "100")
+    clock = count(0.0, 0.1).__next__
+    monkeypatch.setattr("skinwave.progress_bar.follower", partial(follower, clock=clock))
     with progress_of(Namespace(quiet=False, json=False)) as progress:
         for phase in ("mesh", "assemble", "factorise"):
             progress(phase, 0.0)
