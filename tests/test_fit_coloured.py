@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from skinwave.fits.coloured import autocovariances, flat_top, significant_lags, widening
+from skinwave.fits.coloured import widening
 from skinwave.fits.identify import estimates, widenings
 from skinwave.fits.observed import Data
 from skinwave.fits.parameters import parse
@@ -45,18 +45,6 @@ def test_widening_of_a_mean_is_that_of_effective_samples():
         noise = coloured(rng, rho, (20_000, 2))
         (factor,) = widening(noise, np.ones((1, 20_000, 2)))
         assert factor == pytest.approx(np.sqrt((1 + rho) / (1 - rho)), rel=0.08)
-
-
-def test_widening_is_the_exact_sandwich_of_a_matrix():
-    """Against the sum over all pairs of samples, with the same autocovariances."""
-    rng = np.random.default_rng(1)
-    noise, rows = coloured(rng, 0.7, (90, 2)), rng.standard_normal((3, 90, 2)).cumsum(axis=1)
-    gamma = autocovariances(noise)
-    window = flat_top(significant_lags(gamma), 90)
-    lag = np.abs(np.subtract.outer(np.arange(90), np.arange(90)))
-    sandwich = np.einsum("kns,nms,kms->k", rows, (window[:, None] * gamma)[lag], rows)
-    independent = (noise**2).mean() * (rows**2).sum(axis=(1, 2))
-    assert widening(noise, rows) == pytest.approx(np.sqrt(sandwich / independent), rel=0.02)
 
 
 def test_intervals_of_white_residuals_stay_as_they_are():

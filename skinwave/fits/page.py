@@ -118,7 +118,7 @@ def whiteness_sentence(found: Fit) -> str:
         return "There are too few data along an axis for a test of whiteness."
     said = "nothing speaks against white residuals." if test.is_white else (
         "they are not white. Intervals are those of a sandwich covariance, with the residuals' "
-        "autocovariances in place of independent errors (Newey and West 1987; of profiles Kent "
+        "spectrum in place of independent errors (White 1980; of profiles Kent "
         "1982), as far as it widens them: " + ", ".join(
             f"{each.key} by {significant(factor, 3)}"
             for each, factor in zip(found.estimates, found.widenings, strict=True)
