@@ -15,7 +15,13 @@ from fem.elements import shape_derivatives, shape_functions, triangle_rule
 from meshes import TetMesh, facet_set
 from meshes.tetmesh import Floats, Ints
 
-BESIDE = 1e-9  # barycentric: how far outside a facet a point still counts as on it
+BESIDE = 1e-6  # barycentric: how far outside a facet a point still counts as on it
+CLOSE = 1e-9  # of a facet's size: Newton's method has found a point
+MOST_STEPS, FURTHEST = 12, 3.0  # of Newton's method, and how far outside a facet it is followed
+EDGE_ON = 1e-9  # of a facet's squared size: the area of one that is seen edge-on
+SAME_HEIGHT = 1e-6  # of the surface's extent: neighbours meet at one height
+AT_ONCE = 2_000_000  # pairs of points and facets
+NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  # of a facet
 
 
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
@@ -118,9 +124,9 @@ def probe_operator(
 ) -> sparse.csr_array:
     """Probe operator S: displacement into the body at surface points.
 
-    A point is projected along z onto the facets; positive is the direction of a pressure, against
-    the normal of the facet; or, with a patch, against the mean normal of the surface. Next to a
-    crease the facet itself depends on the mesh.
+    A point is projected along z onto the facets, of several onto the highest; positive is the
+    direction of a pressure, against the normal of the facet; or, with a patch, against the mean
+    normal of the surface. Next to a crease the facet itself depends on the mesh.
 
     Parameters
     ----------
@@ -139,7 +145,38 @@ def probe_operator(
     ValueError
         If a point lies outside the facets, or has no finite coordinates.
     """
-    nodes, N, normals = _surface_frame(mesh, points, facets, patch)
+    return _inwards(mesh, *_surface_frame(mesh, points, facets, patch))
+
+
+def node_operator(
+    mesh: TetMesh, facets: str | Ints = "top", *, patch: float = 0.0
+) -> tuple[Ints, sparse.csr_array]:
+    """Displacement into the body at the nodes of a surface, against the mean normal of the facets
+    at each.
+
+    Parameters
+    ----------
+    mesh, facets, patch : as for `probe_operator`
+
+    Returns
+    -------
+    nodes (s,) in ascending order, and the operator (s, 3 n), sparse and without unit
+    """
+    nodes = facet_set(mesh, facets)
+    surface, local = np.unique(nodes, return_inverse=True)
+    if patch:
+        normals = _mean_normals(mesh, nodes, mesh.points[surface], patch)
+    else:
+        normals, own = np.zeros((len(surface), 3)), local.reshape(nodes.shape)
+        for number, at in enumerate(NODES[: nodes.shape[1]]):
+            here = np.broadcast_to(at, (len(nodes), 3))
+            np.add.at(normals, own[:, number], np.cross(*_facet_tangents(mesh, nodes, here)))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return surface, _inwards(mesh, surface[:, None], np.ones((len(surface), 1)), normals)
+
+
+def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.csr_array:
+    """Displacement against normals (p, 3), of nodes (p, a) with weights (p, a)."""
     values = -np.einsum("pa,pi->pai", N, normals)
     columns = 3 * nodes[:, :, None] + np.arange(3)
     rows = np.broadcast_to(np.arange(len(nodes))[:, None, None], columns.shape)
@@ -174,15 +211,12 @@ def _surface_frame(
         raise ValueError(f"points of shape {points.shape}: give (p, 2 or 3) finite coordinates")
     if not len(nodes):
         raise ValueError("there are no facets to read; name a facet set that is not empty")
-    points = points[:, :2]
-    owner, barycentric = _nearest(mesh.points[nodes[:, :3], :2], points)
-    if (beside := (barycentric < -BESIDE).any(axis=1)).any():
-        x_mm, y_mm = 1e3 * points[beside][0]
+    owner, barycentric = _seen(mesh.points[nodes], points[:, :2])
+    if (beside := owner < 0).any():
+        x_mm, y_mm = 1e3 * points[beside][0, :2]
         raise ValueError(
             f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
         )
-    if mesh.order == 2:
-        barycentric = on_curved(mesh.points[nodes[owner], :2], barycentric, points)
     N = shape_functions(barycentric, nodes.shape[1])
     if patch:
         places = np.einsum("pa,pai->pi", N, mesh.points[nodes[owner]])
@@ -194,11 +228,14 @@ def _surface_frame(
 
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
     """Mean normals (p, 3) of facets (k, a) about places (p, 3), weighted by area and distance."""
-    at = facet_points(mesh, nodes)
-    squared = ((places[:, None] - at) ** 2).sum(axis=2)
-    nearest = squared.min(axis=1, keepdims=True)  # of facets larger than the patch one is left
-    weights = np.exp((nearest - squared) / (2 * patch**2))
-    return np.asarray(weights @ facet_geometry(mesh, nodes)[1].reshape(-1, 3))
+    at, areas = facet_points(mesh, nodes), facet_geometry(mesh, nodes)[1].reshape(-1, 3)
+    found, count = np.empty((len(places), 3)), max(1, AT_ONCE // len(at))
+    for start in range(0, len(places), count):
+        part = slice(start, start + count)
+        squared = ((places[part, None] - at) ** 2).sum(axis=2)
+        nearest = squared.min(axis=1, keepdims=True)  # of facets larger than the patch one is left
+        found[part] = np.exp((nearest - squared) / (2 * patch**2)) @ areas
+    return found
 
 
 def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
@@ -223,27 +260,20 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
 
 
 def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
-    """Barycentric coordinates of points on curved facets seen along z, or in curved tetrahedra, by
-    Newton's method.
-
-    A point next to the edge of a bowed facet may lie a little beyond it, which does no harm.
+    """Barycentric coordinates of points in curved tetrahedra, by Newton's method.
 
     Parameters
     ----------
-    elements : (p, a, i) float, metre, nodes of the facet or tetrahedron of each point
-    barycentric : (p, i + 1) float, to start from
-    points : (p, i) float, metre
+    elements : (p, a, 3) float, metre, nodes of the tetrahedron of each point
+    barycentric : (p, 4) float, to start from
+    points : (p, 3) float, metre
 
     Returns
     -------
-    (p, i + 1) float
+    (p, 4) float
     """
     for _ in range(4):
-        N = shape_functions(barycentric, elements.shape[1])
-        miss = points - np.einsum("pa,pai->pi", N, elements)
-        tangents = np.einsum(
-            "pad,pai->pid", shape_derivatives(barycentric, elements.shape[1]), elements
-        )
+        miss, tangents = _missed(elements, barycentric, points)
         step = np.linalg.solve(tangents, miss[:, :, None])[:, :, 0]
         barycentric = barycentric + np.column_stack([-step.sum(axis=1), step])
     return barycentric
@@ -262,25 +292,80 @@ def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> NDA
     -------
     (p,) bool
     """
-    _, barycentric = _nearest(mesh.points[facet_set(mesh, facets)[:, :3], :2], points)
-    return np.all(barycentric >= -BESIDE, axis=1)
+    return _seen(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 
-def _nearest(triangles: Floats, points: Floats) -> tuple[Ints, Floats]:
-    """Index (p,) of the triangle (k, 3, 2) that each point (p, 2) lies in, or the least outside,
-    and its barycentric coordinates (p, 3) there.
+def _seen(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """Highest of the facets (k, a, 3) at each of the points (p, 2), seen along z, -1 where there is
+    none; and the barycentric coordinates (p, 3) there.
+
+    A point is on a facet only if Newton's method ends inside of it. Outside, shape functions
+    extrapolate, and without bound on a facet that is seen edge-on.
     """
-    origin, edges = triangles[:, 0], triangles[:, 1:] - triangles[:, :1]
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    standing = np.abs(area) < 1e-12 * (edges**2).sum(axis=(1, 2))
-    inverse_area = np.where(standing, np.nan, 1 / np.where(standing, 1, area))
-    owners, coordinates = [], []
-    for point in points:
-        x, y = (point - origin).T
-        second = (x * edges[:, 1, 1] - y * edges[:, 1, 0]) * inverse_area
-        third = (y * edges[:, 0, 0] - x * edges[:, 0, 1]) * inverse_area
-        inside = np.minimum(np.minimum(second, third), 1 - second - third)
-        owner = int(np.nanargmax(inside))
-        owners.append(owner)
-        coordinates.append([1 - second[owner] - third[owner], second[owner], third[owner]])
-    return np.array(owners), np.array(coordinates)
+    who, which = _near(facets[:, :, :2], points)
+    barycentric, found = _within(facets[which, :, :2], points[who])
+    who, which, barycentric = who[found], which[found], barycentric[found]
+    height = np.einsum(
+        "ma,ma->m", shape_functions(barycentric, facets.shape[1]), facets[which, :, 2]
+    )
+    size = np.ptp(facets[:, :, :2], axis=(0, 1)).max(initial=0.0)
+    level = np.rint(height / (SAME_HEIGHT * size or 1.0))
+    # Last is the highest; of neighbours that share an edge, the one that it is deepest inside.
+    order = np.lexsort((barycentric.min(axis=1), level, who))
+    last = order[np.append(np.diff(who[order]) > 0, True)[: len(order)]]
+    owner, coordinates = np.full(len(points), -1), np.zeros((len(points), 3))
+    owner[who[last]], coordinates[who[last]] = which[last], barycentric[last]
+    return owner, coordinates
+
+
+def _near(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
+    """Pairs (m,) of points (p, 2) and facets (k, a, 2) whose bounding boxes they lie in."""
+    hull = facets.copy()
+    if facets.shape[1] == 6:  # the control points of their edges, between which curves stay
+        corners = facets[:, :3]
+        hull[:, 3:] = 2 * facets[:, 3:] - (corners + np.roll(corners, -1, axis=1)) / 2
+    low, high = hull.min(axis=1), hull.max(axis=1)
+    slack = BESIDE * (high - low).max(axis=1, initial=0.0, keepdims=True)
+    (left, below), (right, above) = (low - slack).T, (high + slack).T
+    who, which = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
+    count = max(1, AT_ONCE // max(len(facets), 1))
+    for start in range(0, len(points), count):
+        x, y = points[start : start + count].T[:, :, None]
+        pairs = np.nonzero((left <= x) & (x <= right) & (below <= y) & (y <= above))
+        who.append(pairs[0] + start)
+        which.append(pairs[1])
+    return np.concatenate(who), np.concatenate(which)
+
+
+def _within(facets: Floats, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Barycentric coordinates (m, 3) of points (m, 2) on facets (m, a, 2), and whether each is on
+    its facet.
+    """
+    found = np.full((len(points), 3), 1 / 3)
+    size = np.ptp(facets, axis=1).max(axis=1, initial=0.0)
+    missed, active = np.full(len(points), np.inf), np.arange(len(points))
+    for _ in range(MOST_STEPS):
+        miss, tangents = _missed(facets[active], found[active], points[active])
+        missed[active] = np.linalg.norm(miss, axis=1) / size[active]
+        (a, b), (c, d) = np.moveaxis(tangents, 0, 2)
+        area = a * d - b * c
+        standing = np.abs(area) < EDGE_ON * size[active] ** 2
+        missed[active[standing]] = np.inf  # seen edge-on there
+        going = ~standing & (missed[active] > CLOSE)
+        miss, area = miss[going], area[going]
+        second = (d[going] * miss[:, 0] - b[going] * miss[:, 1]) / area
+        third = (a[going] * miss[:, 1] - c[going] * miss[:, 0]) / area
+        active = active[going]
+        found[active] += np.column_stack([-second - third, second, third])
+        active = active[np.abs(found[active]).max(axis=1, initial=0.0) < FURTHEST]
+        if not len(active):
+            break
+    return found, (missed <= CLOSE) & (found.min(axis=1) >= -BESIDE)
+
+
+def _missed(elements: Floats, barycentric: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Vectors (p, i) from places in elements (p, a, i) to points (p, i), and tangents (p, i, d)."""
+    N = shape_functions(barycentric, elements.shape[1])
+    derivatives = shape_derivatives(barycentric, elements.shape[1])
+    miss = points - np.einsum("pa,pai->pi", N, elements)
+    return miss, np.einsum("pad,pai->pid", derivatives, elements)

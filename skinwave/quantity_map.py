@@ -93,6 +93,11 @@ def quantity_map(
             x=x, y=y, rms=_flat_rms(scene, depth, places), asked=asked, depth=depth,
             note="wavenumber integral of the laterally infinite body",
         )  # fmt: skip
+    if scene.load.support_motion or (scene.load.gravity and asked.invariant):
+        raise ValueError(
+            "a map is of motion about the rest without gravity, on a support at rest; leave "
+            "gravity and support_motion out"
+        )
     size = h or default_size(scene.body)
     rms, coarse = (
         _element_rms(
@@ -152,7 +157,7 @@ def _element_rms(scene: Scene, moved: DrivenBody, depth: float, places: Floats) 
     """RMS (ny, nx) at places (ny, nx, 2) of a meshed body; not a number off it."""
     asked, flat = scene.reading.asked, places.reshape(-1, 2)
     seen = fem.on_surface(moved.build.mesh, flat)
-    seen[seen] = _is_above(moved, flat[seen], depth)
+    seen[seen] = _is_above(scene, moved, flat[seen], depth)
     reading = Reading(quantity=asked.name, depths=(depth,) * int(seen.sum()) if depth else ())
     rows, solids = probe_rows(scene.body, moved.build, flat[seen], reading)
     motion = read_at(moved.motion, rows @ moved.basis)
@@ -163,11 +168,12 @@ def _element_rms(scene: Scene, moved: DrivenBody, depth: float, places: Floats) 
     return rms.reshape(places.shape[:2])
 
 
-def _is_above(moved: DrivenBody, places: Floats, depth: float) -> NDArray[np.bool_]:
+def _is_above(scene: Scene, moved: DrivenBody, places: Floats, depth: float) -> NDArray[np.bool_]:
     """Mask of places (p, 2) below which the body has a depth in metre along its normal."""
     if not depth:
         return np.ones(len(places), bool)
-    points, normals = surface_frame(moved.build.mesh, places)
+    patch = scene.body.of_kind.normal_patch
+    points, normals = surface_frame(moved.build.mesh, places, patch=patch)
     return fem.is_inside(moved.build.mesh, points - depth * normals)
 
 

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike
 import fem
 from simple_model import Response
 from simple_model.choices import choose
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress, SkinwaveWarning, silent, versions
 from skinwave.models import MapFunction, Request, named
-from skinwave.models.advice import check_taken
+from skinwave.models.advice import check_taken, takes
+from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.laws import check_laws
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
@@ -229,6 +231,35 @@ def compute(
     if found.effort.versions:
         return found
     return replace(found, effort=replace(found.effort, versions=versions()))
+
+
+def has_elements(scene: Scene, h: float | None = None) -> bool:
+    """Whether pages compute a scene by finite elements: it has a body, and that can be meshed or
+    has no model without a mesh.
+
+    Parameters
+    ----------
+    scene : Scene
+    h : metre, element size; the default of the body if not given
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    ValueError
+        If only elements are a model of the body, or their size is given, and it cannot be meshed.
+    """
+    if not scene.body.of_kind.discretise:
+        return False
+    try:
+        check_mesh(scene.body, h or default_size(scene.body))
+    except ValueError:
+        if h or not takes(FLAT_BODY, scene):
+            raise
+        return False
+    return True
 
 
 def warned(response: Response, sentences: tuple[str, ...]) -> Response:

@@ -6,18 +6,21 @@ A body's motion is its wavenumber integral where it has one, else that of its re
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 import fem
+from meshes import reading
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
 from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import load_lines, pressure_lines
-from skinwave.bodies.analytic import compliance, has_exact_waves
+from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
-from skinwave.pictures.motion import Waves, line_amplitudes, waves
+from skinwave.models.loads import surface_motion
+from skinwave.pictures.motion import DrivenBody, driven, line_amplitudes
 from skinwave.scene import Scene
 
 REACH, STEP = 0.044, 0.001  # m of a map either way from the middle, and between its places
@@ -38,9 +41,9 @@ class SurfaceMap:
     Parameters
     ----------
     x, y : (nx,), (ny,) float, metre, equally spaced
-    rms : (ny, nx) float, in `unit`, "m" or "Pa"; not a number off the body
+    rms : (ny, nx) float, in `unit`, "m" or "Pa"; nan off the body
     level : (ny, nx) float, dB, the sensation level of the component where it is highest,
-        were the body skin; minus infinity of a pressure
+        were the body skin; nan off the body, minus infinity of a pressure
     note : str, how it was computed, if another way than the probes
     """
 
@@ -94,8 +97,8 @@ def body_map(
     """
     if not has_wavenumber_integral(scene):
         size = max(h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
-        moved = waves(scene, REDUCED, progress, h=size, solver=solver)
-        return replace(element_map(moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
+        moved = driven(scene, REDUCED, progress, h=size, solver=solver)
+        return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
     waves_of = compliance(scene.body)
 
     def answer(places: Floats) -> Lines:
@@ -106,21 +109,42 @@ def body_map(
 
 
 def has_wavenumber_integral(scene: Scene) -> bool:
-    """Whether a wavenumber integral stands for the scene, whose sides then absorb."""
+    """Whether a wavenumber integral stands for the scene, whose sides then reflect nothing."""
     plain = scene.pressure.profile == "gaussian" and scene.tacton.trajectory.shape != "recorded"
     plain = plain and scene.load.is_plain
-    return plain and scene.body.sides == "absorbing" and has_exact_waves(scene.body)
+    return plain and is_laterally_infinite(scene.body) and has_exact_waves(scene.body)
 
 
-def element_map(moved: Waves, x: Floats, y: Floats) -> SurfaceMap:
-    """Map of a motion by finite elements."""
-    top = moved.mesh.points[np.unique(moved.mesh.facets["top"])]
-    frequencies, amplitudes = line_amplitudes(moved, fem.probe_operator(moved.mesh, top))
-    lines = frequencies, amplitudes
-    from scipy.interpolate import LinearNDInterpolator  # which takes long to import
+def element_map(scene: Scene, moved: DrivenBody, x: Floats, y: Floats) -> SurfaceMap:
+    """Map of a meshed body's motion, which is read as probes read it."""
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    seen = fem.on_surface(moved.build.mesh, places.reshape(-1, 2)).reshape(places.shape[:2])
+    lines = line_amplitudes(moved, surface_motion(scene.body, moved.build, places[seen]))
+    found = np.full((2, *seen.shape), np.nan)
+    found[:, seen] = _rms_and_level(lines, "m")
+    return SurfaceMap(x=x, y=y, rms=found[0], level=found[1], unit="m")
 
-    between = LinearNDInterpolator(top[:, :2], np.column_stack(_rms_and_level(lines, "m")))
-    rms, level = np.moveaxis(between(*np.meshgrid(x, y)), -1, 0)  # not a number off the body
+
+def save(path: Path, found: SurfaceMap) -> None:
+    """A map as one npz file."""
+    np.savez(path, x=found.x, y=found.y, rms=found.rms, level=found.level)
+
+
+def load(path: Path) -> SurfaceMap:
+    """A map of a body's motion from its file.
+
+    Raises
+    ------
+    ValueError
+        If the file is none of these.
+    """
+    try:
+        arrays = reading.arrays(path)
+        x, y, rms, level = (np.asarray(arrays[n], np.float64) for n in ("x", "y", "rms", "level"))
+        if x.ndim != 1 or not rms.shape == level.shape == (*y.shape, *x.shape):
+            raise ValueError(f"'rms' is of shape {rms.shape}, and 'level' of {level.shape}")
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is no map ({error}); make it anew from its scene") from None
     return SurfaceMap(x=x, y=y, rms=rms, level=level, unit="m")
 
 

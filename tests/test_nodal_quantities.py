@@ -10,7 +10,7 @@ from PIL import Image
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.load_spectrum import pressure_lines, synthesise
 from simple_model.tensors import hooke
-from skinwave import exports, quantity_map
+from skinwave import exports, quantity_map, surface
 from skinwave.bodies.build import build, operators
 from skinwave.cli import main
 from skinwave.effort import silent
@@ -230,9 +230,12 @@ def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(
     assert (tmp_path / "quantity-slab.png").stat().st_size > 10_000
 
 
-def test_a_report_of_motion_keeps_no_map(view, tmp_path):
+def test_a_report_of_motion_keeps_the_map_of_its_surface(view, tmp_path):
     album.keep_view(view, tmp_path)
-    assert not (tmp_path / "map.npz").exists()
+    found = surface.load(tmp_path / "map.npz")
+    at = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)
+    assert found.rms[at] == pytest.approx(view.rms.max(), rel=0.05)  # at places, and at nodes
     (tmp_path / "map.npz").write_bytes(b"none")
-    with pytest.raises(ValueError, match="is no map"):
-        quantity_map.load(tmp_path / "map.npz", SCENE)
+    for load in (surface.load, lambda path: quantity_map.load(path, SCENE)):
+        with pytest.raises(ValueError, match="is no map"):
+            load(tmp_path / "map.npz")

@@ -55,7 +55,7 @@ def checked(body: Body, h: float, slack: float = 1.0) -> float:
     if not body.of_kind.is_bounded:
         return h
     if not isfinite(body.depth):
-        exact = "use --model flat-body or " if has_exact_waves(body) else ""
+        exact = "take the model flat-body, or " if has_exact_waves(body) else ""
         raise ValueError(f"thickness_mm = inf has no mesh; {exact}give a finite depth")
     longest = max(body.width, body.height, body.depth)
     if h > longest:

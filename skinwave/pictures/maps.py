@@ -59,17 +59,19 @@ def sampler(view: View, raster: Raster) -> Callable[[Floats], Floats]:
 
 def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
     """Linear interpolation of values (s,) of a view's surface to places (..., 2)."""
-    found = view.finder(places[..., 0], places[..., 1])
-    corners = view.places[view.triangles[found]]  # (..., 3, 2)
-    edges = corners[..., 1:, :] - corners[..., :1, :]
-    inside = (places - corners[..., 0, :])[..., None]
+    owner = view.finder(places[..., 0], places[..., 1])
+    on = owner >= 0
+    found = view.triangles[owner[on]]
+    corners = view.places[found]  # (q, 3, 2)
+    edges = corners[:, 1:] - corners[:, :1]
+    inside = (places[on] - corners[:, 0])[..., None]
     second_third = np.linalg.solve(edges.swapaxes(-1, -2), inside)[..., 0]
-    first = 1 - second_third.sum(axis=-1, keepdims=True)
-    weights = np.concatenate([first, second_third], axis=-1)
-    weights[found < 0] = np.nan
+    weights = np.column_stack([1 - second_third.sum(axis=-1), second_third])
 
     def carried(values: Floats) -> Floats:
-        return np.asarray((values[view.triangles[found]] * weights).sum(axis=-1))
+        at = np.full(on.shape, np.nan)
+        at[on] = (values[found] * weights).sum(axis=-1)
+        return at
 
     return carried
 
@@ -277,9 +279,9 @@ def _draw_focus(ax: Axes, view: View, time: float) -> None:
 
 def _draw_trace(ax: Axes, trace: Trace, name: str) -> AxesImage:
     """Motion over its largest: on a ray, where waves fade, over the largest at each place."""
-    peak = np.abs(trace.motion).max(axis=0)
+    peak = np.abs(trace.motion).max(axis=0)  # nan off the body
     faintest = FAINTEST if name == "ray" else 1.0
-    peak = np.maximum(peak, faintest * max(float(peak.max()), 1e-300))
+    peak = np.maximum(peak, faintest * np.nan_to_num(peak).max(initial=1e-300))
     frame = (0.0, 1e3 * trace.distance[-1], 0.0, 1e3 * trace.times[-1])
     return ax.imshow(trace.motion / peak, cmap=SIGNED, vmin=-1, vmax=1, extent=frame,
                      origin="lower", aspect="auto", interpolation="bilinear")  # fmt: skip

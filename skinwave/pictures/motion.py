@@ -170,7 +170,7 @@ def vibration(moved: Waves, times: Floats) -> Floats:
     return fem.exponential_sum(rates, moving.lines, times)
 
 
-def line_amplitudes(moved: Waves, read: sparse.csr_array) -> tuple[Floats, Floats]:
+def line_amplitudes(moved: DrivenBody, read: sparse.csr_array) -> tuple[Floats, Floats]:
     """Frequencies (f,) in Hz above 0 and amplitudes (f, p) in metre that an operator (p, 3 n)
     reads.
     """

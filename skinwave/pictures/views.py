@@ -12,24 +12,28 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 import fem
 from meshes import reading
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import Effort, sensation_level
-from simple_model.load_spectrum import pressure_lines
+from simple_model.flat_body import steady_lines
+from simple_model.load_spectrum import Complex, pressure_lines, synthesise
+from skinwave.bodies.analytic import compliance
 from skinwave.fitting import effort_of, fitting
-from skinwave.models.reduction import oscillating
+from skinwave.models.loads import surface_motion
+from skinwave.models.reduction import oscillating, read_at
 from skinwave.models.speeds import repeated, shown_part, strongest_tone
-from skinwave.pictures.motion import Waves, check_values, line_amplitudes, vibration
+from skinwave.pictures.motion import Waves, check_values, vibration
 from skinwave.pictures.nodal import Shade, Tensors, shade, tensors
+from skinwave.run import Run
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps, loads
 
 STRONG = 0.1  # of the strongest line: weaker ones need no frames of their own
 SLOWEST = 20.0  # Hz: slower tones are not followed by diagrams of motion over place and time
-GRID = 121  # points along a side of the point kernel's surface
+GRID, LAYER_GRID = 121, 81  # points along a side of the surface of the point kernel, of a layer
+NEGLIGIBLE = 1e-4  # of the load's strongest line: lines that are not shown
 ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
 TYPICAL = 140.0  # Hz, where nothing vibrates
 FIELD_FRAMES = 8  # of those that are shown, written for other programs
@@ -43,8 +47,8 @@ UNITS = ("m", "Pa")  # of a body's displacement, and of the point kernel's press
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """Motion (t, q) along a line, in the unit of its view: `places` (q, 2) in metre, `distance`
-    (q,) in metre along it, `times` (t,) in s.
+    """Motion (t, q) along a line, in the unit of its view, nan off the body: `places` (q, 2) in
+    metre, `distance` (q,) in metre along it, `times` (t,) in s.
     """
 
     places: Floats
@@ -154,19 +158,20 @@ def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | N
     times = np.arange(frames) * period / frames
     check_values(frames, len(mesh.points))
     motion = vibration(moved, times) @ moved.basis.T
-    # Nodes of a bowed rim may lie beside all facets, seen from above: they are read next to it.
-    seen = fem.on_surface(mesh, mesh.points[surface, :2])
-    nearest = cKDTree(mesh.points[surface[seen]]).query(mesh.points[surface])[1]
-    read = fem.probe_operator(mesh, mesh.points[surface[seen]])
-    frequencies, amplitudes = line_amplitudes(moved, read)
-    amplitudes = amplitudes[:, nearest]
+    _, inwards = fem.node_operator(mesh, patch=scene.body.of_kind.normal_patch)
+    seen = read_at(oscillating(moved.motion), inwards @ moved.basis)
+    frequencies, amplitudes = seen.frequencies, np.abs(seen.lines)
     levels = np.full(len(surface), -np.inf)
     if scene.body.is_skin:
         levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
     tone = strongest_tone(frequencies, amplitudes)
 
     def trace(places: Floats, t: Floats) -> Floats:
-        return vibration(moved, t) @ (fem.probe_operator(mesh, places) @ moved.basis).T
+        build, found = moved.driven.build, np.full((len(t), len(places)), np.nan)
+        on = fem.on_surface(build.mesh, places)
+        read = surface_motion(scene.body, build, places[on]) @ moved.driven.basis
+        found[:, on] = vibration(moved, t) @ read.T
+        return found
 
     speed = scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL)
     reach = np.array([scene.body.width, scene.body.height]) / 2
@@ -210,7 +215,7 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = No
     is how long it is played, s, and in how many frames, as `body_view` takes it.
     """
     pressure = scene.pressure
-    points, triangles = _grid(reach)
+    points, triangles = _grid(reach, GRID)
     frequencies, patterns = pressure_lines(pressure, points)
     moving = frequencies > 0
     amplitudes = np.abs(patterns[moving])
@@ -233,6 +238,39 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = No
         sensation=levels.max(axis=0, initial=-np.inf),
         tone=strongest_tone(frequencies[moving], amplitudes),
         speed=None, ray=_ray(scene, reach, trace), track=_track(scene, trace),
+    )  # fmt: skip
+
+
+def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
+    """The view of an infinite layer or a half-space, by its wavenumber integral, on a flat square;
+    `reach` and `part` as `kernel_view` takes them.
+    """
+    scene, body = run.scene, run.scene.body
+    waves_of = compliance(body)
+    points, triangles = _grid(reach, LAYER_GRID)
+    period, frames = part
+    times = np.arange(frames) * period / frames
+
+    def lines(places: Floats) -> tuple[Floats, Complex]:
+        f, a = steady_lines(waves_of, scene.pressure, places, threshold=NEGLIGIBLE)
+        return f[f > 0], a[f > 0]
+
+    def trace(places: Floats, t: Floats) -> Floats:
+        return synthesise(*lines(places), t)
+
+    f, found = lines(points[:, :2])
+    amplitudes, levels = np.abs(found), np.full(len(points), -np.inf)
+    if body.is_skin:
+        levels = sensation_level(amplitudes, f[:, None]).max(axis=0, initial=-np.inf)
+    motion = np.zeros((frames, len(points), 3), np.float32)
+    motion[:, :, 2] = -synthesise(f, found, times)
+    tone = strongest_tone(f, amplitudes)
+    return View(
+        body=run.body, model=run.model, unit="m", scene=scene, points=points,
+        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
+        period=period, times=times, motion=motion, rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
+        sensation=levels, tone=tone, speed=body.of_kind.wave_speed(body, tone or TYPICAL),
+        effort=run.response.effort, ray=_ray(scene, reach, trace), track=_track(scene, trace),
     )  # fmt: skip
 
 
@@ -365,12 +403,12 @@ def split(facets: Ints) -> Ints:
     return facets[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]].reshape(-1, 3)
 
 
-def _grid(reach: Floats) -> tuple[Floats, Ints]:
-    """A flat rectangle of points (n, 3) and triangles (k, 3)."""
-    x, y = (np.linspace(-r, r, GRID) for r in reach)
+def _grid(reach: Floats, side: int) -> tuple[Floats, Ints]:
+    """A flat rectangle of points (side^2, 3) and triangles (k, 3)."""
+    x, y = (np.linspace(-r, r, side) for r in reach)
     X, Y = np.meshgrid(x, y, indexing="ij")
-    a = (np.arange(GRID - 1)[:, None] * GRID + np.arange(GRID - 1)).ravel()
-    b = a + GRID
+    a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    b = a + side
     triangles = np.vstack([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
     return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
 

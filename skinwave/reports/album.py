@@ -17,7 +17,7 @@ from meshes import reading
 from simple_model import Response, published
 from simple_model.choices import choose
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
-from skinwave import record
+from skinwave import record, surface
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
 from skinwave.fields import assessed_probes
@@ -33,6 +33,7 @@ from skinwave.pictures.views import (
     body_view,
     fastest_line,
     kernel_view,
+    layer_view,
     load,
     save,
     shaded,
@@ -44,8 +45,9 @@ from skinwave.quantity_map import save as save_map
 from skinwave.run import Run
 from skinwave.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.scene_file import dumps, read
-from skinwave.simulation import compute
+from skinwave.simulation import answered, compute, has_elements
 from skinwave.studies import description, paper15
+from skinwave.surface import SurfaceMap, body_map, element_map, grid
 from skinwave.verify.suite import suite
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
@@ -56,8 +58,8 @@ CASES = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a seco
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Album:
     """Contents of a folder: runs; views by body, where there are any; the plan, how far its
-    response agrees with the pictures, and the command that made it, where these were saved; maps
-    by body, of another quantity than the displacement of the surface.
+    response agrees with the pictures, and the command that made it, where these were saved; by
+    body `surfaces`, maps of the displacement of the surface, or `maps` of another quantity.
     """
 
     title: str
@@ -67,6 +69,7 @@ class Album:
     planned: Mapping[str, Any] | None
     trust: Mapping[str, Any] | None
     maps: Mapping[str, QuantityMap] = field(default_factory=dict)
+    surfaces: Mapping[str, SurfaceMap] = field(default_factory=dict)
 
 
 def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
@@ -140,10 +143,16 @@ def make(
 
 
 def keep_view(view: View, folder: Path) -> None:
-    """A view in a file, and the map of another quantity that its probes read."""
+    """A view in a file and, of a body, the map of what its probes read."""
     save(folder / "view.npz", view)
-    if view.moved is not None and not (scene := view.scene).reading.is_plain:
+    scene = view.scene
+    if not scene.reading.is_plain and view.moved is not None:
         save_map(folder / "map.npz", map_of_motion(scene, view.moved.driven))
+    elif scene.reading.is_plain and view.unit == "m":
+        x, y = grid(scene)
+        moved = view.moved and view.moved.driven
+        found = element_map(scene, moved, x, y) if moved else body_map(scene, x, y)
+        surface.save(folder / "map.npz", found)
 
 
 def answers(
@@ -161,7 +170,7 @@ def answers(
     moved = {
         body: _moved(its, body, progress, h, solver)
         for body, its in shown.items()
-        if its.body.of_kind.discretise
+        if has_elements(its, h)
     }
     tones = max(repeated(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
@@ -173,6 +182,10 @@ def answers(
             response = assessed_probes(its, moved[column], h, PLANNED, solver)
             run = Run(tacton=scene.name, body=column, scene=its, response=response)
             yield body_view(its, column, moved[column], part), run
+        elif its.body.of_kind.discretise:
+            response = answered(its, tolerance=PLANNED, solver=solver)
+            run = Run(tacton=scene.name, body=column, scene=its, response=response)
+            yield layer_view(run, KERNEL_REACH, part), run
         else:
             run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
             yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
@@ -249,12 +262,15 @@ def open_album(folder: Path) -> Album:
     views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own, scenes_of = folder / "scene.toml", {run.column: run.scene for run in runs}
     kept = {path.parent.name: path for path in sorted(folder.glob("*/map.npz"), key=_order)}
+    plain = {name for name in scenes_of if scenes_of[name].reading.is_plain}
+    others = {*scenes_of} - plain
     scene = read(own) if own.exists() else runs[-1].scene
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
         views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
         trust=_json(folder / "trust.json", TRUST),
-        maps={name: load_map(kept[name], scenes_of[name]) for name in kept if name in scenes_of},
+        maps={name: load_map(kept[name], scenes_of[name]) for name in kept if name in others},
+        surfaces={name: surface.load(kept[name]) for name in kept if name in plain},
     )  # fmt: skip
 
 

@@ -5,8 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from skinwave import document
 from skinwave.effort import Progress, versions
 from skinwave.exports import write_field, write_probes, write_sound
@@ -14,7 +12,6 @@ from skinwave.files import distinct_names, folder_name
 from skinwave.numbers import significant
 from skinwave.pictures.figures import label
 from skinwave.pictures.levels import strongest_probe
-from skinwave.pictures.maps import Raster, sampler
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
 from skinwave.reports.album import Album, open_album
@@ -30,7 +27,7 @@ from skinwave.studies.dispersion_page import page_parts
 from skinwave.studies.driven_modes import driven_modes
 from skinwave.studies.lines_table import lines_table
 from skinwave.studies.quantity_map_page import CAPTION, quantity_figure, sentences
-from skinwave.surface import SILENT, SurfaceMap, grid, kernel_map
+from skinwave.surface import kernel_map
 
 ASSESSED = 0.5  # s that a Tacton must last for claims about its lines to be assessed
 
@@ -107,15 +104,11 @@ def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
 
 
 def _maps(album: Album, run: Run) -> Drawn:
-    """A body's map as its view has it, and the kernel's."""
-    view = album.views.get(run.column)
-    if view is None or view.scene.pressure != run.scene.pressure:
+    """A body's map as it was saved with its view, and the kernel's."""
+    view, surface = album.views.get(run.column), album.surfaces.get(run.column)
+    if view is None or surface is None or view.scene.pressure != run.scene.pressure:
         return ()
-    x, y = grid(run.scene)
-    carried = sampler(view, Raster(x=x, y=y))
-    level = carried(np.maximum(view.sensation, SILENT))
-    surface = SurfaceMap(x=x, y=y, rms=carried(view.rms), level=level, unit="m")
-    return surface, kernel_map(run.scene.pressure, x, y)
+    return surface, kernel_map(run.scene.pressure, surface.x, surface.y)
 
 
 def _write_data(folder: Path, album: Album) -> None:

@@ -14,6 +14,7 @@ from skinwave.models.prepared import Prepared, answer
 from skinwave.pictures.surfaces import MeasuredPlaces
 from skinwave.run import Run
 from skinwave.scene import Scene, check_motion
+from skinwave.simulation import compute
 from skinwave.studies.measured_lines import lines_to_compare
 from skinwave.studies.measured_study import MeasuredComparison, main_column
 
@@ -55,7 +56,10 @@ def in_quantity(run: Run, quantity: str, prepared: Mapping[str, Prepared]) -> Ru
     if not run.response.record.of_body or run.response.quantity == quantity:
         return run
     scene = replace(run.scene, quantity=quantity)
-    found = answer(replace(prepared[run.column], reading=scene.reading), scene)
+    if run.column in prepared:
+        found = answer(replace(prepared[run.column], reading=scene.reading), scene)
+    else:
+        found = compute(scene, run.model)
     found = replace(found, expected_error=run.response.expected_error)
     return replace(run, scene=scene, response=found)
 

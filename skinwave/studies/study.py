@@ -9,7 +9,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 from skinwave import document
-from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress, one_thread, peak_memory
 from skinwave.files import write_lines, write_responses, write_run
 from skinwave.models.prepared import Prepared, answer, prepare
@@ -17,7 +16,7 @@ from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, check_load, with_body
-from skinwave.simulation import check_options, compute
+from skinwave.simulation import answered, check_options, compute, has_elements
 from skinwave.studies import measured_page, measured_tables, paper15, study_page
 from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
 from skinwave.studies.claims import claimed, evaluate, write_claims
@@ -71,9 +70,8 @@ def run_study(
     An interrupt ends the runs early; those that are finished are still compared and written.
     """
     check_options(solver, h=h)
-    for solid in {s.body for group in scenes.values() for s in group.values()}:
-        if solid.of_kind.discretise:
-            check_mesh(solid, h or default_size(solid))  # before any run
+    for scene in (s for group in scenes.values() for s in group.values()):
+        has_elements(scene, h)  # which refuses before any run
     started = time.perf_counter()
     with helper() as aside, one_thread():
         bodies = _begun_bodies(scenes, aside, progress, h, solver)
@@ -139,8 +137,8 @@ def _begun_bodies(
     the coarser ones that responses are assessed by, are reduced in other processes.
     """
     every = [each for group in scenes.values() for each in group.items()]
-    solids = {s.body: (column, s) for column, s in every if s.body.of_kind.discretise}
-    *others, last = solids
+    solids = {s.body: (column, s) for column, s in every if has_elements(s, h)}
+    others, last = list(solids)[:-1], next(reversed(solids), None)
     begun = {body: aside.submit(_prepared, solids[body][1], h, solver) for body in others}
     coarse = {
         body: aside.submit(coarser_body, scene, h, solver=solver)
@@ -149,6 +147,7 @@ def _begun_bodies(
 
     @lru_cache
     def here() -> Prepared:
+        assert last
         column, scene = solids[last]
 
         def named(phase: str, fraction: float) -> None:
@@ -183,9 +182,7 @@ def _begun_maps(
     begun = {
         scene.body: aside.submit(element_maps, scene, h, solver)
         for scene in scenes[first_of(scenes)].values()
-        if scene.body.of_kind.discretise
-        and scene.reading.is_plain
-        and not has_wavenumber_integral(scene)
+        if has_elements(scene, h) and scene.reading.is_plain and not has_wavenumber_integral(scene)
     }
 
     def maps(run: Run) -> Drawn:
@@ -214,10 +211,12 @@ def _answered(
     every = [(name, column, scene) for name, g in scenes.items() for column, scene in g.items()]
     with suppress(KeyboardInterrupt):
         for k, (name, column, scene) in enumerate(
-            sorted(every, key=lambda each: bool(each[2].body.of_kind.discretise))
+            sorted(every, key=lambda each: has_elements(each[2], h))
         ):
             if not scene.body.of_kind.discretise:
                 response = compute(scene, column)
+            elif not has_elements(scene, h):
+                response = answered(scene, solver=solver)
             else:
                 prepared[column], coarser = bodies(scene)
                 found = answer(prepared[column], scene)

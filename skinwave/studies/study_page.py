@@ -147,10 +147,11 @@ def effort_section(
     """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]
     efforts = {}
-    for body, p in prepared.items():
+    for body in dict.fromkeys(run.body for run in runs if run.response.record.of_body):
         spent = [r.response.effort for r in runs if r.body == body]
         worst = max(e.energy_imbalance for e in spent), max(e.radiated for e in spent)
-        efforts[body] = replace(p.effort, energy_imbalance=worst[0], radiated=worst[1])
+        first = prepared[body].effort if body in prepared else spent[0]
+        efforts[body] = replace(first, energy_imbalance=worst[0], radiated=worst[1])
     return document.section("Effort", tables.effort_table(efforts, len(groups), outcome.seconds))
 
 
@@ -192,7 +193,7 @@ def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> str
     return document.paragraph(
         f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
         "doi 10.1145/3613905.3650981), as published and under the load that the bodies "
-        "receive, beside finite elements of these bodies. Amplitudes of every line are in "
+        "receive, beside the motion of these bodies. Amplitudes of every line are in "
         "lines.csv, waveforms in responses.npz; each run's folder has its scene."
     )
 

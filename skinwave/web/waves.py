@@ -37,7 +37,7 @@ from skinwave.bodies.sizes import default_size
 from skinwave.effort import Clock, Progress, silent
 from skinwave.models.affine_scenes import has_affine_operators
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import probe_rows, surface_load
+from skinwave.models.loads import probe_rows, surface_load, surface_motion
 from skinwave.models.prepared import in_motion, sample_times
 from skinwave.models.reduction import (
     BAND,
@@ -377,7 +377,7 @@ def seen_of(made: Any, body: Body, reduced: ReducedBody, basis: Floats) -> Reduc
     """A reduced body with what a page shows of it, in the basis (3 n, r) of its coordinates."""
     inwards = (1 - 1e-6) * places()  # a body may end where the area does
     within = fem.on_surface(made.mesh, inwards)
-    read = fem.probe_operator(made.mesh, inwards[within]) @ basis
+    read = surface_motion(body, made, inwards[within]) @ basis
     shape, nodes = skin_of(made, body)
     return Reduced(
         body=reduced, read=read, within=within, made=made, shape=shape, nodes=nodes,
