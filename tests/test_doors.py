@@ -6,16 +6,18 @@ import csv
 import html
 import json
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import skinwave
-from simple_model import Effort, Response
+from simple_model import Effort, MovingPressure, Response, Tacton
 from skinwave import document
 from skinwave.cli import main
 from skinwave.planning.assessment import sentences
-from skinwave.planning.warnings import beyond_linear
+from skinwave.planning.warnings import beyond_linear, implausible
+from skinwave.scene import Body, Scene
 from skinwave.scene_file import loads
 from skinwave.simulation import answered, compute
 
@@ -191,6 +193,17 @@ def deflected(by, scene, model="fem"):
     times = np.arange(3) / 1e4
     motion = np.outer([0.0, -1.0, 0.5], np.ones(len(scene.probes))) * by
     return Response(model=model, times=times, probes=scene.probe_points, values=motion)
+
+
+def test_what_a_scene_hardly_means_is_said():
+    """A density that no solid has, and a probe twice; not one at two depths."""
+    probes = ((0.0, 0.0), (0.005, 0.0), (0.0, 0.0))
+    light = replace(Body().solid, density=1.0)
+    scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=Body(), probes=probes)
+    assert len(implausible(scene)) == 1
+    assert implausible(replace(scene, depth=(0.0, 0.0, 0.001))) == ()
+    found = implausible(replace(scene, body=Body(material=light)))
+    assert [said.partition(" ")[0] for said in found] == ["density_kg_m3", "points_mm"]
 
 
 def test_a_sheet_is_linear_up_to_half_its_thickness():

@@ -1,5 +1,6 @@
 """Pattern files: import, export and round trip; what is malformed is refused in one line."""
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -569,3 +570,21 @@ def test_no_conversion_is_refused_in_one_line(tmp_path, monkeypatch, capsys, arg
     assert said in printed
     assert printed.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("suffix", "options", "alias"),
+    [(".wav", {"rate": 300}, 100), (".csv", {"rate": 250}, 50), (".py", {}, None)],
+)
+def test_a_rate_that_does_not_reach_the_modulation_is_noted(suffix, options, alias):
+    """By the tone that the samples have instead: their spectrum has its line there."""
+    scene = loads("[tacton]\nam_frequency_hz = 200\nduration_s = 0.5\n")
+    content, notes = write_pattern(scene, suffix, Options(**options))
+    said = [note for note in notes if "above half the rate" in note]
+    assert len(said) == (alias is not None)
+    if suffix == ".wav":
+        rate, samples = wavfile.read(io.BytesIO(content))
+        strongest = np.abs(np.fft.rfft(samples - samples.mean())).argmax() * rate / len(samples)
+        assert strongest == pytest.approx(alias, abs=2)
+    if alias:
+        assert f"played at {alias} Hz" in said[0]

@@ -15,6 +15,7 @@ from skinwave.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.studies.claims import evaluate
 from skinwave.studies.description import above, modelled, unresolved
 from skinwave.studies.study_page import caption, write_single
+from skinwave.studies.summary import known_of
 from skinwave.sweeps.measures import measured
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
@@ -190,3 +191,15 @@ def test_a_page_lists_layers_from_the_surface_down():
     assert words == (
         "; on it, from the surface down: 0.27 mm of epidermis, 1 mm of dermis, 4 mm of fat"
     )
+
+
+def test_what_is_known_of_a_material_is_that_of_its_preset():
+    """The page has the same numbers as `spreads_of`; of one's own material none is known."""
+
+    def known(body):
+        return known_of(Scene(pressure=MovingPressure(tacton=Tacton()), body=body))
+
+    words = "moduli known to a factor of 2 (90 %), losses known to a factor of 3 (90 %)"
+    assert known(BODIES["skin-slab"]) == words
+    assert "23.7 %" in known(Body(material="forearm"))
+    assert known(Body(material=Body().solid)) == ""

@@ -642,3 +642,16 @@ def test_what_a_worker_was_at_when_it_died_is_done_again(tmp_path, monkeypatch):
 def test_keys_of_0_2_are_varied_by_todays_names():
     with pytest.warns(FutureWarning, match="depth_mm is now thickness_mm"):
         assert parse("body.depth_mm=10,15").key == "body.thickness_mm"
+
+
+def test_one_sweep_at_a_time_writes_into_a_folder(scene, capsys):
+    """Its rows would be doubled; the next one finds them, and a process that ends lets go."""
+    folder = dataset.open_folder(Path("short-sweep"))
+    arguments = ["sweep", "short.toml", "--vary", "body.thickness_mm=10,15", *THREADS]
+    with dataset.locked(folder):
+        assert "another sweep writes into short-sweep" in refused(capsys, *arguments)
+    there = "import sys; from pathlib import Path; from skinwave.sweeps import dataset; "
+    held = "held = dataset.locked(Path(sys.argv[1])); held.__enter__()"
+    subprocess.run([sys.executable, "-c", there + held, str(folder)], check=True)
+    with dataset.locked(folder):
+        assert not dataset.names(folder)

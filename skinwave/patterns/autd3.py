@@ -10,7 +10,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
-from skinwave.patterns.pattern import Options, loudness
+from skinwave.patterns.pattern import Options, aliased, loudness
 from skinwave.scene import Scene
 
 TICK = 40_000.0  # Hz
@@ -44,6 +44,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         notes.append(f"{foci} foci {'in turn' if turns else 'at the same time'}")
     if len(samples) > 1:
         notes.append(f"modulation: {len(samples)} samples at {TICK / ticks:g} Hz in 255 steps")
+    notes += aliased(scene.tacton, TICK / ticks)
     return _script(scene, places, division, samples, ticks, notes).encode(), tuple(notes)
 
 

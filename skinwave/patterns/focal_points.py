@@ -16,7 +16,7 @@ from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
 from simple_model.tacton import LONGEST, MOST_FOCI
-from skinwave.patterns.pattern import Options, Pattern, loudness, one_height
+from skinwave.patterns.pattern import Options, Pattern, aliased, loudness, one_height
 from skinwave.plain_text import csv_table, number_in
 from skinwave.scene import Scene
 
@@ -122,6 +122,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     notes = (
         f"{len(t):,} samples of {len(tacton.foci)} focal points at {rate:g} Hz",
         "intensity is the sound pressure over that at full drive: the root of the load",
+        *aliased(tacton, rate),
     )
     return csv_table(COLUMNS, rows, "\n"), notes
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
+from simple_model.tacton import tones
 from skinwave.scene import Scene
 
 
@@ -50,6 +51,18 @@ def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
     pressure = replace(base.pressure, tacton=pattern.tacton, **pattern.pressure)
     named = (pattern.name or name).encode("utf-8", "replace").decode()  # half a letter is none
     return replace(base, name=named, pressure=pressure)
+
+
+def aliased(tacton: Tacton, rate: float) -> list[str]:
+    """A note on each tone of the modulation above half a rate in Hz, which samples at that rate
+    cannot have.
+    """
+    return [
+        f"AM of {f:g} Hz is above half the rate of samples, {rate / 2:g} Hz, and is played at "
+        f"{abs(f - rate * round(f / rate)):g} Hz: lower the AM, or raise the rate if the device can"
+        for f in sorted(set(tones(tacton)))
+        if f > rate / 2
+    ]
 
 
 def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:

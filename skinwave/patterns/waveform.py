@@ -12,7 +12,7 @@ from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.rhythm import ROLES
 from simple_model.tacton import LONGEST, level, modulation, tones
-from skinwave.patterns.pattern import Options, Pattern
+from skinwave.patterns.pattern import Options, Pattern, aliased
 from skinwave.scene import Scene
 
 SCALES = ("full", "peak", "rms")
@@ -67,6 +67,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     path = scene.tacton.trajectory
     samples, said = (_with_levels if path.levels else _one_role)(scene, t)
     notes = [f"{len(t):,} samples at {rate:g} Hz; full scale is the scene's amplitude", *said]
+    notes += aliased(scene.tacton, rate)
     if not path.is_static:
         notes.append("a WAV has no positions: the path is left out")
     file = io.BytesIO()

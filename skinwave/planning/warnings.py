@@ -12,6 +12,7 @@ from skinwave.planning.refinement import Refined, enough
 from skinwave.scene import Scene
 
 NONLINEAR = "fem-nonlinear"
+DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 
 
@@ -87,6 +88,23 @@ def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
         f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
         f"of it; {cure}",
     )
+
+
+def implausible(scene: Scene) -> tuple[str, ...]:
+    """Warnings of a density that no solid has, and of a probe that is given twice."""
+    lightest, heaviest = DENSITIES
+    odd = sorted({solid.density for solid in scene.body.solids
+                  if not lightest <= solid.density <= heaviest})  # fmt: skip
+    found = [
+        f"density_kg_m3 = {density:g} is that of no solid, {lightest:g} to {heaviest:g}; "
+        "give it in kg/m3"
+        for density in odd
+        if scene.body.of_kind.discretise
+    ]
+    places = [(*probe, depth) for probe, depth in zip(scene.probes, scene.depths, strict=True)]
+    for x, y, _ in sorted({place for place in places if places.count(place) > 1}):
+        found.append(f"points_mm has ({1e3 * x:g}, {1e3 * y:g}) mm more than once; leave one out")
+    return tuple(found)
 
 
 def error_unknown(error: float) -> tuple[str, ...]:

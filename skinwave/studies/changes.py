@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,15 +17,16 @@ from skinwave.planning.budget import ErrorBudget, error_budget
 from skinwave.propagation import Propagation, propagation, share_outside
 from skinwave.run import Run
 from skinwave.scene import Body, Scene
+from skinwave.scene_keys import SCALES
 from skinwave.simulation import compute
+from skinwave.spreads import spreads_of, with_values
 from skinwave.studies import paper15
 from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
 
 if TYPE_CHECKING:
     from skinwave.pictures.surfaces import MeasuredPlaces
 
-# Skin's stiffness is known to a factor of 2, its loss to one of 5 between sources.
-STIFFER, LOSSIER = 2.0, 5**0.5
+OF_MATERIAL, ENDS = "material", (0.05, 0.95)  # part of an uncertainty; its 90 % interval
 Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's
 Maps = Callable[[Run], Drawn]
 FIRST = ("am140-stm20",)  # of the paper's Tactons, the one with both modulations in the middle
@@ -154,16 +156,21 @@ def _error(run: Run) -> float:
 
 
 def _shares(scene: Scene) -> tuple[float, float] | None:
-    """Least and largest share outside the kernel's region where stiffness and loss, one at a time,
-    are as little and as much as is known of skin.
+    """Least and largest share outside the kernel's region where the moduli of all materials, and
+    then their losses, are at both ends of what is known of them; None if none is uncertain.
     """
-    if not has_wavenumber_integral(scene):
+    spreads = [each for each in spreads_of(scene) if each.part == OF_MATERIAL]
+    if not spreads or not has_wavenumber_integral(scene):
         return None
-    solid = scene.body.solid
-    varied = [solid, *(solid.scaled(modulus=k) for k in (1 / STIFFER, STIFFER))]
-    varied += [solid.scaled(loss=k) for k in (1 / LOSSIER, LOSSIER)]
+    varied = [scene]
+    for scale, end in product(SCALES, ENDS):
+        values = {
+            each.key: float(each.distribution.quantile(each.value, end))
+            for each in spreads
+            if each.key.endswith(scale)
+        }
+        varied += [with_values(scene, values)] * bool(values)
     x, y = grid(scene)
     kernel = kernel_map(scene.pressure, x, y).rms
-    bodies = [replace(scene, body=replace(scene.body, material=each)) for each in varied]
-    found = [share_outside(kernel, body_map(each, x, y).rms) for each in bodies]
+    found = [share_outside(kernel, body_map(each, x, y).rms) for each in varied]
     return min(found), max(found)

@@ -13,6 +13,9 @@ from skinwave.pictures.styles import Style
 from skinwave.pictures.surfaces import BESIDE, SURFACES, surfaces_figure
 from skinwave.propagation import Component, Propagation, Reach, added_lines
 from skinwave.run import Run
+from skinwave.scene import Scene
+from skinwave.scene_keys import LOSSES, MODULI, SCALES
+from skinwave.spreads import spreads_of
 from skinwave.studies.changes import Shown
 
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
@@ -22,6 +25,7 @@ ABOUT_MAPS = (
     "map. Strongest is the largest amplitude at any probe; a phase delay is known up to whole "
     "periods and includes the phase of a body that is driven off resonance."
 )
+SCALED = {MODULI: "moduli", LOSSES: "losses"}
 NAMED = 3  # lines that a sentence names
 
 
@@ -167,11 +171,26 @@ def _sure(shown: Shown) -> str:
     if shown.body.scene.body.of_kind.is_plate:
         text = "grammage, stiffness and support of the sheet that was measured are not published"
         return f"{error}; {text}."
-    text = "skin's stiffness is known to a factor of 2, its loss to one of 5"
+    if not (known := known_of(shown.body.scene)):
+        return f"{error}."
+    text = f"material: {known}"
     if shown.shares is not None:
         least, most = (significant(100 * share, 2) for share in shown.shares)
-        text += f": with these, varied one by one, the share is {least} to {most} %"
+        text += f": with these, moduli and losses in turn, the share is {least} to {most} %"
     return f"{error}; {text}."
+
+
+def known_of(scene: Scene) -> str:
+    """What is known of the moduli and the losses of a scene's materials, in words."""
+    found: dict[str, list[str]] = {name: [] for name in SCALES}
+    for each in spreads_of(scene):
+        if (name := each.key.rpartition(".")[2]) in found:
+            found[name].append(each.distribution.words)
+    return ", ".join(
+        f"{SCALED[name]} {' or '.join(dict.fromkeys(words))}"
+        for name, words in found.items()
+        if words
+    )
 
 
 def _component(found: Component | None, unit: str = "m") -> str:

@@ -1,21 +1,24 @@
 """Rows of a sweep on disk: small Parquet files in one folder, read as one table.
 
-Each file is written aside and renamed, so that what is there is whole; none is ever rewritten, and
-two sweeps into one folder only add to it. A folder with other files among the rows is refused.
+Each file is written aside and renamed, so that what is there is whole, and none is ever rewritten.
+One sweep at a time writes into a folder. A folder with other files among the rows is refused.
 """
 
 import json
 import os
 import secrets
-from collections.abc import Iterable, Mapping, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from meshes import reading
 from skinwave import marks, record
 from skinwave.outputs import output_file, unwritable
 from skinwave.plain_text import csv_table
 
+LOCK = ".lock"  # among the rows, of the sweep that writes them
 ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
 OWN = (ROWS, CSV, "figures", record.FILE)  # what a sweep's folder holds
 UNKNOWN = {"typed": "", "name": "sweep", "options": {}}  # the command of a folder without record
@@ -46,6 +49,58 @@ def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
     except OSError as error:
         raise unwritable(out, error, "choose another --out") from None
     return out
+
+
+@contextmanager
+def locked(out: Path) -> Iterator[None]:
+    """Hold the rows of a folder of `open_folder`, which the system releases when a process ends,
+    however it ends.
+
+    Raises
+    ------
+    ValueError
+        If another sweep holds them.
+    """
+    path = out / ROWS / LOCK
+    try:
+        file = _held(path)
+    except (BlockingIOError, PermissionError):
+        raise ValueError(
+            f"another sweep writes into {out}; wait for its end, or choose another --out"
+        ) from None
+    except OSError as error:
+        raise unwritable(out, error, "choose another --out") from None
+    try:
+        yield
+    finally:
+        if sys.platform != "win32":  # where no open file can be removed
+            path.unlink(missing_ok=True)
+        file.close()
+
+
+def _held(path: Path) -> IO[bytes]:
+    """A file that this process alone has locked; an OSError if another has."""
+    while True:
+        file = open(path, "ab")  # noqa: SIM115, closed by who holds it
+        try:
+            _lock(file.fileno())
+            if os.path.exists(path) and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        except OSError:
+            file.close()
+            raise
+        file.close()  # of one that has just been removed by who held it
+
+
+def _lock(descriptor: int) -> None:
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _refuse_foreign(out: Path) -> None:

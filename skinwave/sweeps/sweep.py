@@ -96,14 +96,32 @@ def sweep(
     ------
     ValueError
         If a solver option is wrong, an extra is not installed, no scheduler responds, or the folder
-        is not that of a sweep.
+        is not that of a sweep, or another sweep writes into it.
     """
     started = time.perf_counter()
     report = progress or silent
     _check(model_options)
     engine.check(scheduler)
     count = engine.workers(scheduler, workers)
-    there = dataset.names(dataset.open_folder(folder, command))
+    with dataset.locked(dataset.open_folder(folder, command)):
+        return _swept(
+            wanted, folder, model_options, report, scheduler=scheduler, count=count,
+            started=started,
+        )  # fmt: skip
+
+
+def _swept(
+    wanted: Sequence[DesignPoint],
+    folder: Path,
+    model_options: ModelOptions,
+    report: Progress,
+    *,
+    scheduler: str,
+    count: int,
+    started: float,
+) -> SweepOutcome:
+    """Run the cases that a folder has no rows of, while no other sweep writes there."""
+    there = dataset.names(folder)
     release = version("skinwave")
     named = {case.name(release, model_options): case for case in wanted}
     left = {name: case for name, case in named.items() if name not in there}
