@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
@@ -650,8 +651,8 @@ def test_one_sweep_at_a_time_writes_into_a_folder(scene, capsys):
     arguments = ["sweep", "short.toml", "--vary", "body.thickness_mm=10,15", *THREADS]
     with dataset.locked(folder):
         assert "another sweep writes into short-sweep" in refused(capsys, *arguments)
-    there = "import sys; from pathlib import Path; from skinwave.sweeps import dataset; "
-    held = "held = dataset.locked(Path(sys.argv[1])); held.__enter__()"
+    there = "import os, sys; from pathlib import Path; from skinwave.sweeps import dataset; "
+    held = "held = dataset.locked(Path(sys.argv[1])); held.__enter__(); os._exit(0)"
     subprocess.run([sys.executable, "-c", there + held, str(folder)], check=True)
     with dataset.locked(folder):
         assert not dataset.names(folder)

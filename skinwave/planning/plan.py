@@ -44,6 +44,7 @@ from skinwave.planning.warnings import (
 )
 from skinwave.scene import FLAT, Body, Scene
 
+INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 
 
@@ -275,8 +276,9 @@ def _without_mesh(
         PlanRow(what="model", value=model, reason="as asked" if warnings else reason),
         *left_out(scene, highest),
     ]
+    error = float(np.linalg.norm([returned, left, INTEGRAL_ERROR]))
     return Plan(
-        model=model, body=scene.body, highest=highest, error=float(np.hypot(returned, left)),
+        model=model, body=scene.body, highest=highest, error=error,
         seconds=asked.seconds, memory=asked.memory, rows=tuple(rows), warnings=warnings,
     )  # fmt: skip
 
