@@ -1,9 +1,10 @@
 """Effect of propagation: a body's motion beside the point kernel under the same load.
 
 Share outside: integral of squared RMS motion over the surface where the kernel's RMS is 20 dB below
-its largest, over the integral everywhere. Spread: largest distance from the path of a place whose
-RMS is within 6 dB of the largest. Phase delay: difference of phase between motion and the kernel's
-pressure at the same probe over 2 pi f. All of the steady vibration, about the mean.
+its largest, over the integral everywhere, both within 44 mm of the origin along x and y. Spread:
+largest distance from the path of a place whose RMS is within 6 dB of the largest. Phase delay:
+difference of phase between motion and the kernel's pressure at the same probe over 2 pi f. All of
+the steady vibration, about the mean.
 """
 
 from dataclasses import dataclass
@@ -117,8 +118,8 @@ def propagation(
 
 
 def share_outside(kernel: Floats, rms: Floats) -> float:
-    """Share 0..1 of squared motion (ny, nx) where the kernel's (ny, nx) is 20 dB below its largest;
-    places that are no number are off the body.
+    """Share 0..1 of squared motion (ny, nx) where the kernel's (ny, nx) is 20 dB below its largest,
+    both on a `surface.grid`; places that are no number are off the body.
     """
     outside = kernel < _level(kernel, OUTSIDE)
     return float(np.nansum(rms[outside] ** 2) / np.nansum(rms**2))

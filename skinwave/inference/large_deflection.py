@@ -48,7 +48,7 @@ def refusal(row: Row) -> str:
     """Why a candidate's sheet is not computed at large deflection; empty if it is."""
     scene = scene_of(candidate_of(row), next(tactons())[1])
     if found := beyond(named(MODEL), scene):
-        return f"{MODEL} {' and '.join(limit.why for limit in found)}"
+        return f"{MODEL} {', and '.join(limit.why for limit in found)}"
     if (count := modes_below(scene.body, HIGHEST)) > MOST_MODES:
         return (
             f"it has about {count:.0f} modes below {HIGHEST:.0f} Hz, of which {MODEL} takes "

@@ -147,7 +147,7 @@ def in_words(cures: Sequence[Cure], asked: str) -> str:
 
 
 def _why(model: Model, found: Sequence[Limit]) -> str:
-    return f"{model.name} {' and '.join(limit.why for limit in found)}"
+    return f"{model.name} {', and '.join(limit.why for limit in found)}"
 
 
 def _of_any(scene: "Scene") -> list[Cure]:

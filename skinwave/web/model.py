@@ -28,6 +28,7 @@ from simple_model.tacton import CARRIER, level, tones
 from skinwave.run import ASSESSED, lines_beside
 from skinwave.scene import Scene
 from skinwave.simulation import compute
+from skinwave.surface import grid
 from skinwave.web.moving import Moving
 from skinwave.web.paths import REACH
 
@@ -149,9 +150,24 @@ def unresolved_lines(scene: Scene, response: Response) -> tuple[str, ...]:
                                 settle=UNTRUSTED)[1])  # fmt: skip
 
 
+def map_line(side: int = SIDE) -> Floats:
+    """Coordinates (side,) in metre of the places of a map along x, and along y."""
+    return np.linspace(-REACH, REACH, side)
+
+
+def on_grid(values: Floats, scene: Scene) -> Floats:
+    """Values (side, side) of a map on the `surface.grid` of a report (ny, nx), interpolated."""
+    from scipy.interpolate import RegularGridInterpolator  # which takes long to import
+
+    x, y = grid(scene)
+    line = map_line(len(values))
+    places = np.stack(np.meshgrid(y, x, indexing="ij"), axis=-1)
+    return np.asarray(RegularGridInterpolator((line, line), values)(places))
+
+
 def places(side: int = SIDE) -> Floats:
     """Places (side * side, 2) in metre of a map, row after row."""
-    line = np.linspace(-REACH, REACH, side)
+    line = map_line(side)
     x, y = np.meshgrid(line, line)
     return np.column_stack([x.ravel(), y.ravel()])
 
@@ -218,7 +234,7 @@ def borderline(values: Floats, at: float) -> tuple[Floats, ...]:
     """Lines (k, 2) in metre along which values (side, side) of the area are `at`."""
     from contourpy import contour_generator
 
-    line = np.linspace(-REACH, REACH, len(values))
+    line = map_line(len(values))
     masked = np.ma.masked_invalid(values)
     return tuple(np.asarray(x) for x in contour_generator(line, line, masked).lines(at))
 

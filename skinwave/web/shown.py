@@ -129,10 +129,10 @@ def summary(scene: Scene, answers: Sequence[Answer]) -> list[str]:
     kernel, waves = answers[0], answers[-1]
     if waves is kernel or not np.nansum(waves.map.rms):
         return [*here, drive]
-    share = 100 * share_outside(kernel.map.rms, waves.map.rms)
+    share = 100 * share_outside(*(model.on_grid(each.map.rms, scene) for each in (kernel, waves)))
     return [
         *here,
-        f"Waves carry {share:.0f} % of the mean-square motion in this area to where the point "
+        f"Waves carry {share:.0f} % of the mean-square motion to where the point "
         "kernel, under the same load, predicts less than a tenth of its largest.",
         drive,
     ]
