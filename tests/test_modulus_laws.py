@@ -465,3 +465,12 @@ def test_a_body_with_a_loss_factor_moves_after_its_load_and_settles():
     steady = steady_state(layer, load, [[0.0, 0.0]], times).values[:, 0]
     assert np.linalg.norm((found - steady)[2000:]) < 1e-3 * np.linalg.norm(steady[2000:])
     assert abs(found[0]) < 2e-3 * np.abs(found).max()
+
+
+@pytest.mark.parametrize(("exponent", "time"), [(0.05, 1e-4), (0.1, 1e-3), (0.18, 0.1)])
+def test_laws_that_relax_far_below_the_band_have_a_series(exponent, time):
+    law = FractionalZener(shear_modulus=10e3, fast_modulus=1e5, exponent=exponent, time=time)
+    series, w = fit_prony(law, rest=10e3), 2 * np.pi * np.geomspace(1, 2000, 501)
+    assert series.error <= 0.005
+    assert np.abs(series(w) / law(w) - 1).max() < 0.006
+    assert complex(series(0.0)) == pytest.approx(10e3, rel=1e-9)

@@ -326,6 +326,7 @@ def test_reduction_alone_costs_less_than_a_thousandth(kind, h):
     small = fem.Operators(
         K=sparse.csr_array(model.K), C=sparse.csr_array(model.C), M=sparse.eye_array(r).tocsr(),
         R=sparse.csr_array((r, r)), free=np.arange(r), n_dofs=r,
+        branches=tuple(replace(b, K=sparse.csr_array(b.K)) for b in model.branches),
     )  # fmt: skip
     project = model.basis.T @ P
     full = marched(ops, S, lambda t: P @ load(points, t), 1e-4, 0.02)
