@@ -57,7 +57,7 @@ def poles(model: ReducedModel, outputs: Floats | None = None) -> Poles:
         companion = np.block([[companion, pulled], [followed, -np.eye(k) / time]])
     values, vectors = linalg.eig(companion)
     kept = values.imag >= 0
-    inverse = np.linalg.inv(vectors)[kept, r : 2 * r]
+    inverse = np.linalg.solve(vectors, np.eye(len(values))[:, r : 2 * r])[kept]
     # A real pole stands alone, so that twice the real part counts it double.
     weight = np.where(values[kept].imag > 0, 1.0, 0.5)
     read = model.outputs if outputs is None else outputs
