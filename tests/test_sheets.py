@@ -308,15 +308,16 @@ def test_the_tangent_is_the_derivative_of_the_force_and_that_of_the_energy():
 
 
 def test_stretched_sheets_at_large_deflection_begin_as_linear_ones():
-    body = replace(SMALL, mounting=TWO)
+    body = replace(SMALL, material=replace(PAPER, loss_factor=0.1), mounting=TWO)
     tacton = Tacton(am_frequency=140, duration=0.05, amplitude=0.05)
     scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=((0.0, 0.0),))
     request = Request(times=np.arange(500) / 1e4, tolerance=0.05, report=lambda *_: None)
     nonlinear_, plate = (
         named(m).solve(scene, replace(request, h=0.05 / 16 if m == "fem-nonlinear" else None))
-        for m in ("fem-nonlinear", "plate-modes")
+        for m in ("fem-nonlinear", "plate-modes-transient")
     )
-    assert nonlinear_.values[0, 0] == pytest.approx(plate.values.mean(), rel=0.03)
+    apart = np.linalg.norm(nonlinear_.values - plate.values)
+    assert apart < 0.05 * np.linalg.norm(plate.values)
 
 
 def test_the_sag_of_any_support():
@@ -425,7 +426,7 @@ def test_assumptions_that_a_sheet_keeps_by_its_mounting():
     )
     framed = replace(scene, body=replace(scene.body, mounting=Mounting()))
     assert set(droppable(framed)) - set(droppable(scene)) == {"vacuum"}  # without a frame, no air
-    with pytest.raises(ValueError, match="orthotropic; use --model fem"):
+    with pytest.raises(ValueError, match="this sheet is orthotropic"):
         droppable(replace(scene, body=SMALL))
 
 
