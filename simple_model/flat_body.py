@@ -7,13 +7,13 @@ focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
     u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(x_p - X(a), w) exp(-2 pi i n a) da
 
 where Q is the transform of the pressure at the focus. With splines B_j(r) that interpolate g(r, w)
-= sum_j g_j(w) B_j(r), the path and the probes are apart from the body,
+= sum_j g_j(w) B_j(r), the path and the probes are apart from the body: in the steady state
 
     h_n = sum_j g_j(w) int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
 
-and a recorded path, which may be long and run through once, moves the probe by
+and from rest
 
-    u(w) = sum_j g_j(w) int q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
+    u(w) = sum_j g_j(w) int_0^inf q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
 
 Displacement normal to the surface is one component, g(r) itself. A `Field` has m, each a sum of
 integrals times weights that depend on x_p - x.
@@ -23,43 +23,47 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.fft import next_fast_len, rfft
+from scipy.special import erfc
 
 from simple_model.compliance import Compliance
 from simple_model.focus import gaussian_width
-from simple_model.load_spectrum import (
-    foci_harmonics,
-    load_lines,
-    merge_lines,
+from simple_model.load_spectrum import load_lines, synthesise
+from simple_model.material import Complex
+from simple_model.path_cells import (
+    cells,
+    is_abrupt,
+    jump_times,
+    moved_load,
     path_fourier,
     path_samples,
-    path_strengths,
-    path_weights,
-    synthesise,
 )
-from simple_model.material import Complex
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.response import Effort, Response, step
-from simple_model.sampling import finer, highest, reached, shown, transform
+from simple_model.sampling import below_half_the_rate, finer, reached
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import Field, normal_field, point_integrals
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-PADDING = 2.0  # the transform's period over the duration; what wraps round is damped by WRAPPED
-WRAPPED = 1e-5
-AT_ONCE = 2**19  # pairs of frequency and distance: some ten megabytes
+PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
+WRAPPED = 1e-5  # damped by this
+SLOWEST = 10_000.0  # Hz of its samples
+ABRUPT = 4  # samples of a load that jumps, or turns, in each of these
+ENDING = 6.0  # of the error function that ends a load after the record
+FEW_DISTANCES = 40  # are integrated one by one, without a spline
+AT_ONCE = 2**22  # values that are transformed at a time, some hundred megabytes
 STEPS_PER_WIDTH = 6  # distances of a spline in a standard deviation of the focal spot
 FEWEST_STEPS = 8  # of them
-FEW_DISTANCES = 40  # are integrated one by one, without a spline
 ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
-FAINT = 1e-7  # of the strongest harmonic of the path, which a transient leaves out
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
+
+Splines = Callable[[Floats], Floats]
 
 
 def steady_lines(
@@ -81,7 +85,7 @@ def steady_lines(
     Raises
     ------
     ValueError
-        If the focus is not Gaussian, or its path recorded, or as `pressure.check_lines` does.
+        If the focus is not Gaussian, or as `pressure.check_lines` does.
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -107,20 +111,38 @@ def field_lines(
         As `steady_lines` does.
     """
     _check(pressure)
-    if pressure.tacton.trajectory.shape == "recorded":
-        raise ValueError("a recorded path has no steady state; ask for its motion from rest")
-    lines = load_lines(pressure, threshold)
-    f, which = np.unique(lines.frequencies, return_inverse=True)
-    away = _offsets(pressure, probes)
-    respond = _response_at(field, pressure, away, 2 * np.pi * f)
-    weights = path_weights(pressure)
-    blocks = max(1, away[..., 0].size * len(f) // AT_ONCE)
-    amplitudes = [
-        path_fourier(respond(part) * weights)[which, ..., lines.harmonics]
-        * lines.coefficients[:, None, None]
-        for part in np.array_split(away, min(blocks, len(away)))
-    ]
-    return merge_lines(lines.frequencies, np.hstack(amplitudes))
+    lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
+    f, which = np.unique(np.round(lines.frequencies, 9), return_inverse=True)
+    orders, order = np.unique(lines.harmonics, return_inverse=True)
+    knots, width = path_samples(pressure), _width(pressure)
+    table, splines = _interpolation(probes, knots, width)
+    g = point_integrals(field, table, 2 * np.pi * f, width)
+    amplitudes = np.zeros((len(f), len(probes), len(field.weights(ANYWHERE))), np.complex128)
+    count = min(len(probes), max(1, len(probes) * len(table) * len(knots) // AT_ONCE))
+    for some in np.array_split(np.arange(len(probes)), count):
+        carried = carriers(field, splines, probes[some, None] - knots)
+        h = path_fourier(pressure, carried, orders)
+        for line, (k, n) in enumerate(zip(which, order, strict=True)):
+            moved = np.einsum("cj,mcjp->pm", g[:, k], h[..., n])
+            amplitudes[k, some] += lines.coefficients[line] * moved
+    return f, amplitudes
+
+
+def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
+    """Splines with the weights of a field.
+
+    Parameters
+    ----------
+    field : Field
+    splines : from distances (...) to (..., j)
+    away : (..., q, 2) float, metre, offsets of probes from positions of a focus
+
+    Returns
+    -------
+    (m, c, j, ..., q) float: components are these times the integrals (c, j), in sum over both
+    """
+    of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
+    return np.asarray(field.weights(away)[:, :, None] * of_distance)
 
 
 def sampled_lines(
@@ -138,7 +160,7 @@ def sampled_lines(
     frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m)
     """
     f, a = field_lines(field, pressure, probes)
-    below = shown(pressure, f, times)
+    below = below_half_the_rate(f, times)
     return f[below], a[below]
 
 
@@ -179,8 +201,9 @@ def flat_body(
     """Motion of probes from rest.
 
     By FFT over twice the duration with exponential damping, which reduces the wrap-around to 1e-5.
-    Lines above half the sampling rate are left out. The rest position is that before the load: the
-    deflection of an infinite sheet under a load with non-zero mean grows without bound.
+    The load goes on after the record and ends smoothly. Its lines above half the sampling rate are
+    left out. The rest position is that before the load: the deflection of an infinite sheet under a
+    load with non-zero mean grows without bound.
 
     Parameters
     ----------
@@ -201,7 +224,7 @@ def flat_body(
     started = time.perf_counter()
     probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
     found = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
-    effort = {"steps": len(times), "dofs": _padded(times) // 2 + 1}
+    effort = {"steps": len(times), "dofs": len(times) + 1}
     return _timed("flat-body", started, times, probes, found, **effort)
 
 
@@ -226,19 +249,73 @@ def field_history(
     """
     _check(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
-    dt, n, padded = step(times), len(times), _padded(times)
+    within = max(1, int(np.ceil(step(times) * SLOWEST - 1e-6)))
+    dt, n = step(times) / within, (len(times) - 1) * within + 1
+    padded = next_fast_len(PADDING[0] * n + PADDING[1], real=True)
     damping = -np.log(WRAPPED) / (padded * dt)
-    t = np.asarray(np.arange(padded) * dt, np.float64)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
-    window = (np.arange(padded) < n) * np.exp(-damping * t)
-    answered = _recorded if pressure.tacton.trajectory.shape == "recorded" else _circling
-    u = answered(field, pressure, probes, w, window, dt)
-    return np.fft.irfft(u, padded, axis=0)[:n] * np.exp(damping * t[:n, None, None])
+
+    def lasting(t: Floats) -> Floats:
+        """Factor of the load at times (t,) in s, with the damping of the transform."""
+        after = (t - n * dt) / ((padded - n) * dt)
+        ended = erfc(ENDING * (2 * after - 1)) / 2
+        return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
+
+    sampled, jumps = pressure.tacton.is_sampled, jump_times(pressure, 0.0, padded * dt)
+    parts = finer(reached(pressure), dt)
+    if within > 1 or (parts > 1 and not (sampled or is_abrupt(pressure))):
+        knots, of_load = _low_passed(pressure, 0.5 / step(times), padded, dt, lasting)
+        parts = 1
+    else:
+        turns = len(pressure.tacton.trajectory.parts[1]) > 1
+        parts = max(parts, ABRUPT if len(jumps) or turns else 1)
+        knots, of_load = _as_it_is(pressure, jumps, padded, dt, parts, lasting)
+    table, splines = _interpolation(probes, knots, _width(pressure))
+    g = point_integrals(field, table, w, _width(pressure), negligible=NEGLIGIBLE)
+    u = np.zeros((len(w), len(probes), len(field.weights(ANYWHERE))), np.complex128)
+    for i, probe in enumerate(probes):
+        carried = carriers(field, splines, probe - knots)
+        for m, c in np.argwhere(field.weights(ANYWHERE).any(axis=-1)):
+            blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
+            for some in np.array_split(np.arange(len(table)), blocks):
+                x = of_load(carried[m, c, some].T)
+                transformed = rfft(x, axis=0)[: len(w)] / parts
+                u[:, i, m] += np.einsum("wj,wj->w", g[c][:, some], transformed)
+    t = dt * np.arange(n)[::within]
+    return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
 
 
-def _padded(times: Floats) -> int:
-    """Samples of the transform."""
-    return int(PADDING * len(times))
+def _as_it_is(
+    pressure: MovingPressure, jumps: Floats, padded: int, dt: float, parts: int,
+    lasting: Callable[[Floats], Floats],
+) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
+    """Positions (q, 2) in metre of the foci, and the function from what a focus of unit pressure
+    does there (q, j) to what the load does (t, j), in samples of dt / parts from 0.
+    """
+    fine = dt / parts
+    at, shares = cells(np.append(jumps, 0.0), -fine / 2, fine, padded * parts)
+    gain = pressure.gain(np.maximum(at, 0.0)) * lasting(at)
+    knots, mixed = moved_load(pressure, at, gain)
+    return knots, (shares @ mixed).__matmul__
+
+
+def _low_passed(
+    pressure: MovingPressure, highest: float, padded: int, dt: float,
+    lasting: Callable[[Floats], Floats],
+) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
+    """The same in samples of dt, of the load's lines below a frequency in Hz alone."""
+    lines = load_lines(pressure)
+    below = lines.frequencies < highest
+    f, orders = lines.frequencies[below], lines.harmonics[below]
+    t = dt * np.arange(padded)
+    window = lasting(t)
+    window[0] /= 2  # the load begins in the middle of a sample
+
+    def of_load(values: Floats) -> Floats:
+        amplitudes = lines.coefficients[below, None] * path_fourier(pressure, values.T, orders).T
+        return synthesise(f, amplitudes, t) * window[:, None]
+
+    return path_samples(pressure), of_load
 
 
 def _timed(
@@ -253,86 +330,6 @@ def _timed(
         values=displacement,
         effort=Effort(seconds=seconds, **effort),  # type: ignore[arg-type]
     )
-
-
-def _circling(
-    field: Field,
-    pressure: MovingPressure,
-    probes: Floats,
-    w: Complex,
-    window: Floats,
-    dt: float,
-) -> Complex:
-    """Transform (f, p, m) of the field at the probes under foci that run a closed path."""
-    f_d, away = pressure.tacton.trajectory.drawing_frequency, _offsets(pressure, probes)
-    distance = np.linalg.norm(away, axis=-1)
-    table, through = _interpolation(distance, _width(pressure))
-    g = point_integrals(field, table, w, _width(pressure), negligible=NEGLIGIBLE)
-    shares = through(np.eye(len(table)))(distance) * path_weights(pressure)
-    h = path_fourier(np.einsum("mcpk,jpk->cjpmk", field.weights(away), shares))
-    orders, _ = path_strengths(pressure, FAINT)
-    h = h[..., orders] * foci_harmonics(pressure, orders)
-    u = np.zeros((len(w), *h.shape[2:-1]), np.complex128)
-    gain = cache(partial(_gain, pressure, window, dt))
-    for n, of_path in zip(orders, np.moveaxis(h, -1, 0), strict=True):
-        parts = finer(highest(pressure, abs(n) * f_d), dt)
-
-        def turned(late: float, n: int = n, parts: int = parts) -> Complex:
-            t, gained = gain(late, parts)
-            return gained * np.exp(2j * np.pi * n * f_d * t)
-
-        transformed = transform(turned, w, dt, parts)[:, None, None]
-        u += np.tensordot(g, of_path, axes=([0, 2], [0, 1])) * transformed
-    return u
-
-
-def _gain(
-    pressure: MovingPressure, window: Floats, dt: float, late: float, parts: int
-) -> tuple[Floats, Floats]:
-    """Times (t,) in s from `late` on, and the windowed pressure (t,) in Pa at the focus, averaged
-    over the `parts` part of dt.
-    """
-    t = np.asarray(late + np.arange(len(window)) * dt, np.float64)
-    gain = pressure.gain(t, over=dt / parts) * window
-    if late == 0:
-        gain[0] /= 2  # the trapezoidal rule's end point: the load begins in the middle of a sample
-    return t, gain
-
-
-def _recorded(
-    field: Field,
-    pressure: MovingPressure,
-    probes: Floats,
-    w: Complex,
-    window: Floats,
-    dt: float,
-) -> Complex:
-    """Transform (f, p, m) of the field at the probes under foci that run any path."""
-    path, width = pressure.tacton.trajectory, _width(pressure)
-    furthest = np.linalg.norm(probes[:, None] - path.outline, axis=2).max()
-    table = distance_table(furthest, width)
-    g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
-    carriers = radial_spline(table, np.eye(len(table)))
-    parts = finer(reached(pressure), dt)
-
-    def load(late: float, probe: Floats, component: int, integral: int) -> Floats:
-        t, gain = _gain(pressure, window, dt, late, parts)
-        phases = [np.mod(path.phase(t) + ahead, 1.0) for ahead in pressure.tacton.foci]
-        away = [probe - path.at_phase(phase) for phase in phases]
-        gains = [gain * pressure.weight(phase) for phase in phases]
-        return sum(
-            (q * field.weights(x)[component, integral])[:, None]
-            * carriers(np.linalg.norm(x, axis=1))
-            for q, x in zip(gains, away, strict=True)
-        )
-
-    weights = field.weights(ANYWHERE)  # not where x, y or x^2 - y^2 is 0
-    u = np.zeros((len(w), len(probes), len(weights)), np.complex128)
-    for i, probe in enumerate(probes):
-        for component, integral in np.argwhere(weights.any(axis=-1)):
-            loaded = partial(load, probe=probe, component=component, integral=integral)
-            u[:, i, component] += (g[integral] * transform(loaded, w, dt, parts)).sum(axis=1)
-    return u
 
 
 def distance_table(furthest: float, width: float) -> Floats:
@@ -377,34 +374,13 @@ def _width(pressure: MovingPressure) -> float:
     return width
 
 
-def _offsets(pressure: MovingPressure, probes: ArrayLike) -> Floats:
-    """Offsets (p, k, 2) in metre of the probes from knots of the path."""
-    return np.atleast_2d(np.asarray(probes, np.float64))[:, None] - path_samples(pressure)
-
-
-def _interpolation(
-    distance: Floats, width: float
-) -> tuple[Floats, Callable[[Complex | Floats], Callable[[Floats], Complex | Floats]]]:
-    """Distances (j,) in metre to integrate at, and the interpolant of values (..., j) there: of few
-    distances each one, between many a spline.
+def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
+    """Distances (j,) in metre to integrate at, and the function of distances (...) to the shares
+    (..., j) that interpolate between them: of few distances each one, between many splines.
     """
-    unique = np.unique(distance)
-    if len(unique) <= FEW_DISTANCES:
-        return unique, lambda values: lambda r: values[..., np.searchsorted(unique, r)]
-    table = distance_table(distance.max(), width)
-    return table, partial(radial_spline, table, axis=-1)
-
-
-def _response_at(
-    field: Field, pressure: MovingPressure, offsets: Floats, w: ArrayLike
-) -> Callable[[Floats], Complex]:
-    """Components (f, p, m, k) at any of these offsets (p, k, 2) in metre from the focus."""
-    width = _width(pressure)
-    table, through = _interpolation(np.linalg.norm(offsets, axis=-1), width)
-    integrals = through(point_integrals(field, table, w, width))
-
-    def components(away: Floats) -> Complex:
-        integral = integrals(np.linalg.norm(away, axis=-1))
-        return np.einsum("mcpk,cfpk->fpmk", field.weights(away), integral)
-
-    return components
+    if len(knots) * len(probes) <= FEW_DISTANCES:
+        unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
+        return unique, lambda r: (r[..., None] == unique).astype(float)
+    furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
+    table = distance_table(furthest, width)
+    return table, radial_spline(table, np.eye(len(table)))

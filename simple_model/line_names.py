@@ -14,7 +14,7 @@ orders, sinusoids before the path: "f_AM" where f_AM = 2 f_d.
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -27,6 +27,7 @@ from simple_model.load_spectrum import (
     harmonics_unbounded,
     path_strengths,
 )
+from simple_model.path_cells import unsampled
 from simple_model.pressure import MovingPressure
 from simple_model.tacton import Tacton, tones
 from simple_model.trajectory import Floats
@@ -169,8 +170,9 @@ def _orders(name: str) -> Orders:
 def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
     """Orders (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
     tacton = pressure.tacton
-    n, share = path_strengths(pressure, ROUND_OFF)
-    share = share * np.abs(foci_harmonics(pressure, n))
+    path = unsampled(pressure)
+    n, share = path_strengths(path, ROUND_OFF)
+    share = share * np.abs(foci_harmonics(path, n))
     gain, c = _gain_products(pressure, 1e-3 * threshold)
     of_tacton = symbols(tacton)
     if of_tacton[0]:
@@ -203,7 +205,7 @@ def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, 
             orders, coefficients = _in_powers(pressure)
             of_signal = np.stack([_fourier(values**j) for j in range(len(coefficients))])
     if coefficients is None:
-        orders, coefficients = gain_orders(_unsampled(pressure))
+        orders, coefficients = gain_orders(unsampled(pressure))
     if tacton.rhythm is not None and of_tacton[5]:
         level = tacton.rhythm.level((np.arange(PULSED) + 0.5) / PULSED * tacton.rhythm.period)
         powers = _fourier(_factor(pressure, level))
@@ -213,15 +215,11 @@ def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, 
     return np.column_stack([orders[m[k]], _ranks(u[k], of_signal), _ranks(v, powers[None])]), c
 
 
-def _unsampled(pressure: MovingPressure) -> MovingPressure:
-    return replace(pressure, tacton=replace(pressure.tacton, rhythm=None, signal=None))
-
-
 def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
     """Orders (m, 3) and coefficients (k, m) of the gain with powers 0 to k - 1 of a factor of the
     modulation: through Chebyshev's points, and checked between them.
     """
-    law, plain = pressure.law, _unsampled(pressure)
+    law, plain = pressure.law, unsampled(pressure)
     for degree in DEGREES if law.degree is None else (max(1, law.degree),):
         factors = np.cos(np.pi * np.arange(2 * degree + 1) / (2 * degree))
         powers = np.vander(factors, degree + 1, increasing=True)

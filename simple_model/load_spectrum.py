@@ -7,35 +7,38 @@ so that a line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n 
 phases leave only every n-th harmonic of the path.
 
 A rhythm or a signal makes Q more than a few sinusoids. The lines are then those of the Tacton
-repeated periodically, at multiples of one over its duration. From rest that is the same load within
-that time, by causality.
+repeated periodically, at multiples of one over its duration, as if it were a path of that period
+with Q along it. From rest that is the same load within that time, by causality.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import lcm
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, sparse
+from scipy import sparse
 
 from simple_model.drive import DriveLaw
-from simple_model.focus import spot_detail, spot_reach
+from simple_model.focus import spot_reach
+from simple_model.path_cells import (
+    HIGHEST,
+    harmonics,
+    is_abrupt,
+    path_cells,
+    path_fourier,
+    path_samples,
+)
 from simple_model.pressure import MovingPressure, check_lines
-from simple_model.tacton import Tacton, modulation_at_phases, tones
+from simple_model.tacton import modulation_at_phases, tones
 from simple_model.trajectory import Floats
 
 Complex = NDArray[np.complex128]
 
-FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
-KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
 PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
 MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all, for a drive law that is no polynomial
 ALIASED = 1e-4  # of the strongest: a drive law's harmonics beyond those that are sampled
-HIGHEST = 10_000.0  # Hz of the lines of pulses and recordings: the rest moves bodies by 0.1 %
-SAMPLED = 40_000.0  # Hz at which a rhythm or signal is averaged
-MOST_SAMPLED = 50_000_000  # lines of a rhythm or signal, some hundred megabytes
+LINES_AT_ONCE = 2**24  # lines at places, some hundred megabytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,13 +76,14 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
         As `pressure.check_lines` does.
     """
     check_lines(pressure)
-    n, of_spot = path_strengths(pressure, threshold)
-    f, c = (_sampled_lines if pressure.tacton.is_sampled else _sinusoid_lines)(pressure, n)
-    f, order = np.round(f, 9), np.repeat(n, f.shape[1])  # f_AM - 2 f_d may be 0 but for round-off
-    c = (c * foci_harmonics(pressure, n)[:, None]).ravel() * np.where((f := f.ravel()) > 0, 2, 1)
-    strength = np.abs(c) * np.repeat(of_spot, f.size // len(n))
+    tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
+    tone, gain = (np.zeros(1), np.ones(1)) if tacton.is_sampled else _gain_lines(pressure)
+    f = (n[:, None] * path_cells(pressure).frequency + tone).ravel()
+    f, order = np.round(f, 9), np.repeat(n, len(tone))  # f_AM - 2 f_d may be 0 but for round-off
+    c = (foci_harmonics(pressure, n)[:, None] * gain).ravel() * np.where(f > 0, 2, 1)
+    strength = np.abs(c) * np.repeat(of_spot, len(tone))
     kept = (f >= 0) & (strength > threshold * strength.max())
-    if pressure.tacton.trajectory.shape == "recorded":
+    if tacton.is_sampled or tacton.trajectory.shape == "recorded" or is_abrupt(pressure):
         kept &= f <= HIGHEST
     if not kept.any():
         kept = (order == 0) & (f == 0)
@@ -107,8 +111,14 @@ def pressure_lines(
     frequencies : (f,) float, Hz, of the distinct lines
     amplitudes : (f, n) complex, Pa
     """
-    spots = pressure.spot(points, path_samples(pressure)) * path_weights(pressure)[:, None]
-    return load_lines(pressure, threshold).gather(path_fourier(spots.T).T)
+    lines, knots = load_lines(pressure, threshold), path_samples(pressure)
+    points = np.asarray(points, np.float64)
+    count = max(1, len(points) * path_cells(pressure).cells.shape[0] // LINES_AT_ONCE)
+    parts = [
+        lines.gather(path_fourier(pressure, pressure.spot(some, knots).T).T)
+        for some in np.array_split(points, count)
+    ]
+    return parts[0][0], np.hstack([amplitudes for _, amplitudes in parts])
 
 
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
@@ -138,7 +148,8 @@ def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Compl
 
     Parameters
     ----------
-    pressure, points, load : as for `reduced_lines`; the modulation does not matter
+    pressure, points, load : as for `reduced_lines`; but for a rhythm or signal the modulation does
+        not matter
 
     Returns
     -------
@@ -150,16 +161,15 @@ def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Compl
         low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
         near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
         forces.append(pressure.spot(points[near], part) @ load[near])
-    weighted = np.vstack(forces) * path_weights(pressure)[:, None]
-    return path_fourier(weighted.T).T
+    return path_fourier(pressure, np.vstack(forces).T).T
 
 
 def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:
-    """Orders (n,) of the harmonics of one focus along the path that, with all foci, exceed a
-    fraction of the strongest, and 0; and their largest amplitude (n,) at about eight points of it.
+    """Orders (n,) of the harmonics of one focus along the path, or of a Tacton with a rhythm or
+    signal, that exceed a fraction of the strongest, and 0; and their largest amplitude (n,) at
+    about eight points of it.
     """
-    of_spot = _largest_harmonics(pressure)
-    n = harmonics(len(of_spot))
+    of_spot, n = _largest_harmonics(pressure), harmonics(pressure)
     share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
     heard = (share > threshold * share.max()) | (n == 0)
     return n[heard], of_spot[n[heard]]
@@ -167,40 +177,20 @@ def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[
 
 @lru_cache(maxsize=8)  # lines, their names and maps are of the same load
 def _largest_harmonics(pressure: MovingPressure) -> Floats:
-    found = np.abs(path_fourier(_swept(pressure))).max(axis=0)
+    knots = path_samples(pressure)
+    spots = pressure.spot(knots[:: max(1, len(knots) // 8)][:9], knots).T
+    found = np.abs(path_fourier(pressure, spots)).max(axis=0)
     found.setflags(write=False)
     return found
 
 
 def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
-    """Array factor (k,) of all foci on harmonics n (k,) of one: 1 for a single focus."""
-    return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
-
-
-def path_samples(pressure: MovingPressure) -> Floats:
-    """Sample positions (k, 2) in metre along one period of the path; one if the focus is static.
-
-    They are the middles of k equal parts, between which corners and jumps of the path fall.
+    """Array factor (k,) of all foci on harmonics n (k,) of one; 1 for a single focus, and where the
+    harmonics are those of the Tacton.
     """
-    path = pressure.tacton.trajectory
-    return path.at_phase(_knot_phases(pressure))
-
-
-def path_weights(pressure: MovingPressure) -> Floats:
-    """Factors (k,) of a recording's levels on the pressure at `path_samples`; 1 without levels."""
-    return pressure.weight(_knot_phases(pressure))
-
-
-def harmonics(knots: int) -> NDArray[np.int_]:
-    """Orders of the harmonics of `path_fourier` that so many knots resolve, ascending."""
-    return np.arange(-((knots - 1) // 2), (knots + 1) // 2)
-
-
-def path_fourier(values: Floats | Complex) -> Complex:
-    """Fourier coefficients (..., n) of values (..., k) at `path_samples`; -n is harmonic -n."""
-    k = values.shape[-1]
-    shift = np.exp(-1j * np.pi * np.fft.fftfreq(k))
-    return np.asarray(fft.fft(values, axis=-1) * (shift / k))
+    if pressure.tacton.is_sampled:
+        return np.ones(len(n), np.complex128)
+    return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
 
 
 def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
@@ -226,87 +216,6 @@ def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Compl
     total = np.zeros((len(distinct), *amplitudes.shape[1:]), np.complex128)
     np.add.at(total, which, amplitudes)
     return distinct, total
-
-
-def _knot_phases(pressure: MovingPressure) -> Floats:
-    """Fractions (k,) of the period, the middles of equal parts of it; 0 if the focus is static."""
-    path = pressure.tacton.trajectory
-    if path.is_static:
-        return np.zeros(1)
-    width = spot_detail(pressure.height, pressure.profile)
-    if path.shape == "recorded":
-        enough, whole = _recorded_knots(pressure.tacton, width)
-    else:
-        enough, whole = KNOTS_PER_WIDTH * path.length / width, 12
-    if pressure.heading:  # which jumps at corners
-        enough = max(enough, 2.5 * HIGHEST / path.drawing_frequency)
-    k = whole * int(np.ceil(max(enough, FEWEST_KNOTS) / whole))
-    return (np.arange(k) + 0.5) / k
-
-
-def _recorded_knots(tacton: Tacton, width: float) -> tuple[float, int]:
-    """Number of knots that a recording needs for a focal spot of a width in metre, and what they
-    are a multiple of: enough for all lines up to `HIGHEST` or, if nothing about it is abrupt within
-    a path, for its fastest part.
-    """
-    path, n = tacton.trajectory, tacton.n_paths
-    clock, period = np.array(path.times), path.times[-1]
-    steps = np.diff(clock)
-    moves = steps > 0
-    even = np.ptp(steps[moves]) < 1e-9 * period
-    whole = lcm(int(moves.sum()), n) if even else 12 * n
-    lines = 2.5 * HIGHEST * period
-    jumps = clock[1:][~moves] * n / period
-    if path.levels or path.hold or np.abs(jumps - np.round(jumps)).max(initial=0.0) > 1e-9:
-        return max(KNOTS_PER_WIDTH * path.length / width, lines), whole
-    lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
-    fastest = float((lengths[moves] / steps[moves]).max())
-    return min(KNOTS_PER_WIDTH * fastest * period / width, lines), whole
-
-
-def _swept(pressure: MovingPressure) -> Floats:
-    """Focal spot (8, k) at about eight points of the path while the focus runs along it."""
-    knots = path_samples(pressure)
-    watched = knots[:: max(1, len(knots) // 8)][:9]
-    return (pressure.spot(watched, knots) * path_weights(pressure)[:, None]).T
-
-
-def _sampled_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floats, Complex]:
-    """Frequencies (n, k) in Hz and coefficients (n, k) in Pa of the gain as harmonics n see it.
-
-    Sampled averages of the gain; averaging takes sin(x)/x off its lines, which is put back.
-
-    Raises
-    ------
-    ValueError
-        If there are more than `MOST_SAMPLED` of them.
-    """
-    tacton = pressure.tacton
-    count = max(2, int(np.ceil(tacton.duration * SAMPLED)))
-    dt = tacton.duration / count
-    t = (np.arange(count) + 0.5) * dt
-    gain = pressure.gain(t, over=dt)
-    k = np.arange(min(count // 2, int(HIGHEST * tacton.duration) + 1))
-    if len(n) * len(k) > MOST_SAMPLED:
-        raise ValueError(
-            f"a rhythm or signal on this path makes {len(n) * len(k):,} lines, the limit is "
-            f"{MOST_SAMPLED:,}; shorten the Tacton or the path, or put the rhythm into its levels"
-        )
-    middle = np.exp(-1j * np.pi * k / count) / count
-    f_d = tacton.trajectory.drawing_frequency
-    c = np.empty((len(n), len(k)), np.complex128)
-    for row, order in zip(c, n, strict=True):
-        transform = np.fft.fft(gain * np.exp(2j * np.pi * f_d * order * t))[k]
-        averaged = np.sinc(np.clip(k / count - order * f_d * dt, -0.5, 0.5))
-        row[:] = transform * middle / averaged
-    return np.tile(k / tacton.duration, (len(n), 1)), c
-
-
-def _sinusoid_lines(pressure: MovingPressure, n: NDArray[np.int_]) -> tuple[Floats, Complex]:
-    """Lines as of `_sampled_lines`, of a gain that is made of sinusoids, exactly."""
-    f, c = _gain_lines(pressure)
-    f_d = pressure.tacton.trajectory.drawing_frequency
-    return n[:, None] * f_d + f, np.broadcast_to(c, (len(n), len(c)))
 
 
 def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from simple_model.compliance import Compliance
 from simple_model.flat_body import distance_table, radial_spline
 from simple_model.focus import spot_width
-from simple_model.load_spectrum import Complex, load_lines, path_fourier, path_samples
+from simple_model.load_spectrum import Complex, load_lines
+from simple_model.path_cells import path_fourier, path_samples
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import point_response
@@ -97,7 +98,7 @@ def path_operator(
     table = distance_table(away.max(), width)
     splines = radial_spline(table, np.eye(len(table)))
     blocks = np.array_split(away, max(1, away.size * len(table) // AT_ONCE))
-    parts = [path_fourier(splines(part).swapaxes(1, 2))[..., distinct] for part in blocks]
+    parts = [path_fourier(pressure, splines(part).swapaxes(1, 2), distinct) for part in blocks]
     return PathOperator(
         width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
         coefficients=load.coefficients,

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.focus import spot_detail, spot_reach
-from simple_model.load_spectrum import load_lines, path_forces, path_samples
+from simple_model.load_spectrum import load_lines, path_forces
 from simple_model.material import Complex, Floats, ModulusLaw
+from simple_model.path_cells import path_samples
 from simple_model.plate_modes import PlateModes, steady_response
 from simple_model.pressure import MovingPressure
 
@@ -24,7 +25,7 @@ def modal_path_forces(
     Parameters
     ----------
     modes : PlateModes
-    pressure : MovingPressure, whose path and focal spot are taken
+    pressure : MovingPressure, of which path, focal spot, rhythm and signal are taken
     middle : (2,) metre, of the plate, where the scene's middle is (0, 0)
 
     Returns

@@ -55,6 +55,16 @@ class Rhythm:
         """Seconds after which the pulses repeat."""
         return float(np.sum(self.pulses))
 
+    @cached_property
+    def edges(self) -> Floats:
+        """Times (k,) in s within a period at which the level jumps."""
+        if self.ramp:
+            return np.empty(0)
+        lengths = np.array(self.pulses)
+        starts = np.cumsum(lengths.sum(axis=1)) - lengths.sum(axis=1)
+        gaps = lengths[:, 1] > 0
+        return np.concatenate([starts[np.roll(gaps, 1)], (starts + lengths[:, 0])[gaps]])
+
     def level(self, t: ArrayLike) -> Floats:
         """Level (...), 0..1, at times (...) in s from the start of the Tacton."""
         knots, levels = self._knots

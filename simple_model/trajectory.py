@@ -27,6 +27,7 @@ FURTHEST = 0.100  # m of a point's coordinates, which devices steer to
 MOST_POINTS = 1_000_000
 STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
 NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
+STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
 JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
 _TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
@@ -153,6 +154,51 @@ class Trajectory:
         level = np.array(self.levels)
         return np.asarray(level[before] + part * (level[before + 1] - level[before]))
 
+    @cached_property
+    def parts(self) -> tuple[Floats, Floats]:
+        """Fractions (s + 1,) of the period, from 0 to 1, between which the path is smooth, and the
+        length (s,) of each part in metre.
+        """
+        if self.shape == "recorded":
+            clock = self._clock
+            bounds = np.unique(clock) / clock[-1]
+            steps = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)[np.diff(clock) > 0]
+            return bounds, np.zeros_like(steps) if self.hold else steps
+        if self.shape == "polyline" and self.length > 0:
+            bounds = np.unique(self._arc) / self._arc[-1]
+            if not self._runs_on:
+                way = np.arccos(1 - 2 * bounds) / pi if self.is_eased else bounds
+                bounds = np.concatenate([way, 2 - way[-2::-1]]) / 2
+        else:
+            sides = {"triangle": 3, "square": 4, "line": 2}.get(self.shape, 1)
+            whole = self.is_eased or self.sweep == "one_way"
+            bounds = np.linspace(0, 1, (1 if self.shape == "line" and whole else sides) + 1)
+        share = pi / 2 if self.is_eased else 1.0  # at its fastest
+        return bounds, share * self.length * np.diff(bounds)
+
+    @cached_property
+    def jumps(self) -> Floats:
+        """Fractions (j,) of the period, 0 included and 1 not, at which position or level jumps."""
+        starts = self.parts[0][:-1]
+        return starts[differ(*self.beside(starts))]
+
+    def beside(self, phases: Floats) -> tuple[Floats, Floats]:
+        """Positions and level (k, 3) just before and just after fractions (k,) of the period."""
+        aside = np.mod([phases - self._nearby, phases + self._nearby], 1.0)
+        before, after = (np.column_stack([self.at_phase(a), self.level_at_phase(a)]) for a in aside)
+        return before, after
+
+    def within_part(self, part: int, along: Floats) -> Floats:
+        """Positions (k, 2) in metre at fractions (k,) of the time of a part, ends included."""
+        start, end = self.parts[0][part : part + 2]
+        phases = start + (end - start) * along
+        return self.at_phase(np.clip(phases, start + self._nearby, end - self._nearby))
+
+    @property
+    def _nearby(self) -> float:
+        """Fraction of the period that nothing moves in, but that tells a time from the next."""
+        return 2 * JUST_AFTER / max(1, len(self.points) - 1)
+
     def _about_origin(self, phase: Floats) -> Floats:
         if self.shape == "point":
             return np.zeros((*phase.shape, 2))
@@ -213,6 +259,13 @@ class Trajectory:
             return before, np.zeros_like(t)
         step = np.maximum(clock[before + 1] - clock[before], 1e-300)
         return before, np.clip((t - clock[before]) / step, 0.0, 1.0)
+
+
+def differ(before: Floats, after: Floats) -> NDArray[np.bool_]:
+    """Mask (k,) of positions and levels (k, 3) that are not the same."""
+    place, level = STILL
+    apart = np.abs(after - before)
+    return (apart[:, :2] > place).any(axis=1) | (apart[:, 2] > level)
 
 
 def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajectory:

@@ -18,8 +18,9 @@ from simple_model import (
 )
 from simple_model.compliance import slab
 from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples, synthesise
+from simple_model.load_spectrum import load_lines, synthesise
 from simple_model.material import PRESETS
+from simple_model.path_cells import path_fourier, path_samples
 from simple_model.sampling import resolving_step
 from skinwave import Body, Scene, simulate
 from skinwave.simulation import compute
@@ -99,7 +100,7 @@ def test_pulses_of_a_fast_circle_do_not_fold():
 def test_the_kernel_has_the_lines_of_its_load_below_half_the_rate(load):
     found = point_kernel(load, PROBES, TIMES).displacement
     parts = load_lines(load)
-    spots = path_fourier(load.spot(PROBES, path_samples(load)).T)
+    spots = path_fourier(load, load.spot(PROBES, path_samples(load)).T)
     f, a = parts.gather(spots.T)
     expected = synthesise(f[f < 4800], a[f < 4800], TIMES)
     misfit = np.abs(lines_of(found) - lines_of(expected))[:4600] / np.ptp(expected)

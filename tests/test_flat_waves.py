@@ -115,12 +115,13 @@ def test_flat_bodies_take_a_gaussian_focus_only():
 
 
 def test_load_lines_add_up_to_the_load():
-    from simple_model.load_spectrum import load_lines, path_fourier, path_samples
+    from simple_model.load_spectrum import load_lines
+    from simple_model.path_cells import path_fourier, path_samples
 
     load = circling(0.02, 12, am=140, drive="pressure_squared")
     points, times = np.array([[0.01, 0.0], [0.0, 0.004]]), np.arange(300) / 1e4
     lines = load_lines(load, 1e-8)
-    spots = path_fourier(load.spot(points, path_samples(load)).T)  # (point, n)
+    spots = path_fourier(load, load.spot(points, path_samples(load)).T)  # (point, n)
     waves = lines.coefficients * np.exp(2j * np.pi * lines.frequencies * times[:, None])
     summed = (waves @ spots[:, lines.harmonics].T).real
     np.testing.assert_allclose(summed, point_kernel(load, points, times).displacement, atol=1e-6)

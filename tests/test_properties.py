@@ -16,7 +16,8 @@ from simple_model.compliance import half_space, slab
 from simple_model.drive import DRIVES
 from simple_model.flat_body import steady_lines
 from simple_model.focus import FOCI
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples, reduced_lines
+from simple_model.load_spectrum import load_lines, reduced_lines
+from simple_model.path_cells import path_fourier, path_samples
 from simple_model.rhythm import ROLES
 from simple_model.tacton import SHARINGS
 from simple_model.trajectory import SHAPES, SWEEPS
@@ -292,7 +293,7 @@ def test_probes_around_a_circle_see_the_same_lines(tacton, distance, angle):
     load = MovingPressure(tacton=replace(tacton, am_frequency=0.0))
     probes = turned(distance, np.array([0.0, angle]))
     _, waves = steady_lines(half_space(fem.Material(**SLOW)), load, probes)
-    spots = path_fourier(load.spot(probes, path_samples(load)).T)  # the point kernel's
+    spots = path_fourier(load, load.spot(probes, path_samples(load)).T)  # the point kernel's
     lines = load_lines(load)
     kernel = lines.coefficients * spots[:, lines.harmonics]
     for amplitudes in (np.abs(waves.T), np.abs(kernel)):

@@ -19,8 +19,9 @@ from simple_model import (
 )
 from simple_model.compliance import half_space
 from simple_model.flat_body import flat_body
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples, path_weights
+from simple_model.load_spectrum import load_lines
 from simple_model.material import PRESETS
+from simple_model.path_cells import path_fourier, path_samples
 from skinwave import Body, Scene, simulate
 from skinwave.pictures.views import kernel_view
 from skinwave.planning.plan import plan
@@ -101,7 +102,7 @@ def test_lines_are_those_of_the_load_sampled(extra, foci):
     sampled = np.fft.rfft(load(PLACES, fine), axis=0)[:251] / 80_000
     sampled *= np.exp(-1j * np.pi * np.arange(251) / 80_000)[:, None]
     sampled[1:] *= 2
-    f, a = load_lines(load).gather(path_fourier(load.spot(PLACES, path_samples(load)).T).T)
+    f, a = load_lines(load).gather(path_fourier(load, load.spot(PLACES, path_samples(load)).T).T)
     np.testing.assert_allclose(f[:251], np.arange(251) / 0.25, atol=1e-8)
     assert np.abs(a[:251] - sampled).max() < 2e-4 * np.abs(sampled).max()
 
@@ -205,8 +206,7 @@ def test_levels_of_a_recording_follow_the_drive_law():
 
 def test_lines_of_a_recording_add_up_to_its_load():
     load = MovingPressure(tacton=Tacton(trajectory=wandering(0.25, 5001), duration=0.25))
-    spots = load.spot(PLACES, path_samples(load)) * path_weights(load)[:, None]
-    f, a = load_lines(load).gather(path_fourier(spots.T).T)
+    f, a = load_lines(load).gather(path_fourier(load, load.spot(PLACES, path_samples(load)).T).T)
     t = np.arange(2000) / 1e4 + 0.01
     summed = (np.exp(2j * np.pi * t[:, None] * f) @ a).real
     exact = load(PLACES, t)
@@ -241,7 +241,8 @@ def test_lines_and_time_steps_answer_the_same_load(name):
     x = compute(scene, "fem", h=0.006).displacement
     y = compute(scene, "fem-transient", h=0.006, dt=2.5e-5).displacement
     error = np.linalg.norm(x - y, axis=0) / np.linalg.norm(y, axis=0)
-    assert error.max() < 2e-3 if "pulses" in name else error.max() < 1e-3
+    # Lines of pulses above 10 kHz are left out, which is as if they came 5 us late.
+    assert error.max() < 2.5e-3 if "pulses" in name else error.max() < 1e-3
 
 
 SKIN = half_space(replace(PRESETS["palm"], poisson=0.45))

@@ -203,11 +203,6 @@ def test_what_is_shown_of_paths_of_their_own_is_their_pressure():
     assert names["f_d-f_AM"] == pytest.approx(50)
     assert names["f_d+f_AM"] == pytest.approx(230)
     assert len(model.drawn_paths(scene.tacton)) == 3
-    # At another frequency nothing is found anew: the places are the same.
-    model.harmonics_of.cache_clear()
-    for drawn in (90.0, 33.0, 71.3):
-        model.kernel(scenes.scene_of(STARTS | OWN | {"drawn": drawn}))
-    assert model.harmonics_of.cache_info().misses == 1
 
 
 def test_a_body_of_ones_own_stays():

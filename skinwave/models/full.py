@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, path_samples, synthesise
 from simple_model.material import Material
-from simple_model.sampling import resolving_step, shown
+from simple_model.sampling import below_half_the_rate, resolving_step
 from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.discretised import Discretise
@@ -285,7 +285,7 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             amplitudes = np.vstack([amplitudes, moved])
     energy = energy_balance(total)
     amplitudes = amplitudes * line_factor(asked, 2j * np.pi * frequencies, solids, S.shape[0])
-    below = shown(scene.pressure, frequencies, times)
+    below = below_half_the_rate(frequencies, times)
     effort = Effort(
         dofs=len(ops.free), steps=len(frequencies), energy_imbalance=energy[0], radiated=energy[1],
         solver=fem.available(complex_valued=True)[0] if solver == "auto" else solver,

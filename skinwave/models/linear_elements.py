@@ -107,7 +107,7 @@ def _reduced(scene: Scene, request: Request) -> Response:
         scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
         tolerance=reduction_tolerance(request.tolerance), reading=scene.reading, load=scene.load,
     )  # fmt: skip
-    return answer(prepared, scene, request.report)
+    return answer(prepared, scene, request.report, times=request.times)
 
 
 FEM = register(

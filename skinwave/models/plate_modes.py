@@ -25,7 +25,7 @@ from simple_model.plate_modes import (
     plate_modes,
 )
 from simple_model.plate_response import modal_path_forces
-from simple_model.sampling import shown
+from simple_model.sampling import below_half_the_rate
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.effort import peak_memory, silent
@@ -113,7 +113,7 @@ def _driven(scene: Scene, request: Request) -> Driven:
     request.report("lines", 0.0)
     middle = body.placement.offset
     f, forces = load_lines(pressure).gather(modal_path_forces(modes, pressure, middle))
-    below = shown(pressure, f, request.times)
+    below = below_half_the_rate(f, request.times)
     return Driven(
         modes=modes, frequencies=f[below], forces=forces[below],
         outputs=modes.at(scene.probe_points - middle),

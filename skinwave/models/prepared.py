@@ -14,7 +14,7 @@ from simple_model.focus import spot_width
 from simple_model.load_spectrum import merge_lines, synthesise
 from simple_model.material import Material
 from simple_model.quantities import Quantity
-from simple_model.sampling import shown
+from simple_model.sampling import below_half_the_rate
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
@@ -298,7 +298,7 @@ def answer(
         # Lines are not weighed against the mean: that of an unconstrained body has no bound.
         strength, mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
-        heard &= shown(scene.pressure, motion.frequencies, times)
+        heard &= below_half_the_rate(motion.frequencies, times)
         moving = from_rest(select_lines(motion, heard), times)
         waveforms = with_sag(moving, prepared.sag, asked)
     effort = replace(

@@ -12,7 +12,8 @@ from meshes import TetMesh
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.compliance import Compliance, half_space, slab, thin_sheet
 from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples
+from simple_model.load_spectrum import load_lines
+from simple_model.path_cells import path_fourier, path_samples
 from simple_model.wavenumber_integral import point_response
 from skinwave.verify import references
 from skinwave.verify.case import Case, Plot, below, described, largest, misfit, relative
@@ -236,7 +237,7 @@ def _line(
     mine = np.flatnonzero(np.abs(lines.frequencies - hz) < 1e-6)
     n = lines.harmonics[mine]
     ops = quarter(bool(n[0] % 2))
-    spots = path_fourier(load.spot(fem.facet_points(mesh), path_samples(load)).T)[:, n].real
+    spots = path_fourier(load, load.spot(fem.facet_points(mesh), path_samples(load)).T, n).real
     force = fem.load_operator(mesh) @ (spots @ lines.coefficients[mine])
     return fem.probe_operator(mesh, probes) @ fem.harmonic(ops, force, hz)[0]
 

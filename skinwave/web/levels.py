@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 
 from meshes.tetmesh import Floats
 from simple_model import sensation_level
-from simple_model.load_spectrum import path_samples, pressure_lines
+from simple_model.load_spectrum import pressure_lines
+from simple_model.path_cells import path_samples
 from skinwave.scene import Scene
 from skinwave.web.model import FAINTEST_LEVEL, Answer, AreaMap, mean_level, places
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from meshes.tetmesh import Floats, Ints
@@ -13,7 +12,6 @@ from simple_model import (
     Response,
     Tacton,
     Trajectory,
-    evenly,
     line_table,
     modulation,
     published,
@@ -23,7 +21,7 @@ from simple_model import (
 )
 from simple_model.focus import lobe_width
 from simple_model.joined import parted
-from simple_model.load_spectrum import load_lines, path_fourier, path_samples
+from simple_model.load_spectrum import pressure_lines
 from simple_model.tacton import CARRIER, level, tones
 from skinwave.run import ASSESSED, lines_beside
 from skinwave.scene import Scene
@@ -177,12 +175,7 @@ def kernel_map(pressure: MovingPressure) -> AreaMap:
     with the highest sensation level, of a rhythm with its pauses, is at the threshold of skin.
     """
     tacton = replace(pressure.tacton, rhythm=None)
-    path = tacton.trajectory
-    found = load_lines(replace(pressure, tacton=tacton), 1e-3)
-    # Of paths of their own only every n-th harmonic is left, of which `harmonics_of` knows.
-    n, at_all = tacton.n_paths, at_any_speed(path)
-    found = replace(found, harmonics=found.harmonics // n)
-    f, amplitudes = found.gather(harmonics_of(at_all, n, pressure.height, pressure.profile))
+    f, amplitudes = pressure_lines(replace(pressure, tacton=tacton), places(), 1e-3)
     f, amplitudes = f[f > 1e-6], np.abs(amplitudes[f > 1e-6])
     rms = np.sqrt((amplitudes**2).sum(axis=0) / 2).reshape(SIDE, SIDE)
     level = sensation_level(mean_level(pressure) * amplitudes, f[:, None], unit="Pa")
@@ -214,20 +207,6 @@ def drawn_paths(tacton: Tacton) -> tuple[Floats, ...]:
         return ()
     lines = parted(path, tacton.n_paths) if path.shape == "recorded" else (path.outline,)
     return tuple(line for line in lines if np.ptp(line, axis=0).any())
-
-
-@lru_cache(maxsize=2)  # up to 13 MB each
-def harmonics_of(
-    path: Trajectory, n_paths: int, height: float, profile: str
-) -> NDArray[np.complex128]:
-    """Harmonics (n, SIDE^2) of a focus of unit pressure on a path, at a map's places; of several
-    paths that are joined every n_paths-th, which is the mean of all.
-    """
-    tacton = Tacton(trajectory=path, foci=evenly(n_paths))
-    pressure = MovingPressure(tacton=tacton, height=height, profile=profile)
-    spots = pressure.spot(places(), path_samples(pressure))
-    mean = spots.reshape(n_paths, -1, SIDE**2).mean(axis=0)
-    return path_fourier(mean.T).T
 
 
 def borderline(values: Floats, at: float) -> tuple[Floats, ...]:

@@ -23,13 +23,8 @@ from scipy import fft, sparse
 import fem
 from meshes.tetmesh import Floats, Ints
 from simple_model import MovingPressure, Response, sensation_level
-from simple_model.load_spectrum import (
-    foci_harmonics,
-    harmonics,
-    load_lines,
-    path_fourier,
-    path_samples,
-)
+from simple_model.load_spectrum import foci_harmonics, load_lines
+from simple_model.path_cells import harmonics, path_fourier, path_samples, unsampled
 from simple_model.prony import FIT_TOLERANCE
 from simple_model.response import step
 from skinwave.bodies.build import Build, build, operators
@@ -288,10 +283,10 @@ def flat_motion(table: Table, pressure: MovingPressure, probe: Floats, times: Fl
     f = f[f <= HIGHEST]
     gain = pressure.gain(t, over=dt) * (np.arange(padded) < n)
     gain[0] /= 2  # as in `flat_body`
-    away = np.linalg.norm(probe - path_samples(pressure), axis=1)
-    h = path_fourier(table.along_distances(away))
-    orders = harmonics(h.shape[1])
-    h[:, orders] *= foci_harmonics(pressure, orders)
+    path = unsampled(pressure)
+    away = np.linalg.norm(probe - path_samples(path), axis=1)
+    h, orders = path_fourier(path, table.along_distances(away)), harmonics(path)
+    h[:, orders] *= foci_harmonics(path, orders)
     orders = orders[np.abs(h[:, orders]).max(axis=0) > FAINTEST * np.abs(h).max()]
     h = CubicSpline(table.frequencies, h[:, orders], axis=0)(f)
     turn = np.exp(2j * np.pi * pressure.tacton.trajectory.drawing_frequency * t)
@@ -307,9 +302,8 @@ def path_amplitudes(pressure: MovingPressure) -> tuple[Floats, fem.Complex]:
     found = load_lines(pressure, 1e-3)
     heard = (found.frequencies > 1e-6) & (found.frequencies <= BAND)
     knots = len(path_samples(pressure))
-    phases = (np.arange(knots) + 0.5) / knots
     f, which = np.unique(np.round(found.frequencies[heard], 9), return_inverse=True)
-    waves = np.exp(-2j * np.pi * found.harmonics[heard, None] * phases) / knots
+    waves = path_fourier(pressure, np.eye(knots), found.harmonics[heard]).T
     w = np.zeros((len(f), knots), np.complex128)
     np.add.at(w, which, found.coefficients[heard, None] * waves)
     strength = np.zeros(len(f))
