@@ -307,7 +307,7 @@ def _low_passed(
     lines = load_lines(pressure)
     below = lines.frequencies < highest
     f, orders = lines.frequencies[below], lines.harmonics[below]
-    t = dt * np.arange(padded)
+    t = np.asarray(dt * np.arange(padded), np.float64)
     window = lasting(t)
     window[0] /= 2  # the load begins in the middle of a sample
 

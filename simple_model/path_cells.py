@@ -227,7 +227,7 @@ def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats,
     own = np.flatnonzero(~dense[part])
     positions, q = [path.at_phase(phases[own])], len(own)
     rows, columns, shares = [own], [np.arange(q)], [np.ones(q)]
-    for k in np.flatnonzero(dense):
+    for k in np.flatnonzero(dense).tolist():
         mine = np.flatnonzero(part == k)
         at = path.within_part(k, np.linspace(0, 1, nodes[k]))
         u = (phases[mine] - bounds[k]) / (bounds[k + 1] - bounds[k]) * (nodes[k] - 1)

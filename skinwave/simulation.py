@@ -19,7 +19,7 @@ from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.laws import check_laws
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
-from skinwave.planning.warnings import beyond_linear, implausible
+from skinwave.planning.warnings import beyond_linear, beyond_sampling, implausible
 from skinwave.progress_bar import reported
 from skinwave.sample_grid import from_first, sample_grid
 from skinwave.scene import Scene
@@ -182,7 +182,10 @@ def follow(
             replace(scene, body=required.body), required.model, tolerance, progress,
             times=times, h=required.h or h, dt=dt, solver=solver, mapped=mapped,
         )  # fmt: skip
-    told = (*required.warnings, *beyond_linear(scene, found), *implausible(scene))
+    told = (
+        *required.warnings, *beyond_linear(scene, found), *beyond_sampling(scene, found),
+        *implausible(scene),
+    )  # fmt: skip
     found = replace(found, expected_error=required.error, load=scene.pressure)
     return warned(found, told)
 

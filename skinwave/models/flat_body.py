@@ -114,8 +114,6 @@ def _limits(scene: Scene) -> Iterator[Limit]:
 
 def _steady_limits(scene: Scene) -> Iterator[Limit]:
     yield from _limits(scene)
-    if scene.tacton.trajectory.shape == "recorded":
-        yield Limit(why="takes a path that repeats, not a recorded one")
     if not any(solid.has_loss for solid in scene.body.solids):
         yield Limit(
             why="takes a material with loss, not one whose resonances are unbounded",

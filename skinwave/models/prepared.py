@@ -329,7 +329,7 @@ def steady_waveforms(prepared: Prepared, scene: Scene, times: Floats) -> Floats:
     """
     motion, asked = components(prepared, *scene.loads), prepared.reading.asked
     # Under its mean an unconstrained body has no steady state.
-    heard = shown(scene.pressure, motion.frequencies, times)
+    heard = below_half_the_rate(motion.frequencies, times)
     heard &= scene.body.is_held | (motion.frequencies > 0)
     moving = synthesise(motion.frequencies[heard], motion.lines[heard], times)
     return asked.waveforms(with_sag(moving, prepared.sag, asked), len(prepared.probes))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from meshes import MeshError
 from meshes.tetmesh import Floats
+from simple_model.path_cells import is_abrupt
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress, silent
 from skinwave.models.prepared import Prepared, answer, components, prepare, reduction_tolerance
@@ -67,7 +68,7 @@ def has_goal_oriented(scene: Scene, body: Body) -> bool:
     """
     grid, sized, path = body.of_kind.grid, body.of_kind.sized, scene.tacton.trajectory
     follows = bool(grid and grid.has(body)) or bool(sized and sized.has(body))
-    few = not (scene.tacton.is_sampled or path.shape == "recorded")
+    few = not (scene.tacton.is_sampled or path.shape == "recorded" or is_abrupt(scene.pressure))
     reads = scene.reading.asked.is_normal and scene.reading.is_on_surface
     return follows and few and reads and scene.load.is_plain
 

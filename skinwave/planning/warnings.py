@@ -3,7 +3,9 @@
 import numpy as np
 
 from simple_model import Response
+from simple_model.line_names import line_names
 from simple_model.quantities import DISPLACEMENT
+from simple_model.response import step
 from skinwave.models import Model, named
 from skinwave.models.advice import cures_for, in_words
 from skinwave.planning.estimates import mean_gain, spot_scale
@@ -14,6 +16,7 @@ from skinwave.scene import Scene
 NONLINEAR = "fem-nonlinear"
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
+LEFT_OUT = 0.05  # of the strongest line of a load: weaker ones are left out without a warning
 
 
 def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
@@ -105,6 +108,21 @@ def implausible(scene: Scene) -> tuple[str, ...]:
     for x, y, _ in sorted({place for place in places if places.count(place) > 1}):
         found.append(f"points_mm has ({1e3 * x:g}, {1e3 * y:g}) mm more than once; leave one out")
     return tuple(found)
+
+
+def beyond_sampling(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Warning of lines of the load that the response leaves out: above half its sampling rate."""
+    lines, highest = line_names(scene.pressure, LEFT_OUT), 0.5 / step(response.times)
+    above = np.flatnonzero(lines.frequencies >= highest)
+    if not len(above):
+        return ()
+    f, strongest = lines.frequencies[above], above[np.argmax(lines.strengths[above])]
+    others = f" and {len(above) - 1} more" if len(above) > 1 else ""
+    return (
+        f"the load's lines above {highest:.4g} Hz, half the sampling rate, are left out: "
+        f"{lines.names[strongest]} at {lines.frequencies[strongest]:.4g} Hz{others}; give times in "
+        f"steps below {500 / f.max():.2g} ms",
+    )
 
 
 def error_unknown(error: float) -> tuple[str, ...]:
