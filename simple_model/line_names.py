@@ -14,7 +14,7 @@ orders, sinusoids before the path: "f_AM" where f_AM = 2 f_d.
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -27,7 +27,7 @@ from simple_model.load_spectrum import (
     harmonics_unbounded,
     path_strengths,
 )
-from simple_model.path_cells import unsampled
+from simple_model.path_cells import is_cut_short, unsampled
 from simple_model.pressure import MovingPressure
 from simple_model.tacton import Tacton, tones
 from simple_model.trajectory import Floats
@@ -171,11 +171,19 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Fl
     """Orders (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
     tacton = pressure.tacton
     path = unsampled(pressure)
+    if once := is_cut_short(path):  # whose cells are of all of the load
+        still = replace(
+            tacton, am_frequency=0.0, second_am_frequency=0.0, envelope_frequency=0.0,
+            rhythm=None, signal=None,
+        )  # fmt: skip
+        path = replace(path, tacton=still)
     n, share = path_strengths(path, ROUND_OFF)
     share = share * np.abs(foci_harmonics(path, n))
+    if once:
+        share /= max(float(np.abs(path.gain(0.0))), 1e-300)
     gain, c = _gain_products(pressure, 1e-3 * threshold)
     of_tacton = symbols(tacton)
-    if of_tacton[0]:
+    if of_tacton[0] and not once:
         whole = n % tacton.n_paths == 0  # of paths of their own nothing else is left
         n, share = n[whole] // tacton.n_paths, share[whole]
     else:

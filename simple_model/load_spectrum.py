@@ -6,13 +6,14 @@
 so that a line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j): n foci at even
 phases leave only every n-th harmonic of the path.
 
-A rhythm or a signal makes Q more than a few sinusoids. The lines are then those of the Tacton
-repeated periodically, at multiples of one over its duration, as if it were a path of that period
-with Q along it. From rest that is the same load within that time, by causality.
+A rhythm or a signal makes Q more than a few sinusoids, and a path that jumps may be longer than the
+Tacton. The lines are then those of the Tacton repeated periodically, at multiples of one over its
+duration, as if it were a path of that period with Q along it. From rest that is the same load
+within that time, by causality.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -38,6 +39,7 @@ Complex = NDArray[np.complex128]
 PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
 MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all, for a drive law that is no polynomial
 ALIASED = 1e-4  # of the strongest: a drive law's harmonics beyond those that are sampled
+MANY, RAISED = 20, 8  # lines of a jump; the power of frequency with which the last are raised
 LINES_AT_ONCE = 2**24  # lines at places, some hundred megabytes
 
 
@@ -77,13 +79,14 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     """
     check_lines(pressure)
     tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
-    tone, gain = (np.zeros(1), np.ones(1)) if tacton.is_sampled else _gain_lines(pressure)
-    f = (n[:, None] * path_cells(pressure).frequency + tone).ravel()
+    whole, frequency = path_cells(pressure).of_tacton, path_cells(pressure).frequency
+    tone, gain = (np.zeros(1), np.ones(1)) if whole else _gain_lines(pressure)
+    f = (n[:, None] * frequency + tone).ravel()
     f, order = np.round(f, 9), np.repeat(n, len(tone))  # f_AM - 2 f_d may be 0 but for round-off
     c = (foci_harmonics(pressure, n)[:, None] * gain).ravel() * np.where(f > 0, 2, 1)
     strength = np.abs(c) * np.repeat(of_spot, len(tone))
     kept = (f >= 0) & (strength > threshold * strength.max())
-    if tacton.is_sampled or tacton.trajectory.shape == "recorded" or is_abrupt(pressure):
+    if whole or tacton.trajectory.shape == "recorded" or is_abrupt(pressure):
         kept &= f <= HIGHEST
     if not kept.any():
         kept = (order == 0) & (f == 0)
@@ -93,6 +96,34 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
         coefficients=c[kept],
         strengths=strength[kept],
     )
+
+
+def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
+    """Lines that give a body the impulse of the load after its start.
+
+    The lines of a jump d that end at a frequency F lack an impulse of d / (2 pi^2 F) after it, as
+    if it came 5 us late. With factors of 1 + (n - 1) (f / F)^n, whose integral over 1/f^2 is that
+    of the lines beyond F, many lines have it.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+
+    Returns
+    -------
+    LoadSpectrum
+
+    Raises
+    ------
+    ValueError
+        As `load_lines` does.
+    """
+    lines, whole = load_lines(pressure), path_cells(pressure)
+    few = whole.frequency * MANY > HIGHEST
+    if few or not (whole.of_tacton or is_abrupt(pressure)):
+        return lines
+    raised = 1 + (RAISED - 1) * (lines.frequencies / HIGHEST) ** RAISED
+    return replace(lines, coefficients=lines.coefficients * raised)
 
 
 def pressure_lines(
@@ -122,7 +153,7 @@ def pressure_lines(
 
 
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
-    """Load spectrum in reduced coordinates.
+    """Load spectrum in reduced coordinates, of `lines_from_rest`.
 
     Parameters
     ----------
@@ -140,7 +171,7 @@ def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tup
     ValueError
         As `pressure.check_lines` does.
     """
-    return load_lines(pressure).gather(path_forces(pressure, points, load))
+    return lines_from_rest(pressure).gather(path_forces(pressure, points, load))
 
 
 def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Complex:
@@ -165,9 +196,8 @@ def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Compl
 
 
 def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:
-    """Orders (n,) of the harmonics of one focus along the path, or of a Tacton with a rhythm or
-    signal, that exceed a fraction of the strongest, and 0; and their largest amplitude (n,) at
-    about eight points of it.
+    """Orders (n,) of the harmonics of `path_cells` that, with all foci, exceed a fraction of the
+    strongest, and 0; and their largest amplitude (n,) at about eight points of the path.
     """
     of_spot, n = _largest_harmonics(pressure), harmonics(pressure)
     share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
@@ -188,7 +218,7 @@ def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
     """Array factor (k,) of all foci on harmonics n (k,) of one; 1 for a single focus, and where the
     harmonics are those of the Tacton.
     """
-    if pressure.tacton.is_sampled:
+    if path_cells(pressure).of_tacton:
         return np.ones(len(n), np.complex128)
     return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
 

@@ -43,21 +43,24 @@ class PathCells:
     """One repetition of a load in equal cells, `frequency` times a second.
 
     What the load does in each of k cells is `cells` (k, q) times what a focus of unit pressure does
-    at `positions` (q, 2) in metre. Without a rhythm or signal the load is one focus that runs once
-    along the path; with one, which multiplies it in time, all of the Tacton in Pa.
+    at `positions` (q, 2) in metre. That is one focus of unit pressure that runs once along the
+    path; or all `of_tacton` in Pa, where that is modulated by a rhythm or signal, or too short for
+    a path that jumps.
     """
 
     positions: Floats
     cells: sparse.csr_array
     frequency: float
+    of_tacton: bool
 
 
 @lru_cache(maxsize=4)
 def path_cells(pressure: MovingPressure) -> PathCells:
-    """Cells of a load's path or, with a rhythm or signal, of the whole Tacton."""
+    """Cells of a load's path or of the whole Tacton."""
     tacton = pressure.tacton
-    if tacton.is_sampled:
-        count = max(2, int(np.ceil(_rate(pressure) * tacton.duration)))
+    of_tacton = tacton.is_sampled or is_cut_short(pressure)
+    if of_tacton:
+        count = fft.next_fast_len(int(np.ceil(_rate(pressure) * tacton.duration)) + 1)
         jumps = np.append(jump_times(pressure, 0.0, tacton.duration), 0.0)
         times, shares = cells(jumps, 0.0, tacton.duration / count, count)
         whole, gain, frequency = pressure, pressure.gain(times), 1 / tacton.duration
@@ -68,7 +71,8 @@ def path_cells(pressure: MovingPressure) -> PathCells:
         times, gain = phases / (frequency or 1.0), np.ones(len(phases))
         whole = replace(pressure, tacton=replace(tacton, foci=(0.0,)))
     positions, mixed = moved_load(whole, times, gain)
-    return PathCells(positions=positions, cells=(shares @ mixed).tocsr(), frequency=frequency)
+    mixed = (shares @ mixed).tocsr()
+    return PathCells(positions=positions, cells=mixed, frequency=frequency, of_tacton=of_tacton)
 
 
 def moved_load(
@@ -248,17 +252,28 @@ def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats,
 
 
 def is_abrupt(pressure: MovingPressure) -> bool:
-    """Whether a load jumps at some place as its foci move, so that its lines fall off slowly.
+    """Whether a load jumps at some place as its foci move, or has levels, which may change as fast,
+    so that its lines fall off slowly.
 
     Of foci on paths of their own, which are joined, none jumps where all paths are closed.
     """
     tacton, jumps = pressure.tacton, jump_phases(pressure)
     n, path = tacton.n_paths, tacton.trajectory
     within = jumps * n - np.round(jumps * n)
-    if (np.abs(within) > SAME).any() or (len(jumps) and (n == 1 or pressure.heading)):
+    if (
+        path.levels
+        or (np.abs(within) > SAME).any()
+        or (len(jumps) and (n == 1 or pressure.heading))
+    ):
         return True
     begins, ends = path.beside(np.arange(n) / n)[1], path.beside(np.arange(1, n + 1) / n)[0]
     return bool(len(jumps) and differ(begins, ends).any())
+
+
+def is_cut_short(pressure: MovingPressure) -> bool:
+    """Whether a path that jumps takes longer than the Tacton."""
+    f_d, duration = pressure.tacton.trajectory.drawing_frequency, pressure.tacton.duration
+    return 0 < f_d * duration < 1 - SAME and is_abrupt(pressure)
 
 
 def unsampled(pressure: MovingPressure) -> MovingPressure:
@@ -286,12 +301,12 @@ def _count(pressure: MovingPressure) -> int:
         moves = (steps := np.diff(path.times)) > 0
         even = np.ptp(steps[moves]) < 1e-9 * path.times[-1]
         whole = lcm(int(moves.sum()), n) if even else 12 * n
-        if not (path.levels or is_abrupt(pressure)):
+        if not is_abrupt(pressure):
             lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
             fastest = float((lengths[moves] / steps[moves]).max())
             enough = min(KNOTS_PER_WIDTH * fastest * path.times[-1] / detail, lines)
-    if path.levels or is_abrupt(pressure):
-        enough = max(enough, lines)
+    if is_abrupt(pressure):
+        return int(fft.next_fast_len(int(np.ceil(max(enough, lines, FEWEST_KNOTS)))))
     return whole * int(np.ceil(max(enough, FEWEST_KNOTS) / whole))
 
 

@@ -1,9 +1,10 @@
-"""Foci so fast that lines of the load lie above half the sampling rate: none may fold back."""
+"""Loads faster than their samples: lines above half the rate, jumps, and ends of records."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from simple_model import (
     MovingPressure,
@@ -18,12 +19,16 @@ from simple_model import (
 )
 from simple_model.compliance import slab
 from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines, synthesise
+from simple_model.flat_quantities import from_rest, steady, surface_field
+from simple_model.focus import spot_width
+from simple_model.load_spectrum import load_lines, pressure_lines, synthesise
 from simple_model.material import PRESETS
 from simple_model.path_cells import path_fourier, path_samples
+from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
 from simple_model.sampling import resolving_step
-from skinwave import Body, Scene, simulate
-from skinwave.simulation import compute
+from simple_model.wavenumber_integral import point_response
+from skinwave import Body, Scene
+from skinwave.simulation import answered, compute
 
 PALM = slab(PRESETS["palm"], 0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
@@ -124,7 +129,7 @@ def test_the_kernel_of_ordinary_paths_is_the_load_itself(speed, am):
 def test_elements_answer_no_line_at_another_frequency():
     load = circling(0.005, 60.0)
     load = replace(load, tacton=replace(load.tacton, duration=0.4))
-    found = simulate(Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),)), "fem", h=6e-3)
+    found = answered(Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),)), "fem", h=6e-3)
     false, true = lines(found, [2360.6, 3819.7], settle=0.5)[:, 0]
     assert false < 1e-3 * true
 
@@ -136,3 +141,106 @@ def test_time_steps_resolve_a_fast_focus_and_leave_others_alone():
     brief = replace(load, tacton=replace(load.tacton, duration=0.01))
     found = compute(Scene(pressure=brief, body=SKIN), "fem-transient", h=10e-3)
     assert found.effort.steps > 0.0099 * 6 * load.tacton.drawing_frequency
+
+
+THIN = slab(PRESETS["palm"], 0.004)
+BESIDE = np.array([[0.009, 0.0], [0.013, 0.002]])
+ONE_WAY = Trajectory(shape="line", size=0.02, speed=0.05, sweep="one_way")  # 0.4 s
+
+
+def at_rest(load, times):
+    """Static deflection (t, p) under the focus where it is at each time."""
+    away = np.linalg.norm(BESIDE[:, None] - load.tacton.trajectory.position(times), axis=-1)
+    r = np.linspace(0, 0.03, 200)
+    g = point_response(THIN, r, [0.0], spot_width(0.2))[0].real
+    return load.gain(0.0) * CubicSpline(r, g)(away).T
+
+
+@pytest.mark.parametrize("model", [flat_body, steady_state])
+def test_a_slow_line_jumps_back_at_once(model):
+    load = MovingPressure(tacton=Tacton(trajectory=ONE_WAY, duration=0.44))
+    times = np.arange(4400) / 1e4
+    found, expected = model(THIN, load, BESIDE, times).displacement, at_rest(load, times)
+    settled = (np.abs(times - 0.410) > 0.010) & (np.abs(times - 0.005) > 0.005)
+    assert np.abs(found - expected)[settled].max() < 5e-3 * np.abs(expected).max()
+    late = (times > 0.38) & (times < 0.399)  # just before it, where the motion is largest
+    assert np.abs(found - expected)[late].max() < 5e-3 * np.abs(expected).max()
+
+
+def test_lines_of_a_slow_line_are_followed_to_the_band_of_bodies():
+    load = MovingPressure(tacton=Tacton(trajectory=ONE_WAY, duration=0.44))
+    times = 0.4 + np.array([-0.5, -0.1, 0.1, 0.5]) * 1e-3  # seen through 10 kHz
+    f, a = pressure_lines(load, BESIDE)
+    sine = 0.09 * load(BESIDE, [0.3999])  # what is left of a jump that is followed so far
+    assert np.abs(synthesise(f, a, times) - load(BESIDE, times)).max() < sine.max()
+
+
+def test_jumps_of_a_recording_are_where_they_are():
+    """Between samples and at the end of its period, against eight times as many samples."""
+    path = Trajectory(
+        shape="recorded", points=((0.006, 0.006), (0.006, -0.006), (-0.006, -0.006)) * 2,
+        times=(0.0, 0.01055, 0.01055, 0.01705, 0.02203, 0.02203),
+    )  # fmt: skip
+    for hold in (False, True):
+        load = MovingPressure(
+            tacton=Tacton(trajectory=replace(path, hold=hold), duration=0.06), peak_pressure=1.0
+        )
+        found, fine = (
+            flat_body(THIN, load, BESIDE, np.arange(600 * n) / (1e4 * n)).displacement[::n]
+            for n in (1, 8)
+        )
+        error = np.linalg.norm(found - fine, axis=0) / np.linalg.norm(fine, axis=0)
+        assert error.max() < 4e-3
+        steady = steady_state(THIN, load, BESIDE, np.arange(600) / 1e4).displacement
+        error = np.linalg.norm((found - steady)[300:], axis=0) / np.linalg.norm(steady, axis=0)
+        assert error.max() < 2e-3
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_rates_are_right_to_the_last_sample(order):
+    load = MovingPressure(tacton=Tacton(am_frequency=49.46, duration=0.2), peak_pressure=1.0)
+    asked = (DISPLACEMENT, VELOCITY, ACCELERATION)[order]
+    field, times = surface_field(asked, THIN), np.arange(2000) / 1e4
+    found, expected = (model(field, asked, load, BESIDE, times) for model in (from_rest, steady))
+    assert np.abs(found - expected)[1500:].max() < 1e-3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("model", [flat_body, steady_state, point_kernel])
+def test_few_samples_show_no_line_above_half_their_rate(model):
+    load, times = MovingPressure(tacton=Tacton(am_frequency=310.0)), np.arange(200) / 500
+    arguments = (load, BESIDE, times) if model is point_kernel else (THIN, load, BESIDE, times)
+    found = model(*arguments).displacement[100:]
+    assert (np.ptp(found, axis=0) < 1e-3 * np.abs(found).max(axis=0)).all()
+
+
+def test_coarse_samples_are_those_of_fine_ones():
+    load = circling(0.02, 6.0, 140.0)
+    load = replace(load, tacton=replace(load.tacton, duration=0.1))
+    f, a = steady_lines(THIN, load, BESIDE)
+    above = f > 1000
+    coarse = flat_body(THIN, load, BESIDE, np.arange(200) / 2000).displacement
+    fine = flat_body(THIN, load, BESIDE, np.arange(1000) / 1e4).displacement[::5]
+    allowed = np.abs(a[above]).sum(axis=0) + 2e-3 * np.abs(fine).max(axis=0)
+    assert (np.abs(coarse - fine).max(axis=0) < allowed).all()
+
+
+def test_lines_that_are_left_out_are_named():
+    load = MovingPressure(tacton=Tacton(am_frequency=310.0, duration=0.4))
+    scene = Scene(pressure=load, body=replace(SKIN, sides="absorbing"))
+    found = answered(scene, "flat-body-harmonic", times=np.arange(200) / 500)
+    assert np.ptp(found.values, axis=0).max() < 1e-3 * np.abs(found.values).max()
+    (said,) = [each for each in found.effort.warnings if "sampling rate" in each]
+    assert "above 250 Hz" in said
+    assert "f_AM at 310 Hz and 1 more" in said
+    cured = answered(scene, "flat-body-harmonic", times=np.arange(400) / 1300)
+    assert not any("sampling rate" in each for each in cured.effort.warnings)
+
+
+def test_every_model_answers_at_the_times_asked_for():
+    load = circling(0.005, 6.0)
+    load = replace(load, tacton=replace(load.tacton, duration=0.02))
+    times = 0.005 + np.arange(30) / 2e3
+    for model in ("point-kernel", "flat-body", "flat-body-harmonic", "fem", "fem-transient"):
+        body = replace(SKIN, sides="absorbing") if "flat" in model else SKIN
+        found = compute(Scene(pressure=load, body=body), model, times=times, h=10e-3)
+        np.testing.assert_allclose(found.times, times, atol=1e-12)

@@ -16,7 +16,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.compliance import AIR_DENSITY
 from simple_model.free_modes import free_modes
-from simple_model.load_spectrum import Complex, load_lines, synthesise
+from simple_model.load_spectrum import Complex, lines_from_rest, synthesise
 from simple_model.plate_modes import (
     Plate,
     PlateModes,
@@ -112,7 +112,7 @@ def _driven(scene: Scene, request: Request) -> Driven:
     modes: PlateModes = _modes(plate_of(body))
     request.report("lines", 0.0)
     middle = body.placement.offset
-    f, forces = load_lines(pressure).gather(modal_path_forces(modes, pressure, middle))
+    f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
     below = below_half_the_rate(f, request.times)
     return Driven(
         modes=modes, frequencies=f[below], forces=forces[below],
