@@ -159,12 +159,12 @@ def _add_loss(draw: random.Random, found: Table, modulus: float) -> None:
         share, when = draw.uniform(0.1, 0.8), _number(draw, 2e-4, 1e-2)
         found["prony"] = [{"modulus_pa": float(f"{share * modulus:.3g}"), "time_s": when}]
     else:
-        found["law"] = draw.choice(["fractional_kelvin_voigt", "fractional_zener"])
+        found["law"] = draw.choice(["fractional-kelvin-voigt", "fractional-zener"])
         found |= {
             "exponent": round(draw.uniform(0.15, 0.9), 2),
             "time_s": _number(draw, 1e-4, 2e-3),
         }
-        if found["law"] == "fractional_zener":
+        if found["law"] == "fractional-zener":
             found["fast_modulus_pa"] = float(f"{modulus * draw.uniform(1.5, 5):.3g}")
 
 
