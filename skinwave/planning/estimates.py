@@ -6,9 +6,11 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Trajectory
-from simple_model.flat_body import flat_body, steady_lines
+from simple_model.flat_body import steady_lines
+from simple_model.flat_quantities import from_rest, surface_field
 from simple_model.focus import gaussian_width, spot_width
 from simple_model.load_spectrum import Complex, load_lines, merge_lines
+from simple_model.quantities import DISPLACEMENT
 from simple_model.trajectory import BY_POINTS
 from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
@@ -20,6 +22,8 @@ REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer ar
 # viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80 to
 # 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
 IN_STEP, OVERDAMPED = 2.0, 1.5
+UNHELD = 2.0  # times that of a body whose base is not clamped: small plates had up to 2.3
+NO_BOUND = 2.0  # relative to the larger of two waveforms, which no difference of them exceeds
 FAR = 0.25  # m, beyond which waves are neglected
 FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: duration and sampling rate of the estimate
 
@@ -87,8 +91,8 @@ def _width(pressure: MovingPressure) -> float | None:
 
 
 def side_reflections(scene: Scene) -> float:
-    """Edge reflections at the probes relative to their motion in an infinite body, at most 1, for
-    the first `FOLLOWED`.
+    """Edge reflections at the probes relative to their motion in an infinite body, for the first
+    `FOLLOWED`; at most `NO_BOUND`, which also stands for an unknown reflection.
 
     The reflection of a side at a probe is the motion of an infinite body at the probe's mirror
     image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
@@ -102,15 +106,21 @@ def side_reflections(scene: Scene) -> float:
         return 0.0
     known = scene.load.is_normal  # what returns of another load is not estimated
     if not known or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
-        return 1.0
+        return NO_BOUND
     duration = min(scene.tacton.duration, FOLLOWED)
     times = np.arange(max(2, round(duration * FOLLOWED_AT))) / FOLLOWED_AT
     seen = np.vstack([probes, *images])
-    u = flat_body(compliance(body), scene.pressure, seen, times).displacement
+    # Below the surface, and of components, about as of the displacement at the surface.
+    asked = scene.reading.asked if scene.reading.asked.is_normal else DISPLACEMENT
+    u = from_rest(surface_field(asked, compliance(body)), asked, scene.pressure, seen, times)
     own, *returned = (u**2).mean(axis=0).reshape(-1, len(probes))
     share = float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)
-    return min(1.0, IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share)
+    back = IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share
+    if body.base != "clamped":
+        # Waves of all frequencies go on, from side to side, and bend the body as a whole.
+        back = UNHELD * back / max(1 - UNHELD * back, UNHELD * back / NO_BOUND)
+    return min(NO_BOUND, back)
 
 
 def _loss_at_cut_off(body: Body) -> float:

@@ -23,6 +23,7 @@ from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, sample_times
 from skinwave.planning.estimates import (
+    NO_BOUND,
     cutoff_frequency,
     has_wavenumber_solution,
     response_spectrum,
@@ -140,7 +141,7 @@ def plan(
             f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    returned = side_reflections(scene) if has_wavenumber_solution(scene) else 1.0
+    returned = side_reflections(scene) if has_wavenumber_solution(scene) else NO_BOUND
     exact = returned <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene)
     if asked.is_infinite if asked else exact:
         found = _without_mesh(scene, tolerance, asked, highest, returned, rows, times)
@@ -317,7 +318,5 @@ def _why_elements(scene: Scene, returned: float) -> str:
         return f"the {body.sides} sides of this sheet reflect; the wavenumber integral has no sides"
     if body.sides == "absorbing":
         return "as asked; this body has a wavenumber integral, too"
-    return (
-        f"the {body.sides} sides reflect about {100 * returned:.3g} %; "
-        "the wavenumber integral has no sides"
-    )
+    reflected = f"about {100 * returned:.3g} %" if returned < 1 else "as much as the load causes"
+    return f"the {body.sides} sides reflect {reflected}; the wavenumber integral has no sides"
