@@ -164,7 +164,8 @@ class Scene:
                 "elements are of another thickness, with another moment about its middle; take a "
                 "slab"
             )
-        if self.load.gravity and self.body.of_kind.discretise and not self.body.is_held:
+        held = self.body.is_held and not self.body.is_on_half_space  # which sags without bound
+        if self.load.gravity and self.body.of_kind.discretise and not held:
             raise ValueError(
                 "an unconstrained body falls under gravity; clamp its base or its sides, or leave "
                 "gravity out"

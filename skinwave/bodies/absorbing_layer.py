@@ -1,42 +1,111 @@
-"""Absorbing (sponge) layer around a slab: its grid lines and its damping profile."""
+"""Absorbing (sponge) layer around and below a slab: grid lines, damping profile and far springs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from fem.boundary import Support
+from fem.load_and_probe import facet_normals, facet_points
 from meshes import Grading, TetMesh, graded_axis
 from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
 
-# An absorbing (sponge) layer around absorbing sides; its mass-proportional damping rises with the
-# square of the distance: dashpots alone reflect a quarter of a shear wave at 30 degrees. Near the
-# cut-on of a slab on a rigid base, c_s/(4 depth), waves are long, and only a wide layer absorbs
-# them. Its cells may grow fast. The reflection of a plane slab of 50 mm is at most 1.4 % of the
-# motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.sides`).
-LAYER_WIDTH, LAYER_DRAG = 7.0, 0.35  # of the depth; of the angular frequency of cut-on
-LAYER_GROWTH, LAYER_COARSEST = 1.4, 2.0  # from cell to cell; of the depth
 LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs carry below it is still near field at their sides
 
 
+@dataclass(frozen=True, kw_only=True)
+class AbsorbingLayer:
+    """Absorbing layer of a `width` in metre. Its mass-proportional damping rises with the square of
+    the distance, up to `drag` in 1/s; its cells grow by `growth` from one to the next, up to
+    `coarsest` in metre.
+    """
+
+    width: float
+    drag: float
+    growth: float
+    coarsest: float
+
+
 def has_layer(body: Body) -> bool:
-    """Whether an absorbing layer is meshed around a body."""
-    return body.of_kind.is_layer and "absorbing" in body.conditions
+    """Whether an absorbing layer is meshed around or below a body."""
+    return body.of_kind.is_layer and "absorbing" in (body.base, *body.conditions)
 
 
-def layer_scale(body: Body) -> float:
-    """Reference length of an absorbing layer, metre: the depth, at most that of `LOWEST_CUT_ON`."""
-    return min(body.depth, body.solid.shear_speed / (4 * LOWEST_CUT_ON))
+def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
+    """Absorbing layer of a slab.
+
+    Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
+    depth, at most that whose first mode cuts on at `LOWEST_CUT_ON`. On a rigid base waves are long
+    near the cut-on, and decay below it: the reflection of a plane slab of 50 mm is at most 1.4 % of
+    the motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.sides`). A
+    free or elastic base has bending waves at any frequency, which a layer has to damp alone. Above
+    an absorbing base waves are spherical, and as long as those of the lowest material.
+
+    Parameters
+    ----------
+    body : Body, a slab
+    wider : how many times as wide the layer is, for estimates of what it reflects
+
+    Returns
+    -------
+    AbsorbingLayer
+    """
+    speed = body.solid.shear_speed
+    longest = speed / (4 * LOWEST_CUT_ON)
+    scale = longest if body.base == "absorbing" else min(body.depth, longest)
+    # Width, and coarsest cell, over that scale; damping over the angular frequency of cut-on.
+    width, coarsest, drag, growth = {
+        "clamped": (7.0, 2.0, 0.35, 1.4),
+        "absorbing": (13.0, 3.0, 0.25, 1.5),
+    }.get(body.base, (20.0, 4.0, 0.25, 1.5))
+    return AbsorbingLayer(
+        width=wider * width * scale, drag=drag * 2 * np.pi * speed / (4 * scale),
+        growth=growth, coarsest=coarsest * scale,
+    )  # fmt: skip
 
 
-def layer_line(body: Body, half: Floats) -> Floats:
+def layer_line(layer: AbsorbingLayer, half: Floats) -> Floats:
     """Grid lines of the absorbing layer, from where the body ends."""
-    scale = layer_scale(body)
-    grading = Grading(radius=0.0, growth=LAYER_GROWTH, coarsest=LAYER_COARSEST * scale)
-    first = min(LAYER_GROWTH * (half[-1] - half[-2]), grading.coarsest)
-    return graded_axis(LAYER_WIDTH * scale, first, grading)[1:]
+    grading = Grading(radius=0.0, growth=layer.growth, coarsest=layer.coarsest)
+    first = min(layer.growth * (half[-1] - half[-2]), layer.coarsest)
+    return graded_axis(layer.width, first, grading)[1:]
 
 
-def layer_drag(body: Body, mesh: TetMesh) -> Floats:
+def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
     """Damping profile (m,) in 1/s of the absorbing layer: 0 in the body, quadratic beyond it."""
-    scale, ends = layer_scale(body), np.array([body.width, body.height]) / 2
-    middles = np.abs(mesh.points[mesh.tets[:, :4], :2].mean(axis=1))
-    beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / (LAYER_WIDTH * scale)
-    return LAYER_DRAG * 2 * np.pi * body.solid.shear_speed / (4 * scale) * beyond**2
+    ends = np.array([body.width / 2, body.height / 2, body.depth])
+    middles = np.abs(mesh.points[mesh.tets[:, :4]].mean(axis=1))
+    beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / layer.width
+    return layer.drag * beyond**2
+
+
+def far_springs(body: Body, mesh: TetMesh) -> Support:
+    """Springs at the end of the absorbing layer of a body on a half-space.
+
+    The half-space beyond resists as it does where a force acts at the origin: of incompressible
+    tissue the traction is radial, 3 P c / (2 pi r^2) with the cosine c of the angle to the force,
+    and the displacement P / (4 pi mu r) times 2 c radially and sin normal to it (Johnson, Contact
+    Mechanics (1985), section 3.2). Springs in all directions have the work of both, which for a
+    normal n is
+
+        k = 12 mu c^2 |n r| / (r (1 + 3 c^2))    with the unit vector r from the origin
+
+    Parameters
+    ----------
+    body : Body, a slab
+    mesh : TetMesh, with its absorbing layer
+
+    Returns
+    -------
+    Support
+    """
+    facets = np.vstack([mesh.facets[name] for name in ("bottom", "sides")])
+    points, normals = facet_points(mesh, facets), facet_normals(mesh, facets).reshape(-1, 3)
+    away = np.linalg.norm(points, axis=1)
+    outward = points / away[:, None]
+    squared = outward[:, 2] ** 2
+    across = np.abs((outward * normals).sum(axis=1))
+    k = 12 * body.solid.shear_modulus * squared * across / (away * (1 + 3 * squared))
+    return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))

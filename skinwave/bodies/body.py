@@ -244,7 +244,15 @@ class Body:
     @property
     def is_held(self) -> bool:
         """Whether it is constrained: at its base, or clamped at one of its sides."""
-        return self.base in ("clamped", "elastic") or "clamped" in self.conditions
+        at_base = self.base in ("clamped", "elastic") or self.is_on_half_space
+        return at_base or "clamped" in self.conditions
+
+    @property
+    def is_on_half_space(self) -> bool:
+        """Whether it is a slab whose base and sides all absorb: part of a half-space, which resists
+        a force at rest.
+        """
+        return self.of_kind.is_layer and {self.base, *self.conditions} == {"absorbing"}
 
     @property
     def is_skin(self) -> bool:

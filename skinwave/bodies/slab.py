@@ -10,7 +10,13 @@ from meshes.shapes.equidistributed import Lines
 from meshes.shapes.structured import check_size, with_planes
 from meshes.tetmesh import Floats, Ints
 from simple_model.compliance import layered
-from skinwave.bodies.absorbing_layer import has_layer, layer_drag, layer_line
+from skinwave.bodies.absorbing_layer import (
+    far_springs,
+    has_layer,
+    layer_drag,
+    layer_line,
+    layer_of,
+)
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers
@@ -23,9 +29,11 @@ SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
 GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 
-def discretise(body: Body, h: float) -> Discretised:
-    """Structured mesh whose elements follow the layers, with any absorbing layer around it."""
-    return on_lines(body, body_lines(body, h))
+def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
+    """Structured mesh whose elements follow the layers, with any absorbing layer around and below
+    it, `wider` times as wide as usual.
+    """
+    return on_lines(body, body_lines(body, h), wider)
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
@@ -45,17 +53,20 @@ def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
     return lambda body, h: on_lines(body, (x, y, -np.interp(-z, before, body.interfaces)))
 
 
-def on_lines(body: Body, lines: Lines) -> Discretised:
+def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
     """Structured mesh on grid lines (n,) in metre through the body, with any absorbing layer around
-    it; planes between its layers are met instead of lines that are close to them.
+    and below it; planes between its layers are met instead of lines that are close to them.
     """
     x, y, z = lines
     planes = [-start for start, _ in body.strata[1:]]
-    mesh = extrude(*_extended(body, x, y), with_planes(z, planes))
+    mesh = extrude(*_extended(body, (x, y, with_planes(z, planes)), wider))
     depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh, materials = in_layers(mesh, body.strata, depths)
-    drag = partial(layer_drag, body) if has_layer(body) else None
-    return Discretised(mesh=mesh, materials=materials, drag=drag)
+    return Discretised(
+        mesh=mesh, materials=materials,
+        drag=partial(layer_drag, body, layer_of(body, wider)) if has_layer(body) else None,
+        support=partial(far_springs, body) if body.is_on_half_space else None,
+    )  # fmt: skip
 
 
 def body_lines(body: Body, h: float) -> Lines:
@@ -67,8 +78,7 @@ def body_lines(body: Body, h: float) -> Lines:
 
 def slab_lines(body: Body, h: float) -> Lines:
     """The same with those of any absorbing layer."""
-    x, y, z = body_lines(body, h)
-    return *_extended(body, x, y), z
+    return _extended(body, body_lines(body, h))
 
 
 def cells(lines: Lines, mesh: TetMesh) -> Ints:
@@ -80,19 +90,21 @@ def cells(lines: Lines, mesh: TetMesh) -> Ints:
     ])  # fmt: skip
 
 
-def _extended(body: Body, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Grid lines through a body along x and y, with an absorbing layer where an end has one."""
+def _extended(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
+    """Grid lines through a body, with an absorbing layer where an end has one."""
     if not has_layer(body):
-        return x, y
-    return _beyond(body, x, "left", "right"), _beyond(body, y, "front", "back")
+        return lines
+    layer, (x, y, z) = layer_of(body, wider), lines
 
+    def beyond(line: Floats, end: str) -> Floats:
+        return line[-1] + layer_line(layer, line) if end == "absorbing" else line[:0]
 
-def _beyond(body: Body, line: Floats, low: str, high: str) -> Floats:
-    before, after = (
-        end[-1] + layer_line(body, end) if body.side(name) == "absorbing" else end[:0]
-        for name, end in ((low, -line[::-1]), (high, line))
-    )
-    return np.concatenate([-before[::-1], line, after])
+    def both(line: Floats, low: str, high: str) -> Floats:
+        before, after = beyond(-line[::-1], body.side(low)), beyond(line, body.side(high))
+        return np.concatenate([-before[::-1], line, after])
+
+    below = beyond(-z[::-1], body.base)
+    return both(x, "left", "right"), both(y, "front", "back"), np.concatenate([-below[::-1], z])
 
 
 def _depth_line(body: Body, h: float) -> Floats:

@@ -9,6 +9,7 @@ from fem.affine import AffineOperators, Solids, assemble_affine
 from fem.materials import Material
 from meshes.tetmesh import Floats
 from skinwave.bodies import Body
+from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.build import Build
 from skinwave.bodies.sheet import air, bending_equivalent
 from skinwave.models.free_keys import FreeKey, Part, solid_at
@@ -109,19 +110,26 @@ def solids_of(reference: Reference, body: Body) -> Solids:
     a thickness that they stand for.
     """
     own = [solid_at(body, part) for part in reference.parts]
-    before, now = reference.body.solid, body.solid
-    # A modulus law has its own in a Prony series, which takes time to fit.
-    resting = (reference.body.softest, body.softest) if reference.is_sprung else ()
-    held = [m.shear_modulus + m.fast_modulus for m in resting]
+    bodies = (reference.body, body)
+    springs = [_spring_modulus(each) for each in bodies] if reference.is_sprung else [1.0, 1.0]
+    drag = [layer_of(each).drag if has_layer(each) else 1.0 for each in bodies]
     meshed = [_times(m, *f) for m, f in zip(own, reference.factors, strict=True)]
     if body.of_kind.equivalent:
         thinner = body.depth / reference.body.depth
         meshed = [bending_equivalent(m, thinner) for m in meshed]
     return Solids(
         materials=tuple(meshed),
-        springs=held[1] / held[0] if held else 1.0,
-        drag=now.shear_speed / before.shear_speed,
+        springs=springs[1] / springs[0],
+        drag=drag[1] / drag[0],
     )
+
+
+def _spring_modulus(body: Body) -> float:
+    """Modulus in Pa that the springs below a body go with: at rest those of a half-space."""
+    if body.is_on_half_space:
+        return body.solid.shear_modulus
+    # A modulus law has its own in a Prony series, which takes time to fit.
+    return body.softest.shear_modulus + body.softest.fast_modulus
 
 
 def _factors(meshed: Material, solid: Material) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.planning.boundaries import absorbing_error
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
     about_its_rest,
@@ -92,7 +93,8 @@ def told(
     fine = about_its_rest(scene, fine)
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
     _, error = convergence(meshed or body, (other, size), (found, fine), tolerance, same=same)
-    error += series_error(scene, response.model, tolerance, coarse)
+    error += coarse.effort.estimate + series_error(scene, response.model, tolerance, coarse)
+    error += absorbing_error(scene, body, tolerance, solver=solver)
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)

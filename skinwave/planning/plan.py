@@ -22,6 +22,7 @@ from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, sample_times
+from skinwave.planning.boundaries import absorbing_error, extended
 from skinwave.planning.estimates import (
     NO_BOUND,
     cutoff_frequency,
@@ -155,8 +156,12 @@ def plan(
         return replace(found, rows=tuple(rows))
     body: Body = scene.body
     cut: list[PlanRow] = []
-    if model is None or h is None:  # else all of it is meshed, as asked
+    if model is None or h is None:
         body, cut = extent(scene, tolerance, highest)
+        body, at_ends, more = extended(scene, body, tolerance, progress, solver=solver)
+        cut = more or cut
+    else:  # all of it is meshed, as asked
+        at_ends = absorbing_error(scene, body, tolerance, progress, solver=solver)
     rows += [
         PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
         *cut,
@@ -164,11 +169,12 @@ def plan(
     reduced = asked is None or asked.is_reduced
     axes = symmetry(scene) if reduced else ""
     goal = reduced and h is None and has_goal_oriented(scene, body)
+    for_mesh = max(tolerance - at_ends, tolerance / 2)
     try:
         if goal:
-            mesh = goal_refined(scene, body, tolerance, progress, symmetry=axes, solver=solver)
+            mesh = goal_refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver)
         else:
-            mesh = refined(scene, body, tolerance, progress, symmetry=axes, solver=solver, h=h)
+            mesh = refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver, h=h)
     except fem.NotReduced as error:
         limit = Limit(why=f"cannot reduce this body: {error}")
         raise refusal(scene, named(model or "fem"), [limit]) from None
@@ -178,12 +184,13 @@ def plan(
     start = start_left_out(scene, asked, mesh.prepared, times) if asked else 0.0
     found = Plan(
         model=model or "fem", body=body, symmetry=axes, h=mesh.h, highest=highest,
-        error=mesh.error + step_error + start,
+        error=mesh.error + mesh.prepared.effort.estimate + at_ends + step_error + start,
         seconds=sum(mesh.prepared.effort.seconds.values()),
         memory=mesh.prepared.effort.peak_memory,
         rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
         warnings=(
             *of_mesh(scene, mesh, tolerance),
+            *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *start_over_tolerance(asked, start, tolerance),

@@ -6,7 +6,7 @@ import numpy as np
 
 import fem
 import meshes
-from skinwave.bodies.absorbing_layer import layer_drag
+from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.slab import slab_lines
 from skinwave.scene import Body
 from skinwave.verify.case import Case, Plot, below
@@ -46,7 +46,7 @@ def _motion(body: Body, *, layer: bool) -> fem.Complex:
     mesh = meshes.half(meshes.extrude(x, [0, H], z), "x")
     ops = fem.assemble(
         mesh, body.solid, fixed={"bottom": "xyz", "mirror_x": "x", "front": "y", "back": "y"},
-        absorbing="right", drag=layer_drag(body, mesh) if layer else None,
+        absorbing="right", drag=layer_drag(body, layer_of(body), mesh) if layer else None,
     )  # fmt: skip
     x = fem.facet_points(mesh)[:, 0]
     force = fem.load_operator(mesh) @ np.exp(-(x**2) / (2 * WIDTH**2))
