@@ -4,8 +4,8 @@ A coarse mesh and its dual solutions say where elements leave that error (`skinw
 Sizes that spread it evenly, of as many elements as the tolerance needs, make the next mesh: those
 along each axis of a structured mesh (`goal_lines`), or those of tetrahedra that fill a surface
 (`goal_sizes`). The estimate itself is not trusted: as with uniform meshes the error is extrapolated
-from the change of the waveforms between two meshes, by the predicted ratio of their errors in the
-place of that of their element sizes.
+from the change of the waveforms between two meshes, as if the finer one were finer everywhere: the
+predicted ratio of their errors was too good by up to 2.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,6 @@ from skinwave.planning.refinement import (
     finer_sizes,
     quantity_of_interest,
     refined,
-    relative_change,
 )
 from skinwave.scene import Body, Scene
 
@@ -150,7 +149,7 @@ def _goal_refined(
     for _ in range(MESHES):
         wanted = np.clip(AIM * tolerance / max(error, 1e-300), LEAST_ALIKE, MOST_ALIKE)
         last = tried(known.finer(before.mesh.ratio * float(wanted), before.mesh, most))
-        error, compared = family.safety * _extrapolated(before, last), before
+        error, compared = _extrapolated(before, last), before
         if error <= tolerance or last.dofs >= most / 2:
             break
         before = last
@@ -163,12 +162,11 @@ def _goal_refined(
 
 
 def _extrapolated(before: _Trial, last: _Trial) -> float:
-    """Relative error of the second of two meshes: e2 = r e1 and e1 <= change + e2 of the worst
-    probe, for the predicted ratio r.
+    """Relative error of the second of two meshes, as of uniform ones of as many degrees of
+    freedom.
     """
-    alike = last.mesh.ratio / before.mesh.ratio
-    change = relative_change(before.found, last.found)
-    return change * alike / (1 - alike) if alike < 1 else 1.0
+    finer = (last.dofs / before.dofs) ** (1 / 3)
+    return CONTROLLER.error(before.found, last.found, finer) if finer > 1 else 1.0
 
 
 def strongest(scene: Scene, prepared: Prepared) -> tuple[Floats, Floats]:
