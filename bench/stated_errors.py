@@ -1,8 +1,8 @@
 """Errors that `fem` states, beside true ones: `python -m bench.stated_errors [N] [SEED]`.
 
-Small random scenes: bodies of most supports and of one to three layers under random Tactons, read at random probes, weak
-ones among them. The reference has elements half as large on the body that the plan models. A scene
-fails if its true error is more than 1.1 times the stated one; a table says which.
+Small random scenes: bodies of most supports and of one to three layers under random Tactons, read
+at random probes, weak ones among them. The reference has elements half as large on the body that
+the plan models. A scene fails if its true error is more than 1.1 times the stated one.
 """
 
 import sys
@@ -32,7 +32,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
     def material() -> Material:
         shear = rng.uniform(8e3, 4e4)
         return Material(
-            density=1000.0, shear_modulus=shear, poisson=rng.choice([0.45, 0.49, 0.4999]),
+            density=1000.0, shear_modulus=shear, poisson=float(rng.choice([0.45, 0.49, 0.4999])),
             viscosity=shear * rng.uniform(1e-4, 4e-4),
         )  # fmt: skip
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fem
+from bench.stated_errors import MOST, stated_and_true
 from meshes import cache
 from simple_model import Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
@@ -200,7 +201,7 @@ def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
 
 
 def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolated_exactly():
-    controller = SizeController(order=2.0, safety=0.5, largest_factor=1.6)
+    controller = SizeController(order=2.0, margin=1.0, safety=0.5, largest_factor=1.6)
     limit = np.array([[3.0, -2.0], [4.0, 1.0]])
 
     def found(h):  # of which the change is the error itself
@@ -552,3 +553,46 @@ def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypat
 def test_a_scene_without_a_body_has_nothing_to_trade():
     with pytest.raises(ValueError, match="give it a sheet or a slab"):
         study(loads("[body]\nkind = 'none'"), lambda phase, fraction: None)
+
+
+FREE = """
+[tacton]
+am_frequency_hz = 226
+duration_s = 0.09
+[body]
+size_x_mm = 29.3
+size_y_mm = 20
+thickness_mm = 9.9
+base = "free"
+sides = "clamped"
+material = {density_kg_m3 = 1000, shear_modulus_pa = 30100, poisson = 0.4999, viscosity_pa_s = 4.3}
+[probes]
+points_mm = [[-5.3, 8.7], [-0.5, -1.1], [-7.7, -1.3]]
+"""
+LAYERS = """
+[tacton]
+am_frequency_hz = 136
+duration_s = 0.041
+[body]
+size_x_mm = 21
+size_y_mm = 24.4
+thickness_mm = 8.5
+sides = "clamped"
+material = {density_kg_m3 = 1000, shear_modulus_pa = 20500, poisson = 0.49, viscosity_pa_s = 6.4}
+[[body.layers]]
+thickness_mm = 1.8
+material = {density_kg_m3 = 1000, shear_modulus_pa = 23400, poisson = 0.4999, viscosity_pa_s = 4.8}
+[[body.layers]]
+thickness_mm = 1.8
+material = {density_kg_m3 = 1000, shear_modulus_pa = 26300, poisson = 0.49, viscosity_pa_s = 7.5}
+[probes]
+points_mm = [[0.8, 7.6], [1.1, 4.4], [8.0, 6.2]]
+"""
+
+
+@pytest.mark.parametrize("text", [FREE, LAYERS])
+def test_true_errors_of_small_bodies_are_as_stated(text):
+    """Whose short sides have few cells, and with jumps of material."""
+    stated, true = stated_and_true(loads(text), 0.1)
+    assert true < MOST * stated
+    assert stated < 0.1

@@ -24,8 +24,13 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.hands import support
 from skinwave.models.free_keys import FreeKey, with_values
 from skinwave.models.loads import surface_load
+from skinwave.models.prepared import answer, prepare
+from skinwave.planning.boundaries import absorbing_error
 from skinwave.planning.estimates import side_reflections
 from skinwave.planning.extent import symmetry
+from skinwave.planning.plan import plan
+from skinwave.scene import Load
+from skinwave.simulation import compute
 from skinwave.sweeps.variation import varied
 
 SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
@@ -150,6 +155,40 @@ def test_a_side_that_absorbs_stands_for_more_of_the_body():
         found.append(fem.probe_operator(made.mesh, probes) @ u)
         assert made.fixed == {"bottom": "xyz", "left": "xyz"}
     assert np.abs(found[0] - found[1]).max() < 0.01 * np.abs(found[1]).max()
+
+
+def errors_beside_the_wavenumber_integral(scene, found):
+    exact = compute(scene, "flat-body").values
+    return np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0)
+
+
+def test_an_absorbing_base_stands_for_a_half_space():
+    """From rest and with the mean, at 20 Hz, where a wave is 250 mm long."""
+    scene = loads(
+        "[tacton]\nam_frequency_hz = 20\nduration_s = 0.06\n[body]\nbase = 'absorbing'\n"
+        "size_x_mm = 30\nsize_y_mm = 30\nthickness_mm = 12\n[probes]\npoints_mm = [[0, 0], [12, 0]]"
+    )
+    prepared = prepare(scene.body, scene.probe_points, h=10e-3, symmetry="xy")
+    found = answer(prepared, scene).values
+    assert errors_beside_the_wavenumber_integral(scene, found).max() < 0.08
+    with pytest.raises(ValueError, match="gravity"):
+        replace(scene, load=Load(gravity=9.81))
+
+
+def test_reflections_of_sides_above_springs_are_in_the_stated_error():
+    scene = loads(
+        "[tacton]\nam_frequency_hz = 212\nduration_s = 0.05\nsuperposition = [1.0, 0.0]\n"
+        "[body]\nsize_x_mm = 24\nsize_y_mm = 24\nthickness_mm = 2.6\nbase = 'elastic'\n"
+        "base_stiffness_n_per_m3 = 1.83e6\nmaterial = {density_kg_m3 = 1000, "
+        "shear_modulus_pa = 9290, poisson = 0.45, viscosity_pa_s = 0.84}\n"
+        "[probes]\npoints_mm = [[9, 0], [0, 6]]"
+    )
+    found = plan(scene, 0.1, model="fem", h=2.6e-3)
+    true = errors_beside_the_wavenumber_integral(scene, answer(found.prepared, scene).values)
+    assert true.max() < 0.1
+    assert true.max() < 1.1 * found.error
+    assert absorbing_error(scene, scene.body) > 0.003
+    assert absorbing_error(scene, replace(scene.body, sides="clamped")) == 0
 
 
 def test_only_sides_that_reflect_count_as_reflecting():

@@ -28,8 +28,10 @@ from skinwave.planning.refinement import (
     CONTROLLER,
     Convergence,
     Refined,
+    cell_count,
     element_sizes,
     finer_sizes,
+    mean_ratio,
     quantity_of_interest,
     refined,
 )
@@ -162,11 +164,15 @@ def _goal_refined(
 
 
 def _extrapolated(before: _Trial, last: _Trial) -> float:
-    """Relative error of the second of two meshes, as of uniform ones of as many degrees of
-    freedom.
-    """
-    finer = (last.dofs / before.dofs) ** (1 / 3)
+    """Relative error of the second of two meshes, as of uniform ones of as many cells."""
+    finer = mean_ratio(_size(before), _size(last))
     return CONTROLLER.error(before.found, last.found, finer) if finer > 1 else 1.0
+
+
+def _size(trial: _Trial) -> int:
+    """Cells of a mesh on grid lines, without any absorbing layer; or degrees of freedom."""
+    follows = trial.mesh.follows
+    return cell_count(follows) if isinstance(follows, tuple) else trial.dofs
 
 
 def strongest(scene: Scene, prepared: Prepared) -> tuple[Floats, Floats]:
