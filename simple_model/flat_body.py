@@ -36,7 +36,6 @@ from simple_model.load_spectrum import load_lines, synthesise
 from simple_model.material import Complex
 from simple_model.path_cells import (
     cells,
-    is_abrupt,
     jump_times,
     moved_load,
     path_fourier,
@@ -44,7 +43,7 @@ from simple_model.path_cells import (
 )
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.response import Effort, Response, step
-from simple_model.sampling import below_half_the_rate, finer, reached
+from simple_model.sampling import SLOWEST, below_half_the_rate, finer, is_folded, reached
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import Field, normal_field, point_integrals
 
@@ -53,7 +52,6 @@ if TYPE_CHECKING:
 
 PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
 WRAPPED = 1e-5  # damped by this
-SLOWEST = 10_000.0  # Hz of its samples
 ABRUPT = 4  # samples of a load that jumps, or turns, in each of these
 ENDING = 6.0  # of the error function that ends a load after the record
 FEW_DISTANCES = 40  # are integrated one by one, without a spline
@@ -261,9 +259,9 @@ def field_history(
         ended = erfc(ENDING * (2 * after - 1)) / 2
         return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
 
-    sampled, jumps = pressure.tacton.is_sampled, jump_times(pressure, 0.0, padded * dt)
+    jumps = jump_times(pressure, 0.0, padded * dt)
     parts = finer(reached(pressure), dt)
-    if within > 1 or (parts > 1 and not (sampled or is_abrupt(pressure))):
+    if is_folded(pressure, times):
         knots, of_load = _low_passed(pressure, 0.5 / step(times), padded, dt, lasting)
         parts = 1
     else:

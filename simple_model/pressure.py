@@ -110,13 +110,10 @@ class MovingPressure:
         """Name of the focal spot, "own" if it has none."""
         return self.profile if isinstance(self.profile, str) else "own"
 
-    def __call__(self, points: ArrayLike, t: ArrayLike, over: float = 0.0) -> Floats:
-        """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s.
-
-        `over` s: see `gain`.
-        """
+    def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
+        """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s."""
         t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)
-        path, gain = self.tacton.trajectory, self.gain(t, over).ravel()
+        path, gain = self.tacton.trajectory, self.gain(t).ravel()
         phases = [np.mod(path.phase(t).ravel() + ahead, 1.0) for ahead in self.tacton.foci]
         weighted = bool(path.levels or self.heading)
         gains = [gain * self.weight(phase) if weighted else gain for phase in phases]

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simple_model.load_spectrum import ALIASED, gain_orders
-from simple_model.path_cells import highest_passing
+from simple_model.path_cells import highest_passing, is_abrupt
 from simple_model.pressure import MovingPressure
 from simple_model.response import step
 from simple_model.tacton import tones
 from simple_model.trajectory import Floats
 
+SLOWEST = 10_000.0  # Hz of samples that show all of a body's motion
 PER_PERIOD = 8  # samples of the highest frequency, so that its start is accurate, too
 REACH = 128  # samples on either side that a low pass weighs: it ends within 2 % of half the rate
 STOP_BAND = ("kaiser", 10.0)  # 100 dB down
@@ -64,6 +65,25 @@ def finer(highest: float, dt: float) -> int:
 def below_half_the_rate(frequencies: Floats, times: Floats) -> NDArray[np.bool_]:
     """Mask (f,) of frequencies (f,) in Hz that equally spaced times (t,) in s show as they are."""
     return np.asarray(frequencies < 0.5 / step(times))
+
+
+def is_folded(pressure: MovingPressure, times: Floats) -> bool:
+    """Whether a load may have lines above half the rate of times (t,) in s that count: of jumps and
+    pulses those above half of 10 kHz do not.
+    """
+    if not isinstance(pressure, MovingPressure):
+        return False
+    dt = step(times)
+    if dt * SLOWEST > 1 + 1e-6:
+        return True
+    return finer(reached(pressure), dt) > 1 and not (
+        pressure.tacton.is_sampled or is_abrupt(pressure)
+    )
+
+
+def highest_driving(pressure: MovingPressure, times: Floats) -> float:
+    """Frequency in Hz below which lines of a load move a body at all, at times (t,) in s."""
+    return 0.5 / step(times) if is_folded(pressure, times) else np.inf
 
 
 def fold_parts(pressure: MovingPressure, times: Floats) -> int:

@@ -23,7 +23,7 @@ from skinwave.fits.fit import fit
 from skinwave.fits.predicted import predicted_lines, predicted_waveforms, target
 from skinwave.load import LOADS, Load, LoadKind, register
 from skinwave.measurements import Measurement
-from skinwave.models.loads import loads_at, surface_load
+from skinwave.models.loads import load_in_steps, surface_load
 from skinwave.models.prepared import answer, components, prepare
 from skinwave.patterns.conversion import write_pattern
 from skinwave.patterns.pattern import Options
@@ -178,7 +178,7 @@ def test_models_agree_on_loads_beside_pressure(text):
     made = build(scene.body, H)
     P, points = surface_load(made, scene.load)
     assert P.shape[1] == 2 * len(points)
-    q = loads_at(scene.loads, points, 0.0123, 0.0)
+    q = load_in_steps(scene.loads, points, np.arange(200) / 1e4, 5e-5)(0.0123)
     x, y = np.split(q, 2)
     np.testing.assert_allclose(np.hypot(x, y), abs(scene.pressure(points, 0.0123)))
 

@@ -137,8 +137,8 @@ def test_total_force_survives_the_quadrature_of_a_mesh(focus):
 
 
 class Louder(MovingPressure):
-    def __call__(self, points, t, over=0.0):
-        return 2 * super().__call__(points, t, over)
+    def __call__(self, points, t):
+        return 2 * super().__call__(points, t)
 
 
 class Wider(MovingPressure):
@@ -161,7 +161,7 @@ class Foreign:
     tacton = Tacton(am_frequency=140, duration=0.01)
     profile, height = "gaussian", 0.2
 
-    def __call__(self, points, t, over=0.0):
+    def __call__(self, points, t):
         t = np.asarray(t)
         return np.sin(880 * t)[..., None] * np.ones(len(points))
 

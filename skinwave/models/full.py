@@ -26,8 +26,8 @@ from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import (
     inertia,
     line_factor,
+    load_in_steps,
     load_lines_at,
-    loads_at,
     probe_rows,
     sag,
     surface_load,
@@ -129,9 +129,11 @@ def transient_answer(scene: Scene, request: Request) -> Response:
     S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
     report("factorise", 0.0)
 
+    load = load_in_steps(scene.loads, points, times, dt)
+
     @lru_cache(maxsize=4)
     def force(t: float) -> Floats:
-        return P @ loads_at(scene.loads, points, t, dt)
+        return P @ load(t)
 
     with clock("march"):
         states = fem.transient(ops, force, dt, solver=solver)

@@ -1,6 +1,6 @@
 """Load and probes of a meshed body under a moving pressure."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,13 +21,17 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.load_spectrum import merge_lines, pressure_lines
 from simple_model.material import Material
+from simple_model.path_cells import jump_times
 from simple_model.quantities import STRAIN, Quantity
+from simple_model.sampling import below_half_the_rate, is_folded
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
 from skinwave.bodies.build import operators as operators_of
 from skinwave.load import PRESSURE, Load
 from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene import Reading
+
+FAINTEST = 1e-6  # of the strongest line of a load
 
 
 def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array, Floats]:
@@ -48,21 +52,42 @@ def spread(P: sparse.csr_array, values: Floats) -> Floats:
     return np.hstack([P[:, k * len(values) :][:, : len(values)] @ values for k in range(count)])
 
 
-def loads_at(pressures: Sequence[MovingPressure], points: Floats, t: float, over: float) -> Floats:
-    """Components (c k,) in Pa of a load at points (k, 3) in metre, as `surface_load` has them.
+def load_in_steps(
+    pressures: Sequence[MovingPressure], points: Floats, times: Floats, dt: float
+) -> Callable[[float], Floats]:
+    """Load for time steps of a response, without its lines above half the rate of the response.
 
     Parameters
     ----------
     pressures : (c,) MovingPressure
     points : (k, 3) float, metre
-    t : s
-    over : s, the time that rhythms and signals are averaged over
+    times : (t,) float, s, of the response
+    dt : s, of the steps
 
     Returns
     -------
-    (c k,) float
+    function of a time in s, to the components (c k,) in Pa as `surface_load` has them
     """
-    return np.concatenate([each(points, t, over=over) for each in pressures])
+    folded = [is_folded(pressure, times) for pressure in pressures]
+    if not any(folded):
+        return lambda t: np.concatenate([about(each, points, t, dt) for each in pressures])
+    f, lines = load_lines_at(pressures, points, FAINTEST)
+    below = below_half_the_rate(f, times)
+    f, lines = f[below], lines[below]
+    return lambda t: (np.exp(2j * np.pi * f * t) @ lines).real
+
+
+def about(pressure: MovingPressure, points: Floats, t: float, over: float) -> Floats:
+    """Pressure (k,) in Pa at points (k, 3) in metre and a time in s; if it jumps in the time `over`
+    about that, its mean over it from the start on.
+    """
+    start, end = max(t - over / 2, 0.0), t + over / 2
+    jumps = jump_times(pressure, start, end) if isinstance(pressure, MovingPressure) else []
+    if not len(jumps):
+        return pressure(points, t)
+    bounds = np.unique([start, *jumps, end])
+    share = np.diff(bounds) / (end - start)
+    return np.asarray(share @ pressure(points, (bounds[1:] + bounds[:-1]) / 2))
 
 
 def load_lines_at(

@@ -25,7 +25,7 @@ from simple_model.plate_modes import (
     plate_modes,
 )
 from simple_model.plate_response import modal_path_forces
-from simple_model.sampling import below_half_the_rate
+from simple_model.sampling import below_half_the_rate, highest_driving
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.effort import peak_memory, silent
@@ -113,9 +113,9 @@ def _driven(scene: Scene, request: Request) -> Driven:
     request.report("lines", 0.0)
     middle = body.placement.offset
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
-    below = below_half_the_rate(f, request.times)
+    driving = f < highest_driving(pressure, request.times)
     return Driven(
-        modes=modes, frequencies=f[below], forces=forces[below],
+        modes=modes, frequencies=f[driving], forces=forces[driving],
         outputs=modes.at(scene.probe_points - middle),
     )  # fmt: skip
 
@@ -141,7 +141,9 @@ def _motion(scene: Scene, driven: Driven) -> Complex:
 
 def _steady(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
     """Steady state (t, p)."""
-    return synthesise(driven.frequencies, _amplitudes(scene, driven, motion), times)
+    below = below_half_the_rate(driven.frequencies, times)
+    amplitudes = _amplitudes(scene, driven, motion)
+    return synthesise(driven.frequencies[below], amplitudes[below], times)
 
 
 def _amplitudes(scene: Scene, driven: Driven, motion: Complex) -> Complex:

@@ -14,7 +14,7 @@ from simple_model.focus import spot_width
 from simple_model.load_spectrum import merge_lines, synthesise
 from simple_model.material import Material
 from simple_model.quantities import Quantity
-from simple_model.sampling import below_half_the_rate
+from simple_model.sampling import below_half_the_rate, highest_driving
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
@@ -294,7 +294,8 @@ def answer(
     if progress:
         progress("lines", 0.0)
     with clock("lines"):
-        motion = components(prepared, *scene.loads)
+        highest = highest_driving(scene.pressure, times)
+        motion = components(prepared, *scene.loads, highest=highest)
         # Lines are not weighed against the mean: that of an unconstrained body has no bound.
         strength, mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
@@ -335,11 +336,13 @@ def steady_waveforms(prepared: Prepared, scene: Scene, times: Floats) -> Floats:
     return asked.waveforms(with_sag(moving, prepared.sag, asked), len(prepared.probes))
 
 
-def components(prepared: Prepared, *pressures: MovingPressure) -> ReducedResponse:
+def components(
+    prepared: Prepared, *pressures: MovingPressure, highest: float = np.inf
+) -> ReducedResponse:
     """Response of the components that the probes of a reduced body read, with their rates and the
     relaxation of stress.
     """
-    motion = read_at(respond(prepared.body, *pressures), prepared.read)
+    motion = read_at(respond(prepared.body, *pressures, highest=highest), prepared.read)
     if moved := prepared.load.support_motion:
         frequencies = np.append(motion.frequencies, moved.frequency)
         lines = np.vstack([motion.lines, moved.line * np.asarray(prepared.carried)])

@@ -170,9 +170,11 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
     return merge_lines(np.concatenate(frequencies), np.vstack(forces))
 
 
-def respond(reduced: ReducedBody, *pressures: MovingPressure) -> ReducedResponse:
+def respond(
+    reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
+) -> ReducedResponse:
     """Response of a reduced body to a moving pressure, or to the components of another load, in its
-    coordinates (online stage).
+    coordinates (online stage); to their lines below a frequency in Hz.
 
     Raises
     ------
@@ -180,6 +182,7 @@ def respond(reduced: ReducedBody, *pressures: MovingPressure) -> ReducedResponse
         If its energy balance is violated.
     """
     frequencies, forces = reduced_forces(reduced, *pressures)
+    frequencies, forces = frequencies[frequencies < highest], forces[frequencies < highest]
     lines, start = fem.line_response(reduced.poles, forces, frequencies)
     if motion := reduced.support_motion:  # which the body at rest is struck by
         start += fem.impulse_response(reduced.poles, -motion.speed * np.asarray(reduced.inertia))

@@ -20,14 +20,14 @@ from fem.harmonic import dynamic_stiffness
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.load_spectrum import Complex, reduced_lines
-from simple_model.sampling import resolving_step
+from simple_model.load_spectrum import Complex, load_lines, reduced_lines
+from simple_model.sampling import below_half_the_rate, resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.effort import Clock
 from skinwave.models import Request
 from skinwave.models.full import TRANSIENT_RATE, in_time, marched, spent, step_count
-from skinwave.models.loads import surface_load
+from skinwave.models.loads import load_in_steps, surface_load
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.scene import Body, Scene
 
@@ -38,6 +38,7 @@ FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
 COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
 HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
 FEWEST_MODES, MOST_MODES = 40, 160
+MOST_LINES = 500  # of a load that are summed in each step
 
 
 def stretching_size(body: Body, *, reduced: bool) -> float:
@@ -96,10 +97,11 @@ def full_answer(scene: Scene, request: Request) -> Response:
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    load = load_in_steps((scene.pressure,), points, request.times, dt)
     return _marched(
         "fem-nonlinear-transient", scene, request, clock, made, size,
         body=body,
-        force=lambda t: P @ scene.pressure(points, t, over=dt),
+        force=lambda t: P @ load(t),
         read=full_reader(scene.body, made, scene.probe_points, scene.reading),
         dt=dt,
         effort=Effort(dofs=len(body.operators.free)),
@@ -123,20 +125,16 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
     with clock("reduce"):
         request.report("reduce", 0.0)
         sheet = _reduced(scene.body, size, request.solver)
-        hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
         read = modal_reader(
             scene.body, sheet.made, sheet.modes, sheet.operators, scene.probe_points,
             scene.reading, request.solver,
         )  # fmt: skip
 
-    def force(t: float) -> Floats:
-        return (np.exp(2j * pi * hz * t) @ forces).real
-
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     return _marched(
         "fem-nonlinear", scene, request, clock, sheet.made, size,
         body=sheet.modes.elastic,
-        force=force,
+        force=_modal_force(scene, sheet, request.times, dt),
         read=read,
         dt=dt,
         effort=Effort(
@@ -144,6 +142,21 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
             estimate=sheet.modes.left_out,
         ),
     )  # fmt: skip
+
+
+def _modal_force(
+    scene: Scene, sheet: _Reduced, times: Floats, dt: float
+) -> Callable[[float], Floats]:
+    """Modal forces (r,) of a load at a time in s: the sum of its lines or, of many, the load
+    itself.
+    """
+    if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
+        load = load_in_steps((scene.pressure,), sheet.points, times, dt)
+        return lambda t: load(t) @ sheet.load
+    hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
+    below = below_half_the_rate(hz, times)
+    hz, forces = hz[below], forces[below]
+    return lambda t: (np.exp(2j * pi * hz * t) @ forces).real
 
 
 def unstretched_lines(
