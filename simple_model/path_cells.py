@@ -23,7 +23,7 @@ from scipy import fft, sparse
 from simple_model.focus import spot_detail
 from simple_model.pressure import MovingPressure
 from simple_model.tacton import Tacton, tones
-from simple_model.trajectory import Floats, Trajectory, differ
+from simple_model.trajectory import STILL, Floats, Trajectory, differ
 
 Complex = NDArray[np.complex128]
 
@@ -32,6 +32,7 @@ KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
 NODES_PER_WIDTH = 16  # between which values are interpolated along the path, to 1e-6
 HIGHEST = 10_000.0  # Hz of lines of jumps, pulses and recordings: others move bodies by 0.1 %
 PER_HIGHEST = 2.5  # samples in a period of it
+SAMPLED = 40_000.0  # Hz of a rhythm or signal: periods in milliseconds are whole cells
 PASSED = 5.7 / (2 * np.pi)  # f s / v, at which a passing focal spot's spectrum is 1e-7
 BRIEF = 0.01  # of a recording's time, for which it may move faster: a jump has no highest line
 SAME = 1e-9  # of a cell or a period
@@ -60,8 +61,10 @@ def path_cells(pressure: MovingPressure) -> PathCells:
     tacton = pressure.tacton
     of_tacton = tacton.is_sampled or is_cut_short(pressure)
     if of_tacton:
-        count = fft.next_fast_len(int(np.ceil(_rate(pressure) * tacton.duration)) + 1)
-        jumps = np.append(jump_times(pressure, 0.0, tacton.duration), 0.0)
+        count = max(2, int(np.ceil(_rate(pressure) * tacton.duration)))
+        jumps = jump_times(pressure, 0.0, tacton.duration)
+        if not _ends_as_it_begins(pressure):
+            jumps = np.append(jumps, 0.0)
         times, shares = cells(jumps, 0.0, tacton.duration / count, count)
         whole, gain, frequency = pressure, pressure.gain(times), 1 / tacton.duration
     else:
@@ -73,6 +76,22 @@ def path_cells(pressure: MovingPressure) -> PathCells:
     positions, mixed = moved_load(whole, times, gain)
     mixed = (shares @ mixed).tocsr()
     return PathCells(positions=positions, cells=mixed, frequency=frequency, of_tacton=of_tacton)
+
+
+def _ends_as_it_begins(pressure: MovingPressure) -> bool:
+    """Whether the load at the end of the Tacton is that of its beginning, so that it is repeated
+    without a jump.
+    """
+    tacton = pressure.tacton
+    ends = tacton.duration * np.array([SAME, 1 - SAME])
+    begins, stops = pressure.gain(ends)
+    path = tacton.trajectory
+    each = [np.mod(path.phase(ends) + ahead, 1.0) for ahead in tacton.foci]
+    places = [np.column_stack([path.at_phase(p), path.level_at_phase(p)]) for p in each]
+    moved = any(differ(place[:1], place[1:]).any() for place in places)
+    return not moved and bool(
+        abs(begins - stops) <= STILL[1] * abs(pressure.driven(np.ones(1))).max()
+    )
 
 
 def moved_load(
@@ -189,7 +208,7 @@ def jump_phases(pressure: MovingPressure) -> Floats:
     path = pressure.tacton.trajectory
     bounds, lengths = path.parts
     if pressure.heading:
-        return bounds[:-1]
+        return np.union1d(path.jumps, path.turns)
     if path.shape != "recorded":
         return path.jumps
     brief = np.diff(bounds) * path.times[-1] < 1 / (PER_HIGHEST * HIGHEST)
@@ -317,7 +336,7 @@ def _rate(pressure: MovingPressure) -> float:
     tacton, degree = pressure.tacton, pressure.law.degree
     made = highest_passing(pressure) + (degree or KNOTS_PER_WIDTH) * sum(tones(tacton))
     made += tacton.signal.rate if tacton.signal else 0.0
-    return max(PER_HIGHEST * HIGHEST, HIGHEST + made)
+    return max(SAMPLED, HIGHEST + made)
 
 
 def _speed(tacton: Tacton) -> float:

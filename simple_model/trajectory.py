@@ -27,6 +27,7 @@ FURTHEST = 0.100  # m of a point's coordinates, which devices steer to
 MOST_POINTS = 1_000_000
 STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
 NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
+STRAIGHT_ON = 1e-3  # of a unit tangent, below which it does not turn
 STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
 JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
@@ -181,6 +182,13 @@ class Trajectory:
         """Fractions (j,) of the period, 0 included and 1 not, at which position or level jumps."""
         starts = self.parts[0][:-1]
         return starts[differ(*self.beside(starts))]
+
+    @cached_property
+    def turns(self) -> Floats:
+        """Fractions (j,) of the period, 0 included and 1 not, at which the direction jumps."""
+        starts, aside = self.parts[0][:-1], 2 * NEARBY / max(1, len(self.points))
+        ways = self.tangent_at_phase(np.mod([starts - aside, starts + aside], 1.0))
+        return starts[np.abs(ways[1] - ways[0]).max(axis=-1) > STRAIGHT_ON]
 
     def beside(self, phases: Floats) -> tuple[Floats, Floats]:
         """Positions and level (k, 3) just before and just after fractions (k,) of the period."""

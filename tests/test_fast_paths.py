@@ -278,4 +278,4 @@ def test_many_lines_push_a_stretching_sheet_as_their_sum_does(monkeypatch):
     for most, values in ((10, found), (10_000, expected)):
         monkeypatch.setattr(stretching, "MOST_LINES", most)
         values.append(compute(scene, "fem-nonlinear", h=12e-3).values)
-    assert np.linalg.norm(found[0] - expected[0]) < 5e-3 * np.linalg.norm(expected[0])
+    assert np.linalg.norm(found[0] - expected[0]) < 1e-2 * np.linalg.norm(expected[0])
