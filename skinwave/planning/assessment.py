@@ -20,6 +20,7 @@ from skinwave.planning.boundaries import absorbing_error
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
     about_its_rest,
+    above_band,
     compared_with,
     convergence,
     quantity_of_interest,
@@ -95,6 +96,7 @@ def told(
     _, error = convergence(meshed or body, (other, size), (found, fine), tolerance, same=same)
     error += coarse.effort.estimate + series_error(scene, response.model, tolerance, coarse)
     error += absorbing_error(scene, body, tolerance, solver=solver)
+    error += above_band(response.values, response.times[1] - response.times[0])
     warnings = sentences(scene, response, tolerance, h=size, error=error)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)

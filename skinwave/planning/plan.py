@@ -21,7 +21,8 @@ from skinwave.models.laws import check_laws
 from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.prepared import Prepared, sample_times
+from skinwave.models.prepared import Prepared, answer, sample_times
+from skinwave.models.reduction import BAND
 from skinwave.planning.boundaries import absorbing_error, extended
 from skinwave.planning.estimates import (
     NO_BOUND,
@@ -33,7 +34,7 @@ from skinwave.planning.estimates import (
 from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
 from skinwave.planning.goal_oriented import goal_refined, has_goal_oriented
 from skinwave.planning.mesh_rows import element_rows
-from skinwave.planning.refinement import refined
+from skinwave.planning.refinement import above_band, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
 from skinwave.planning.sheets import why_modes
@@ -44,6 +45,7 @@ from skinwave.planning.warnings import (
     over_tolerance,
     start_over_tolerance,
 )
+from skinwave.sample_grid import sample_grid
 from skinwave.scene import FLAT, Body, Scene
 
 INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
@@ -182,15 +184,19 @@ def plan(
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     step_error = _march_error(scene, step) if asked and asked.is_stepped else 0.0
     start = start_left_out(scene, asked, mesh.prepared, times) if asked else 0.0
+    grid, _ = sample_grid(scene, times)
+    sudden = above_band(answer(mesh.prepared, scene, times=grid).values, grid[1])
     found = Plan(
         model=model or "fem", body=body, symmetry=axes, h=mesh.h, highest=highest,
-        error=mesh.error + mesh.prepared.effort.estimate + at_ends + step_error + start,
+        error=mesh.error + mesh.prepared.effort.estimate + at_ends + sudden + step_error + start,
         seconds=sum(mesh.prepared.effort.seconds.values()),
         memory=mesh.prepared.effort.peak_memory,
         rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
         warnings=(
             *of_mesh(scene, mesh, tolerance),
             *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
+            *over_tolerance(f"the {scene.quantity} above {BAND:g} Hz", sudden, tolerance,
+                      "the displacement, or a load that begins smoothly, is"),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *start_over_tolerance(asked, start, tolerance),

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
@@ -30,7 +31,7 @@ from skinwave.models.prepared import (
     prepare,
     reduction_tolerance,
 )
-from skinwave.models.reduction import oscillating
+from skinwave.models.reduction import BAND, oscillating
 from skinwave.planning.goal_meshes import GoalMesh
 from skinwave.scene import Body, Scene
 
@@ -284,6 +285,27 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
     if scene.body.is_held:
         return about_its_rest(scene, found.values)
     return oscillating(components(prepared, *scene.loads)).lines
+
+
+def above_band(waveforms: Floats, step: float) -> float:
+    """Share of waveforms above `BAND`, up to which a reduced body is held to its tolerance.
+
+    Velocity and acceleration have such a share where a load begins, or jumps, at once. A series of
+    cosines continues the record without a jump at its ends.
+
+    Parameters
+    ----------
+    waveforms : (t, p) float
+    step : float, s, between their samples
+
+    Returns
+    -------
+    float, root of the share of the energy of the worst probe
+    """
+    energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
+    frequencies = np.arange(len(energy)) / (2 * step * len(energy))
+    above = energy[frequencies > BAND].sum(axis=0)
+    return float(np.sqrt((above / np.maximum(energy.sum(axis=0), 1e-300)).max()))
 
 
 def convergence(
