@@ -57,16 +57,13 @@ def test_only_a_sheet_has_air(kind):
 @pytest.mark.parametrize("model", ["fem-transient", "fem-harmonic", "fem-nonlinear-transient"])
 @pytest.mark.parametrize("h", [None, H])
 def test_models_without_modes_refuse_it(model, h):
-    with pytest.raises(
-        ValueError,
-        match=f"{model} solves sparse equations, and the added mass of air is a dense operator",
-    ):
+    with pytest.raises(ValueError, match=f"{model} has no air"):
         compute(SCENE, model, h=h)
 
 
 def test_a_sheet_without_a_frame_is_refused_by_elements():
     body = replace(SHEET, sides="absorbing", base="clamped")
-    with pytest.raises(ValueError, match="in a frame, not with absorbing sides; clamp them"):
+    with pytest.raises(ValueError, match="absorbing sides"):
         prepare(body, SCENE.probe_points, h=H)
 
 

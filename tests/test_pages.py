@@ -139,6 +139,7 @@ def opened(browser, path, obeyed=False):
     tab, said = context.new_page(), []
     tab.on("console", lambda message: said.append(message.text))
     tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.set_default_timeout(120_000)
     tab.goto(f"file://{path}")
     settled(tab)
     yield tab, said

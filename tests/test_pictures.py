@@ -435,6 +435,7 @@ def test_the_page_opens_in_a_browser_without_a_network(page, browser):
     tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
     tab.on("pageerror", lambda error: said.append(str(error)))
     tab.route(re.compile("^(https?|wss?)://"), lambda r: (asked.append(r.request.url), r.abort()))
+    tab.set_default_timeout(120_000)
     tab.goto(f"file://{page / 'index.html'}")
     settled(tab)
     for frame in tab.frames[1:]:

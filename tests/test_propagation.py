@@ -208,7 +208,7 @@ def test_the_first_screen_says_what_each_difference_changes():
     assert "not propagation" in drive
     assert "Above threshold out to" in above_threshold
     assert "half or twice the pressure" in above_threshold
-    assert "varied one by one, the share is" in above_threshold
+    assert "in turn, the share is" in above_threshold
     rows = small_table(list(first.changes.values()), "one")
     assert f"{OUTSIDE:g} dB region" in rows
     assert rows.count("<tr>") == 6
