@@ -19,7 +19,12 @@ from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.laws import check_laws
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
-from skinwave.planning.warnings import beyond_linear, beyond_sampling, implausible
+from skinwave.planning.warnings import (
+    beyond_linear,
+    beyond_prediction,
+    beyond_sampling,
+    implausible,
+)
 from skinwave.progress_bar import reported
 from skinwave.sample_grid import from_first, sample_grid
 from skinwave.scene import Scene
@@ -164,6 +169,8 @@ def follow(
 ) -> Response:
     """Response of a plan, with its expected error and all warnings.
 
+    A model that measures its error with the answer states at least that error.
+
     Parameters
     ----------
     required : Plan
@@ -182,11 +189,12 @@ def follow(
             replace(scene, body=required.body), required.model, tolerance, progress,
             times=times, h=required.h or h, dt=dt, solver=solver, mapped=mapped,
         )  # fmt: skip
+    error = float(np.fmax(required.error, found.expected_error))
     told = (
-        *required.warnings, *beyond_linear(scene, found), *beyond_sampling(scene, found),
-        *implausible(scene),
+        *required.warnings, *beyond_prediction(scene, found, required.error, tolerance),
+        *beyond_linear(scene, found), *beyond_sampling(scene, found), *implausible(scene),
     )  # fmt: skip
-    found = replace(found, expected_error=required.error, load=scene.pressure)
+    found = replace(found, expected_error=error, load=scene.pressure)
     return warned(found, told)
 
 
@@ -202,7 +210,8 @@ def compute(
     solver: str = "auto",
     mapped: MapFunction = map,
 ) -> Response:
-    """Response of one model, not planned: its expected error is unknown, and it gives no warnings.
+    """Response of one model, not planned, without warnings. Its expected error is unknown, unless
+    the model measures it.
 
     Parameters
     ----------

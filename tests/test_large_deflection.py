@@ -82,7 +82,7 @@ def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(s
 
 def test_the_motion_starts_from_rest():
     response = compute(SCENE, "fem-nonlinear", h=0.01)
-    assert np.abs(response.displacement[0]).max() == 0.0
+    assert np.abs(response.displacement[0]).max() < 1e-12 * np.abs(response.displacement).max()
     assert response.model == "fem-nonlinear"
     assert response.effort.reduced_dofs == 40
     assert response.effort.steps == 398
@@ -96,10 +96,13 @@ def test_a_sheet_that_hardly_bends_moves_from_rest_as_a_linear_plate():
     body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=held)
     weak = MovingPressure(tacton=Tacton(am_frequency=60, duration=0.02), peak_pressure=1e-3)
     scene = Scene(pressure=weak, body=body, probes=((0.0, 0.0), (5e-3, 5e-3)))
-    linear = compute(scene, "plate-modes-transient").values
-    found = compute(scene, "fem-nonlinear", h=2e-3, dt=1e-4).values
-    error = np.linalg.norm(found - linear, axis=0) / np.linalg.norm(linear, axis=0)
-    assert error.max() < 0.03
+    for quantity, bound in (("displacement", 0.03), ("acceleration", 0.1)):
+        asked = replace(scene, quantity=quantity)
+        linear = compute(asked, "plate-modes-transient").values
+        found = compute(asked, "fem-nonlinear", h=2e-3, dt=1e-4)
+        difference = np.linalg.norm(found.values - linear, axis=0)
+        error = (difference / np.linalg.norm(linear, axis=0)).max()
+        assert error < min(bound, 1.1 * found.expected_error + 0.01)
 
 
 def test_a_step_that_fails_is_halved(sheet, monkeypatch):

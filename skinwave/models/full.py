@@ -15,6 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.load_spectrum import load_lines, synthesise
 from simple_model.material import Material
+from simple_model.quantities import Quantity
 from simple_model.sampling import below_half_the_rate, resolving_step
 from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
@@ -178,14 +179,21 @@ def in_time(
     -------
     (t, p) float, in the unit of the quantity
     """
+    asked = scene.reading.asked
+    sampled = sampled_components(stepped, dt, times, asked, solids)
+    return asked.waveforms(with_sag(sampled, sag, asked), len(scene.probes))
+
+
+def sampled_components(
+    stepped: Floats, dt: float, times: Floats, asked: Quantity, solids: tuple[Material, ...] = ()
+) -> Floats:
+    """Components (t, p c) of a quantity at `times`; parameters as of `in_time`."""
     from scipy.interpolate import CubicSpline  # which takes long to import
 
-    asked = scene.reading.asked
     if asked.relaxes:
         each = np.split(stepped, len(solids), axis=1)
         stepped = np.hstack([fem.relaxed(x, dt, m) for x, m in zip(each, solids, strict=True)])
-    sampled = CubicSpline(np.arange(len(stepped)) * dt, stepped)(times, asked.rate)
-    return asked.waveforms(with_sag(sampled, sag, asked), len(scene.probes))
+    return np.asarray(CubicSpline(np.arange(len(stepped)) * dt, stepped)(times, asked.rate))
 
 
 def marched(

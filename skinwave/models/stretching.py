@@ -4,30 +4,59 @@ A sheet is meshed as in the linear models, by an equivalent solid some ten times
 bending stiffness and mass of the true one. The membrane stiffness of so thick a solid is too small
 by the factor d^2 / h^2, and a membrane in its middle plane adds what is missing: bending stiffness,
 mass and membrane stiffness are all those of the true sheet, and no element is flat.
+
+Time steps make an error that grows with frequency. In modes, the linear part of the motion is known
+exactly: the same steps of the linear part are replaced by it, so that steps affect only what
+stretching changes. What remains is measured with each answer, in the quantity of the scene:
+the linear part differs from that of a thin plate in its own modes by the error of elements and of
+the modes that are left out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import islice
 from math import pi
+from typing import Any
 
 import numpy as np
 
 import fem
 from fem import nonlinear
-from fem.harmonic import dynamic_stiffness
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.load_spectrum import Complex, load_lines, reduced_lines
+from simple_model.load_spectrum import Complex, load_lines
+from simple_model.material import Material
+from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
 from simple_model.sampling import below_half_the_rate, resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.effort import Clock
 from skinwave.models import Request
-from skinwave.models.full import TRANSIENT_RATE, in_time, marched, spent, step_count
+from skinwave.models.advice import beyond
+from skinwave.models.full import (
+    TRANSIENT_RATE,
+    in_time,
+    marched,
+    sampled_components,
+    spent,
+    step_count,
+)
 from skinwave.models.loads import load_in_steps, surface_load
+from skinwave.models.plate_modes import ERROR as PLATE_ERROR
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.prepared import in_motion
+from skinwave.models.reduction import (
+    ReducedBody,
+    ReducedResponse,
+    from_rest,
+    read_at,
+    reduced_forces,
+    reduced_variant,
+    respond,
+    select_lines,
+)
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.scene import Body, Scene
 
@@ -38,6 +67,8 @@ FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
 COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
 HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
 FEWEST_MODES, MOST_MODES = 40, 160
+RATES = DISPLACEMENT, VELOCITY, ACCELERATION
+STANDSTILL = 1e-9  # of the motion of the probe that moves most
 MOST_LINES = 500  # of a load that are summed in each step
 
 
@@ -98,65 +129,104 @@ def full_answer(scene: Scene, request: Request) -> Response:
     P, points = surface_load(made)
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     load = load_in_steps((scene.pressure,), points, request.times, dt)
-    return _marched(
-        "fem-nonlinear-transient", scene, request, clock, made, size,
-        body=body,
-        force=lambda t: P @ load(t),
+    march = _march(
+        body, lambda t: P @ load(t), dt, request, clock,
         read=full_reader(scene.body, made, scene.probe_points, scene.reading),
-        dt=dt,
-        effort=Effort(dofs=len(body.operators.free)),
+        rows=fem.probe_operator(made.mesh, scene.probe_points),
+    )  # fmt: skip
+    values = in_time(march.steps, dt, request.times, scene, _solids(scene))
+    plain = _normal(scene)
+    linear = in_time(march.linear, dt, request.times, plain)
+    return _response(
+        "fem-nonlinear-transient", scene, request, clock, made, size,
+        values=values, error=_plate_error(plain, request, linear, size),
+        effort=replace(march.effort, dofs=len(body.operators.free)),
     )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Reduced:
-    """Sheet reduced to its bending modes, with its load."""
+    """Sheet reduced to its bending modes, and the same without stretching, with its load."""
 
     made: Build
     modes: fem.StretchingModes
-    load: Floats  # (n, r), modal forces of unit pressure at the points (n, 3)
-    points: Floats
+    linear: ReducedBody
     operators: fem.Operators
 
 
 def reduced_answer(scene: Scene, request: Request) -> Response:
-    """Time integration of the sheet's bending modes, from rest."""
+    """Time integration of the sheet's bending modes, from rest, with an exact linear part."""
     clock, size = Clock(), request.h or stretching_size(scene.body, reduced=True)
+    asked, probes, times = scene.reading.asked, scene.probe_points, request.times
     with clock("reduce"):
         request.report("reduce", 0.0)
         sheet = _reduced(scene.body, size, request.solver)
         read = modal_reader(
-            scene.body, sheet.made, sheet.modes, sheet.operators, scene.probe_points,
-            scene.reading, request.solver,
+            scene.body, sheet.made, sheet.modes, sheet.operators, probes, scene.reading,
+            request.solver,
         )  # fmt: skip
 
+    each = np.eye(len(sheet.modes.hz))
+    rows = np.stack([(read(z) - read(-z)) / 2 for z in each], axis=1)  # the rest is quadratic
     dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    return _marched(
-        "fem-nonlinear", scene, request, clock, sheet.made, size,
-        body=sheet.modes.elastic,
-        force=_modal_force(scene, sheet, request.times, dt),
-        read=read,
-        dt=dt,
-        effort=Effort(
-            dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
+    force = _modal_force(scene, sheet.linear, times, dt)
+    march = _march(sheet.modes.elastic, force, dt, request, clock, read=read, rows=rows)
+    with clock("linear part"):
+        motion, solids, plain = (
+            respond(sheet.linear, scene.pressure),
+            _solids(scene),
+            _normal(scene),
+        )
+        linear = _from_rest(motion, rows, times, asked, solids)
+        bent, stepped = (
+            sampled_components(steps, dt, times, asked, solids)
+            for steps in (march.steps - march.linear, march.linear)
+        )
+        values, exact, stepped = (
+            asked.waveforms(each, len(probes)) for each in (linear + bent, linear, stepped)
+        )
+        shapes = fem.probe_operator(sheet.made.mesh, probes) @ sheet.modes.basis
+        elements = _plate_error(
+            plain, request, _from_rest(motion, shapes, times, plain.reading.asked, ()), size
+        )
+    # Steps of the linear part are corrected: what they do to the rest is as small as it is.
+    share = np.minimum(_relative(values - exact, values), 1)
+    error = elements + float((share * _relative(stepped - exact, values)).max())
+    return _response(
+        "fem-nonlinear", scene, request, clock, sheet.made, size, values=values, error=error,
+        effort=replace(
+            march.effort, dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
             estimate=sheet.modes.left_out,
         ),
     )  # fmt: skip
 
 
 def _modal_force(
-    scene: Scene, sheet: _Reduced, times: Floats, dt: float
+    scene: Scene, linear: ReducedBody, times: Floats, dt: float
 ) -> Callable[[float], Floats]:
     """Modal forces (r,) of a load at a time in s: the sum of its lines or, of many, the load
     itself.
     """
     if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
-        load = load_in_steps((scene.pressure,), sheet.points, times, dt)
-        return lambda t: load(t) @ sheet.load
-    hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
+        load = load_in_steps((scene.pressure,), linear.points, times, dt)
+        return lambda t: load(t) @ linear.load
+    hz, forces = reduced_forces(linear, scene.pressure)
     below = below_half_the_rate(hz, times)
     hz, forces = hz[below], forces[below]
     return lambda t: (np.exp(2j * pi * hz * t) @ forces).real
+
+
+def _from_rest(
+    motion: ReducedResponse,
+    rows: Floats,
+    times: Floats,
+    asked: Quantity,
+    solids: tuple[Material, ...],
+) -> Floats:
+    """Components (t, p c) of the linear part of the motion, exact for its modes."""
+    components = in_motion(read_at(motion, rows), asked, solids)
+    below = below_half_the_rate(components.frequencies, times)
+    return from_rest(select_lines(components, below), times)
 
 
 def unstretched_lines(
@@ -175,13 +245,9 @@ def unstretched_lines(
     frequencies (f,) in Hz and complex amplitudes (f, p) in metre
     """
     sheet = _reduced(scene.body, h or stretching_size(scene.body, reduced=True), solver)
-    hz, forces = reduced_lines(scene.pressure, sheet.points, sheet.load)
-    operators = sheet.modes.elastic.operators
-    K, C, M = (part.toarray() for part in (operators.K, operators.C, operators.M))
-    z = [np.linalg.solve(dynamic_stiffness(K, C, M, operators.branches, s), f)
-         for s, f in zip(2j * pi * hz, forces, strict=True)]  # fmt: skip
     shapes = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
-    return hz, np.array(z) @ shapes.T
+    motion = read_at(respond(sheet.linear, scene.pressure), shapes)
+    return motion.frequencies, motion.lines
 
 
 @lru_cache(maxsize=1)
@@ -194,9 +260,13 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
         added=air(body, made, operators), solver=solver,
     )  # fmt: skip
     P, points = surface_load(made)
-    return _Reduced(
-        made=made, modes=modes, load=P.T @ modes.basis, points=points, operators=operators
-    )
+    modal = modes.elastic.operators
+    dense = replace(
+        modal, K=modal.K.toarray(), C=modal.C.toarray(), M=modal.M.toarray(), R=modal.R.toarray(),
+        branches=tuple(replace(each, K=each.K.toarray()) for each in modal.branches),
+    )  # fmt: skip
+    linear = reduced_variant(dense, P.T @ modes.basis, points, Effort(dofs=len(operators.free)))
+    return _Reduced(made=made, modes=modes, linear=linear, operators=operators)
 
 
 def mode_count(body: Body) -> int:
@@ -206,27 +276,79 @@ def mode_count(body: Body) -> int:
     return min(max(found, FEWEST_MODES), MOST_MODES)
 
 
-def _marched(
-    model: str, scene: Scene, request: Request, clock: Clock, made: Build, h: float, *,
-    body: fem.Elastic, force: Callable[[float], Floats], read: Callable[[Floats], Floats],
-    dt: float, effort: Effort,
-) -> Response:  # fmt: skip
-    """Time integration from rest."""
-    times, report, solver = request.times, request.report, request.solver
-    steps = step_count(float(times[-1]), dt)
-    kept = lru_cache(maxsize=2)(force)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _March:
+    """Components (n, p c) that probes read at all steps, those of the linear part alone by the same
+    steps, and the cost.
+    """
+
+    steps: Floats
+    linear: Floats
+    effort: Effort
+
+
+def _march(
+    body: fem.Elastic, force: Callable[[float], Floats], dt: float, request: Request, clock: Clock,
+    *, read: Callable[[Floats], Floats], rows: Any,
+) -> _March:  # fmt: skip
+    """Time integration from rest, and of the linear part, of which `rows` (p c, r) are read."""
+    solver, steps = request.solver, step_count(float(request.times[-1]), dt)
+    kept, linear = lru_cache(maxsize=2)(force), []
+
+    def states() -> Iterator[fem.State]:
+        bent = nonlinear.dynamic(body, lambda t, u: kept(t), dt, solver=solver)
+        straight = fem.transient(body.operators, kept, dt, solver=solver)
+        for state, other in zip(islice(bent, steps + 1), straight, strict=False):
+            linear.append(rows @ other.displacement)
+            yield state
+
     with clock("march"):
-        states = nonlinear.dynamic(body, lambda t, u: kept(t), dt, solver=solver)
         stepped, (imbalance, _) = marched(
-            nonlinear.with_energy_balance(body, islice(states, steps + 1), kept), steps, read,
-            lambda state: nonlinear.total_energy(body, state), report,
+            nonlinear.with_energy_balance(body, states(), kept), steps, read,
+            lambda state: nonlinear.total_energy(body, state), request.report,
         )  # fmt: skip
-    effort = replace(
-        effort, steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
+    effort = Effort(
+        steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
         energy_imbalance=imbalance, dt=dt,
     )  # fmt: skip
+    return _March(steps=stepped, linear=np.array(linear), effort=effort)
+
+
+def _solids(scene: Scene) -> tuple[Material, ...]:
+    return (scene.body.solid,) * len(scene.probes)
+
+
+def _normal(scene: Scene) -> Scene:
+    """The scene with the normal motion whose relative error is no smaller than that of its own
+    quantity: slopes and strains grow with frequency by up to one order more.
+    """
+    asked = scene.reading.asked
+    rate = min(asked.rate + (not asked.is_normal), len(RATES) - 1)
+    return replace(scene, quantity=RATES[rate].name, depth=0.0)
+
+
+def _plate_error(plain: Scene, request: Request, linear: Floats, h: float) -> float:
+    """Relative error of a linear part (t, p) of the normal motion, by that of a thin plate."""
+    if beyond(FROM_REST, plain):
+        return expected_error(plain.body, h)
+    plate = FROM_REST.solve(plain, request).values
+    error = float(_relative(linear - plate, plate).max())
+    return error + PLATE_ERROR
+
+
+def _relative(change: Floats, values: Floats) -> Floats:
+    """Relative changes (p,) of waveforms; 0 where nothing moves."""
+    sizes = np.linalg.norm(values, axis=0)
+    moves = sizes > STANDSTILL * sizes.max()
+    found = np.linalg.norm(change, axis=0) / np.where(moves, sizes, 1)
+    return np.asarray(np.where(moves, found, 0.0))
+
+
+def _response(
+    model: str, scene: Scene, request: Request, clock: Clock, made: Build, h: float, *,
+    values: Floats, error: float, effort: Effort,
+) -> Response:  # fmt: skip
     return Response(
-        model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
-        values=in_time(stepped, dt, times, scene, (scene.body.solid,) * len(scene.probes)),
-        effort=spent(effort, clock, made, h),
+        model=model, times=request.times, probes=scene.probe_points, quantity=scene.quantity,
+        values=values, expected_error=error, effort=spent(effort, clock, made, h),
     )  # fmt: skip

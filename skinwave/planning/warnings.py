@@ -176,6 +176,33 @@ def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tupl
     )
 
 
+def beyond_prediction(
+    scene: Scene, response: Response, predicted: float, tolerance: float
+) -> tuple[str, ...]:
+    """Warning of an error above the tolerance that the model measured and the plan did not predict.
+
+    Parameters
+    ----------
+    scene : Scene
+    response : Response, with the error that its model measured, or nan
+    predicted : relative error of the plan
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    one sentence, or none
+    """
+    error = response.expected_error
+    if not error > np.fmax(predicted, tolerance):
+        return ()
+    return (
+        f"{response.model} has a relative error of about {100 * error:.2g} % in this "
+        f"{scene.reading.asked.words}, more than the tolerance of {100 * tolerance:g} %: a thin "
+        "plate with the same linear motion differs by that; take the displacement, or smaller "
+        "elements and shorter time steps",
+    )
+
+
 def start_over_tolerance(model: Model | None, start: float, tolerance: float) -> tuple[str, ...]:
     """Warning of a model of the steady state where the start from rest is above the tolerance."""
     if model is None:
