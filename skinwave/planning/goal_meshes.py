@@ -41,11 +41,13 @@ class Estimated:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Family:
-    """Goal-oriented meshes of a body: the `coarse` one of elements of a `size` in metre; and what
-    the coarse mesh is `estimated` to leave, at frequencies (f,) in Hz and relative to motion (p,)
-    of the probes, with so many degrees of freedom.
+    """Goal-oriented meshes of a body: the `coarse` one of elements of a `size` in metre; the factor
+    of `safety` on errors that are extrapolated by predicted ratios; and what the coarse mesh is
+    `estimated` to leave, at frequencies (f,) in Hz and relative to motion (p,) of the probes, with
+    so many degrees of freedom.
     """
 
     coarse: GoalMesh
     size: float
+    safety: float
     estimated: Callable[[Floats, Floats, int], Estimated]

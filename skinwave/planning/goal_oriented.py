@@ -4,8 +4,9 @@ A coarse mesh and its dual solutions say where elements leave that error (`skinw
 Sizes that spread it evenly, of as many elements as the tolerance needs, make the next mesh: those
 along each axis of a structured mesh (`goal_lines`), or those of tetrahedra that fill a surface
 (`goal_sizes`). The estimate itself is not trusted: as with uniform meshes the error is extrapolated
-from the change of the waveforms between two meshes, as if the finer one were finer everywhere: the
-predicted ratio of their errors was too good by up to 2.
+from the change of the waveforms from the coarse mesh, by the predicted ratio of their errors in the
+place of that of their element sizes. A coarse mesh of few cells predicts ratios that are too good
+by up to 2; there numbers of cells count, as of uniform meshes.
 """
 
 from dataclasses import dataclass
@@ -34,15 +35,19 @@ from skinwave.planning.refinement import (
     mean_ratio,
     quantity_of_interest,
     refined,
+    relative_change,
 )
 from skinwave.scene import Body, Scene
 
 LINES = 3  # that oscillate and move the probes most: the errors of one would not be those of all
 UNDERESTIMATED = 2.4  # true errors of coarse meshes over their estimates, measured 1.2 to 2.1
 AIM = 0.8  # of the tolerance, so that one goal-oriented mesh is enough
-# Ratio of the errors of two meshes: more alike they change too little to tell, and estimates of a
-# coarse mesh are not followed further.
+# Ratio of the predicted errors of a mesh and the one before: more alike they change too little to
+# tell, and estimates of a coarse mesh are not followed further.
 MOST_ALIKE, LEAST_ALIKE = 0.5, 0.05
+FEW_CELLS = 200  # of a coarse mesh whose predictions are not trusted
+STEEPER = 1.5  # power of its errors by numbers of cells that predicted ones fall by
+NEARLY = 2.0  # times the tolerance: error of that mesh from where goal-oriented ones may save
 SMALL = 4000  # degrees of freedom of a uniform structured mesh that is tried before
 EASY = 0.04  # tolerance that the second of the coarsest uniform meshes of a hand may meet
 MESHES, MOST_DOFS = 3, 250_000  # goal-oriented meshes that are tried, and the largest, about
@@ -100,6 +105,8 @@ def goal_refined(
         found = refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver, h=size)
         if found.convergence is Convergence.REACHED:
             return found
+        if found.error < NEARLY * tolerance:  # one or two more are enough
+            return refined(scene, body, tolerance, progress, symmetry=symmetry, solver=solver)
     try:
         goal = _goal_refined(scene, body, tolerance, progress or silent, symmetry, solver)
     except (MeshError, TimeoutError):
@@ -147,11 +154,13 @@ def _goal_refined(
     report("goal-oriented estimate", 0.0)
     known = family.estimated(frequencies, sizes, coarse.dofs)
     most = max(MOST_DOFS, 4 * coarse.dofs)
-    error = UNDERESTIMATED * known.error
+    error, few = UNDERESTIMATED * known.error, _cells(coarse.mesh) < FEW_CELLS
     for _ in range(MESHES):
-        wanted = np.clip(AIM * tolerance / max(error, 1e-300), LEAST_ALIKE, MOST_ALIKE)
-        last = tried(known.finer(before.mesh.ratio * float(wanted), before.mesh, most))
-        error, compared = _extrapolated(before, last), before
+        wanted = (AIM * tolerance / max(error, 1e-300)) ** (STEEPER if few else 1)
+        wanted = float(np.clip(wanted, LEAST_ALIKE, MOST_ALIKE))
+        last = tried(known.finer(before.mesh.ratio * wanted, before.mesh, most))
+        alike = _alike_by_cells(coarse.mesh, last.mesh) if few else last.mesh.ratio
+        error = family.safety * _extrapolated(coarse, last, alike)
         if error <= tolerance or last.dofs >= most / 2:
             break
         before = last
@@ -159,20 +168,26 @@ def _goal_refined(
         h=as_uniform(last.mesh),
         convergence=Convergence.NOT_REACHED if error > tolerance else Convergence.REACHED,
         error=error, compared=family.size, prepared=last.prepared,
-        goal=last.mesh, compared_dofs=compared.dofs,
+        goal=last.mesh, compared_dofs=coarse.dofs,
     )  # fmt: skip
 
 
-def _extrapolated(before: _Trial, last: _Trial) -> float:
-    """Relative error of the second of two meshes, as of uniform ones of as many cells."""
-    finer = mean_ratio(_size(before), _size(last))
-    return CONTROLLER.error(before.found, last.found, finer) if finer > 1 else 1.0
+def _extrapolated(before: _Trial, last: _Trial, alike: float) -> float:
+    """Relative error of the second of two meshes: e2 = r e1 and e1 <= change + e2 of the worst
+    probe, for the ratio r that they are `alike` by.
+    """
+    change = relative_change(before.found, last.found)
+    return change * alike / (1 - alike) if alike < 1 else 1.0
 
 
-def _size(trial: _Trial) -> int:
-    """Cells of a mesh on grid lines, without any absorbing layer; or degrees of freedom."""
-    follows = trial.mesh.follows
-    return cell_count(follows) if isinstance(follows, tuple) else trial.dofs
+def _alike_by_cells(before: GoalMesh, last: GoalMesh) -> float:
+    """Ratio of the errors of uniform meshes of as many cells."""
+    return mean_ratio(_cells(before), _cells(last)) ** -CONTROLLER.order
+
+
+def _cells(mesh: GoalMesh) -> float:
+    """Cells between the grid lines of a mesh; without lines many."""
+    return cell_count(mesh.follows) if isinstance(mesh.follows, tuple) else np.inf
 
 
 def strongest(scene: Scene, prepared: Prepared) -> tuple[Floats, Floats]:

@@ -22,6 +22,7 @@ from skinwave.planning.refinement import (
 )
 from skinwave.scene import Body, Scene
 
+SAFETY = 1.1  # errors are extrapolated by the order of uniform meshes, as theirs are
 SLOPE = float(np.log(GROWTH))
 BESIDE = 2.0  # standard deviations of the focal spot on either side of its path, which it passes
 
@@ -67,7 +68,7 @@ def family_of_sizes(scene: Scene, body: Body, axes: str, tolerance: float, solve
 
         return Estimated(error=float(found.error.max()), finer=finer)
 
-    return Family(coarse=GoalMesh(widest=size), size=size, estimated=estimated)
+    return Family(coarse=GoalMesh(widest=size), size=size, safety=SAFETY, estimated=estimated)
 
 
 def _coarse_size(scene: Scene, body: Body) -> float:

@@ -251,12 +251,12 @@ def coarser_by(body: Body, other: float, h: float) -> float:
     return min(other / h, mean_ratio(*cells), key=lambda ratio: abs(np.log(ratio)))
 
 
-def cell_count(lines: Lines) -> int:
+def cell_count(lines: Lines) -> float:
     """Number of cells between grid lines."""
-    return int(np.prod([len(line) - 1 for line in lines]))
+    return float(np.prod([len(line) - 1 for line in lines]))
 
 
-def mean_ratio(coarse: int, fine: int) -> float:
+def mean_ratio(coarse: float, fine: float) -> float:
     """Refinement ratio on average of the axes, of two numbers of cells."""
     return float((fine / coarse) ** (1 / 3))
 
