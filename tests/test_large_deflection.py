@@ -76,7 +76,9 @@ def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(s
         made.mesh, made.material, fixed=np.zeros(x.shape, bool), membrane=membrane(PAPER, made)
     )
     solid = PAPER.solid
-    exact = solid.young / (1 - 0.3) * (1e-4) ** 2 * PAPER.depth * PAPER.width * PAPER.height
+    relaxed = (solid.complex_modulus(0.0) / solid.shear_modulus).real
+    area = PAPER.width * PAPER.height
+    exact = relaxed * solid.young / (1 - 0.3) * (1e-4) ** 2 * PAPER.depth * area
     assert free.energy(stretched.ravel()) == pytest.approx(exact, rel=1e-3)
 
 
@@ -200,7 +202,7 @@ def test_what_it_does_not_answer_is_refused():
 @pytest.mark.parametrize("model", ["fem-nonlinear", "fem-nonlinear-transient"])
 @pytest.mark.parametrize(
     ("body", "got"),
-    [(Body(), "not a slab with absorbing sides"), (replace(PAPER, sides="absorbing"), "a sheet")],
+    [(Body(), "not a slab"), (replace(PAPER, sides="absorbing"), "a sheet")],
 )
 def test_nonlinear_models_are_for_sheets_that_are_held(model, body, got):
     for h in (None, 0.01):
@@ -229,5 +231,5 @@ def test_a_lifted_sheet_feels_what_the_focus_has_left_there(model):
 
 def test_a_tilted_sheet_is_refused():
     tilted = replace(SCENE.body, placement=Placement(tilt_x=0.1))
-    with pytest.raises(ValueError, match="lies across the beam"):
+    with pytest.raises(ValueError, match="not a tilted one"):
         compute(replace(SCENE, body=tilted), "fem-nonlinear", h=0.0125)

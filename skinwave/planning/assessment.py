@@ -26,7 +26,7 @@ from skinwave.planning.refinement import (
     quantity_of_interest,
 )
 from skinwave.planning.series import series_error
-from skinwave.planning.warnings import beyond_linear, of_elements
+from skinwave.planning.warnings import beyond_linear, of_elements, of_ends_and_band
 from skinwave.scene import Body, Load, Reading, Scene
 
 Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
@@ -94,10 +94,14 @@ def told(
     fine = about_its_rest(scene, fine)
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
     _, error = convergence(meshed or body, (other, size), (found, fine), tolerance, same=same)
-    error += coarse.effort.estimate + series_error(scene, response.model, tolerance, coarse)
-    error += absorbing_error(scene, body, tolerance, solver=solver)
-    error += above_band(response.values, response.times[1] - response.times[0])
-    warnings = sentences(scene, response, tolerance, h=size, error=error)
+    series = series_error(scene, response.model, tolerance, coarse)
+    at_ends = absorbing_error(scene, body, tolerance, solver=solver)
+    sudden = above_band(response.values, response.times[1] - response.times[0])
+    warnings = (
+        *sentences(scene, response, tolerance, h=size, error=error),
+        *of_ends_and_band(scene, at_ends, sudden, tolerance),
+    )
+    error += coarse.effort.estimate + series + at_ends + sudden
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)
 

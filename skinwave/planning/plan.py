@@ -22,7 +22,6 @@ from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import Prepared, answer, sample_times
-from skinwave.models.reduction import BAND
 from skinwave.planning.boundaries import absorbing_error, extended
 from skinwave.planning.estimates import (
     NO_BOUND,
@@ -41,6 +40,7 @@ from skinwave.planning.sheets import why_modes
 from skinwave.planning.start import start_left_out
 from skinwave.planning.warnings import (
     error_not_estimated,
+    of_ends_and_band,
     of_mesh,
     over_tolerance,
     start_over_tolerance,
@@ -194,9 +194,7 @@ def plan(
         rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
         warnings=(
             *of_mesh(scene, mesh, tolerance),
-            *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
-            *over_tolerance(f"the {scene.quantity} above {BAND:g} Hz", sudden, tolerance,
-                      "the displacement, or a load that begins smoothly, is"),
+            *of_ends_and_band(scene, at_ends, sudden, tolerance),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
             *start_over_tolerance(asked, start, tolerance),

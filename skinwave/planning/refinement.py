@@ -76,11 +76,13 @@ class SizeController:
 
 
 CONTROLLER = SizeController()
+NO_MOTION = 1e-9  # of the probe that moves most: what a weaker one reads is round-off
 
 
 def relative_change(other: NDArray[Any], found: NDArray[Any]) -> float:
     """Change of a quantity of interest (k, p) from another mesh's, relative, of the worst probe."""
-    size = np.maximum(np.linalg.norm(found, axis=0), 1e-300)
+    size = np.linalg.norm(found, axis=0)
+    size = np.maximum(size, max(NO_MOTION * size.max(), 1e-300))
     return float((np.linalg.norm(found - other, axis=0) / size).max())
 
 
@@ -304,8 +306,9 @@ def above_band(waveforms: Floats, step: float) -> float:
     """
     energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
     frequencies = np.arange(len(energy)) / (2 * step * len(energy))
-    above = energy[frequencies > BAND].sum(axis=0)
-    return float(np.sqrt((above / np.maximum(energy.sum(axis=0), 1e-300)).max()))
+    above, whole = energy[frequencies > BAND].sum(axis=0), energy.sum(axis=0)
+    whole = np.maximum(whole, max(NO_MOTION**2 * whole.max(), 1e-300))
+    return float(np.sqrt((above / whole).max()))
 
 
 def convergence(

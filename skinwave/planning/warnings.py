@@ -8,6 +8,7 @@ from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from skinwave.models import Model, named
 from skinwave.models.advice import cures_for, in_words
+from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import Refined, enough
@@ -42,6 +43,30 @@ def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
             f"an element size of about {size:.2g} mm is",
         ),
         *under_resolved(mesh.goal.widest, spot_scale(scene.pressure)),
+    )  # fmt: skip
+
+
+def of_ends_and_band(
+    scene: Scene, at_ends: float, sudden: float, tolerance: float
+) -> tuple[str, ...]:
+    """Warnings of what a reduced body leaves out beside the error of its elements.
+
+    Parameters
+    ----------
+    scene : Scene
+    at_ends, sudden : relative errors of its absorbing ends, and of the motion above `BAND`
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    sentences
+    """
+    return (
+        *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
+        *over_tolerance(
+            f"the {scene.quantity} above {BAND:g} Hz", sudden, tolerance,
+            "the displacement, or a load that begins smoothly, is",
+        ),
     )  # fmt: skip
 
 
