@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -105,8 +106,14 @@ def quick_maps(run: Run) -> Drawn:
     """A body's map and the kernel's, where the body's costs next to nothing."""
     if not has_wavenumber_integral(run.scene):
         return ()
-    x, y = grid(run.scene)
-    return body_map(run.scene, x, y), kernel_map(run.scene.pressure, x, y)
+    surface = _layer_map(run.scene)
+    return surface, kernel_map(run.scene.pressure, surface.x, surface.y)
+
+
+@lru_cache(maxsize=16)  # of a scene and others of its materials, which several parts of a page show
+def _layer_map(scene: Scene) -> SurfaceMap:
+    """Map of a laterally infinite body."""
+    return body_map(scene, *grid(scene))
 
 
 def first_of(names: Iterable[str]) -> str:
@@ -172,5 +179,5 @@ def _shares(scene: Scene) -> tuple[float, float] | None:
         varied += [with_values(scene, values)] * bool(values)
     x, y = grid(scene)
     kernel = kernel_map(scene.pressure, x, y).rms
-    found = [share_outside(kernel, body_map(each, x, y).rms) for each in varied]
+    found = [share_outside(kernel, _layer_map(each).rms) for each in varied]
     return min(found), max(found)
