@@ -98,13 +98,14 @@ def test_a_sheet_that_hardly_bends_moves_from_rest_as_a_linear_plate():
     body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=held)
     weak = MovingPressure(tacton=Tacton(am_frequency=60, duration=0.02), peak_pressure=1e-3)
     scene = Scene(pressure=weak, body=body, probes=((0.0, 0.0), (5e-3, 5e-3)))
-    for quantity, bound in (("displacement", 0.03), ("acceleration", 0.1)):
+    for quantity, bound in (("displacement", 0.03), ("acceleration", 0.04)):
         asked = replace(scene, quantity=quantity)
         linear = compute(asked, "plate-modes-transient").values
         found = compute(asked, "fem-nonlinear", h=2e-3, dt=1e-4)
         difference = np.linalg.norm(found.values - linear, axis=0)
         error = (difference / np.linalg.norm(linear, axis=0)).max()
-        assert error < min(bound, 1.1 * found.expected_error + 0.01)
+        assert error < bound
+        assert error < 1.1 * found.expected_error
 
 
 def test_a_step_that_fails_is_halved(sheet, monkeypatch):
