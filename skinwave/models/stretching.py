@@ -29,7 +29,7 @@ from simple_model import Effort, Response
 from simple_model.load_spectrum import Complex, load_lines
 from simple_model.material import Material
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
-from simple_model.sampling import below_half_the_rate, resolving_step
+from simple_model.sampling import below_half_the_rate, highest_driving, resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.effort import Clock
@@ -172,11 +172,9 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
     force = _modal_force(scene, sheet.linear, times, dt)
     march = _march(sheet.modes.elastic, force, dt, request, clock, read=read, rows=rows)
     with clock("linear part"):
-        motion, solids, plain = (
-            respond(sheet.linear, scene.pressure),
-            _solids(scene),
-            _normal(scene),
-        )
+        solids, plain = _solids(scene), _normal(scene)
+        highest = highest_driving(scene.pressure, times)
+        motion = respond(sheet.linear, scene.pressure, highest=highest)
         linear = _from_rest(motion, rows, times, asked, solids)
         bent, stepped = (
             sampled_components(steps, dt, times, asked, solids)
