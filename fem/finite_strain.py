@@ -282,8 +282,17 @@ def internal_force(part: Part, u: Floats) -> Floats:
 
 
 def stress_force(part: Part, u: Floats, strain: Floats) -> Floats:
-    """Nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at the displacement u (n, 3)
-    in metre.
+    """Nodal forces of the stress of a strain.
+
+    Parameters
+    ----------
+    part : Part
+    u : (n, 3) float, metre, displacement
+    strain : (e, q, k, l) float
+
+    Returns
+    -------
+    (n, 3) float, N
     """
     return spread_stress(part, stress(part, strain) @ deformation(part, u)[0])
 

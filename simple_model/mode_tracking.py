@@ -95,12 +95,16 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
 
 
 def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) -> Floats:
-    """Frequencies (g,) in rad/s in the middle of gaps across which modes are not surely followed.
+    """Frequencies in the middle of gaps across which modes are not surely followed.
 
     Parameters
     ----------
     found, omega, most : as of `tracked`
     waves : (f, m) bool, whether a root is a wave; the slowest have to be followed
+
+    Returns
+    -------
+    (g,) float, rad/s
     """
     from scipy.optimize import linear_sum_assignment  # which takes long to import
 
@@ -125,7 +129,17 @@ def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) ->
 
 
 def merged(found: Found, omega: Floats, other: Found, further: Floats) -> tuple[Found, Floats]:
-    """Roots at two sets of frequencies, and these in rad/s, ascending."""
+    """Roots at two sets of frequencies together.
+
+    Parameters
+    ----------
+    found, other : Found, roots at each set
+    omega, further : (f,) and (g,) float, rad/s, these sets
+
+    Returns
+    -------
+    Found, and frequencies (f + g,) in rad/s, ascending
+    """
     both = np.concatenate([omega, further])
     order = np.argsort(both)
     pairs = ((each.name, getattr(found, each.name), getattr(other, each.name))

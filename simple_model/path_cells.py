@@ -217,7 +217,17 @@ def jump_phases(pressure: MovingPressure) -> Floats:
 
 
 def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
-    """Times (j,) in s between two at which the load jumps at some place."""
+    """Times at which the load jumps at some place.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    start, end : float, s, between which they are
+
+    Returns
+    -------
+    (j,) float, s
+    """
     tacton, phases = pressure.tacton, jump_phases(pressure)
     f_d = tacton.trajectory.drawing_frequency
     found = [np.empty(0)]
@@ -233,15 +243,19 @@ def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
 
 
 def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
-    """Positions (q, 2) in metre and the matrix (m, q) that interpolates what is known there of a
-    focus, to fractions (m,) of the period: by cubics along each part of the path that has more of
-    them than its nodes are.
+    """Positions along a path, and the interpolation from them to phases.
+
+    By cubics along each part of the path that has more phases than nodes.
 
     Parameters
     ----------
     path : Trajectory
     phases : (m,) float, fractions of the period
-    detail : metre, of the focal spot
+    detail : float, metre, of the focal spot
+
+    Returns
+    -------
+    positions (q, 2) in metre, and the matrix (m, q) that interpolates what is known there
     """
     bounds, lengths = path.parts
     part = np.clip(np.searchsorted(bounds, phases, side="right") - 1, 0, len(lengths) - 1)

@@ -255,7 +255,16 @@ def modal_motion(
 def modal_motion_apart(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Modal coordinates as of `modal_motion`, without the coupling of the modes."""
+    """Modal coordinates as of `modal_motion`, without the coupling of the modes.
+
+    Parameters
+    ----------
+    modes, frequencies, forces, modulus : as of `modal_motion`
+
+    Returns
+    -------
+    (f, m) complex
+    """
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     bending = modulus(w) * modes.elastic
     found = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)

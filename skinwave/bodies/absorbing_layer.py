@@ -74,7 +74,18 @@ def layer_line(layer: AbsorbingLayer, half: Floats) -> Floats:
 
 
 def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
-    """Damping profile (m,) in 1/s of the absorbing layer: 0 in the body, quadratic beyond it."""
+    """Damping profile of the absorbing layer: 0 in the body, quadratic beyond it.
+
+    Parameters
+    ----------
+    body : Body
+    layer : AbsorbingLayer
+    mesh : TetMesh, of m elements
+
+    Returns
+    -------
+    (m,) float, 1/s
+    """
     ends = np.array([body.width / 2, body.height / 2, body.depth])
     middles = np.abs(mesh.points[mesh.tets[:, :4]].mean(axis=1))
     beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / layer.width

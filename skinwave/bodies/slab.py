@@ -30,8 +30,17 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
-    """Structured mesh whose elements follow the layers, with any absorbing layer around and below
-    it, `wider` times as wide as usual.
+    """Structured mesh whose elements follow the layers, with any absorbing layer around and below.
+
+    Parameters
+    ----------
+    body : Body
+    h : float, metre, element size
+    wider : float, width of the absorbing layer over its usual width
+
+    Returns
+    -------
+    Discretised
     """
     return on_lines(body, body_lines(body, h), wider)
 
@@ -54,8 +63,19 @@ def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
 
 
 def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
-    """Structured mesh on grid lines (n,) in metre through the body, with any absorbing layer around
-    and below it; planes between its layers are met instead of lines that are close to them.
+    """Structured mesh on grid lines, with any absorbing layer around and below it.
+
+    Planes between layers are met instead of lines that are close to them.
+
+    Parameters
+    ----------
+    body : Body
+    lines : three arrays (n,) in metre, through the body
+    wider : float, width of the absorbing layer over its usual width
+
+    Returns
+    -------
+    Discretised
     """
     x, y, z = lines
     planes = [-start for start, _ in body.strata[1:]]

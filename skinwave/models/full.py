@@ -187,7 +187,16 @@ def in_time(
 def sampled_components(
     stepped: Floats, dt: float, times: Floats, asked: Quantity, solids: tuple[Material, ...] = ()
 ) -> Floats:
-    """Components (t, p c) of a quantity at `times`; parameters as of `in_time`."""
+    """Components of a quantity at sample times.
+
+    Parameters
+    ----------
+    stepped, dt, times, asked, solids : as of `in_time`
+
+    Returns
+    -------
+    (t, p c) float
+    """
     from scipy.interpolate import CubicSpline  # which takes long to import
 
     if asked.relaxes:

@@ -78,8 +78,18 @@ def load_in_steps(
 
 
 def about(pressure: MovingPressure, points: Floats, t: float, over: float) -> Floats:
-    """Pressure (k,) in Pa at points (k, 3) in metre and a time in s; if it jumps in the time `over`
-    about that, its mean over it from the start on.
+    """Pressure about a time: its mean over a step in which it jumps, else its value.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    points : (k, 3) float, metre
+    t : float, s
+    over : float, s, of the step about t; the mean is taken from the start on
+
+    Returns
+    -------
+    (k,) float, Pa
     """
     start, end = max(t - over / 2, 0.0), t + over / 2
     jumps = jump_times(pressure, start, end) if isinstance(pressure, MovingPressure) else []

@@ -339,8 +339,17 @@ def steady_waveforms(prepared: Prepared, scene: Scene, times: Floats) -> Floats:
 def components(
     prepared: Prepared, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of the components that the probes of a reduced body read, with their rates and the
-    relaxation of stress.
+    """Response of the components that the probes read, with rates and the relaxation of stress.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    *pressures : MovingPressure, the components of the load
+    highest : float, Hz, up to which lines are kept
+
+    Returns
+    -------
+    ReducedResponse
     """
     motion = read_at(respond(prepared.body, *pressures, highest=highest), prepared.read)
     if moved := prepared.load.support_motion:

@@ -173,8 +173,17 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
 def respond(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of a reduced body to a moving pressure, or to the components of another load, in its
-    coordinates (online stage); to their lines below a frequency in Hz.
+    """Response of a reduced body to a moving load, in its coordinates (online stage).
+
+    Parameters
+    ----------
+    reduced : ReducedBody
+    *pressures : MovingPressure, the components of the load
+    highest : float, Hz, up to which lines are kept
+
+    Returns
+    -------
+    ReducedResponse
 
     Raises
     ------

@@ -229,7 +229,18 @@ def beyond_prediction(
 
 
 def start_over_tolerance(model: Model | None, start: float, tolerance: float) -> tuple[str, ...]:
-    """Warning of a model of the steady state where the start from rest is above the tolerance."""
+    """Warning of a steady-state model that leaves out a start above the tolerance.
+
+    Parameters
+    ----------
+    model : Model or None
+    start : float, relative error that leaving the start out makes
+    tolerance : float, relative error that is asked for
+
+    Returns
+    -------
+    one sentence, or none
+    """
     if model is None:
         return ()
     what = f"{model.name}, which leaves out the initial transient,"
