@@ -234,8 +234,9 @@ def flat_answer(table: Table, scene: Scene, moving: bool = False) -> Answer:
 
     pressure = scene.pressure
     response = _at_point(table, scene) if scene.reading.is_plain else compute(scene, "flat-body")
-    f, w = path_amplitudes(_steady(pressure))
-    away = np.linalg.norm(places()[:, None] - path_samples(pressure), axis=2)
+    steady = _steady(pressure)
+    f, w = path_amplitudes(steady)
+    away = np.linalg.norm(places()[:, None] - path_samples(steady), axis=2)
     fine = np.linspace(0, FURTHEST, FINER * len(table.distances))
     index = np.rint(away / fine[1]).astype(np.intp)
     of_lines = CubicSpline(table.distances, table.along_frequencies(f), axis=1)(fine)
@@ -257,8 +258,9 @@ def flat_lines(table: Table, scene: Scene) -> tuple[Floats, fem.Complex]:
     """Frequencies (f,) in Hz and steady lines (f,) in metre of a scene's probe."""
     from scipy.interpolate import CubicSpline  # which takes long to import
 
-    f, w = path_amplitudes(_steady(scene.pressure))
-    away = np.linalg.norm(scene.probe_points[0, :2] - path_samples(scene.pressure), axis=1)
+    steady = _steady(scene.pressure)
+    f, w = path_amplitudes(steady)
+    away = np.linalg.norm(scene.probe_points[0, :2] - path_samples(steady), axis=1)
     g = table.along_distances(away)
     return f, (CubicSpline(table.frequencies, g, axis=0)(f) * w).sum(axis=1)
 
