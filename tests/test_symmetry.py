@@ -39,7 +39,7 @@ def test_probes_on_the_plane_see_the_even_part_alone(monkeypatch, body, h):
     part, whole = motions(monkeypatch, body, ON_X, h)
     assert part.effort.dofs < 0.6 * whole.effort.dofs
     error = np.abs(part.displacement - whole.displacement).max()
-    assert error < 1e-5 * np.abs(whole.displacement).max()
+    assert error < 1e-4 * np.abs(whole.displacement).max()  # above the band of the reductions
 
 
 def test_lines_are_solved_on_the_part_that_the_probes_see(monkeypatch):
@@ -58,7 +58,7 @@ def test_a_probe_at_the_middle_sees_a_quarter(monkeypatch):
     part, whole = motions(monkeypatch, SLAB, ((0.0, 0.0),), 5e-3)
     assert part.effort.dofs < 0.4 * whole.effort.dofs
     error = np.abs(part.displacement - whole.displacement).max()
-    assert error < 1e-5 * np.abs(whole.displacement).max()
+    assert error < 1e-4 * np.abs(whole.displacement).max()  # above the band of the reductions
 
 
 def test_probes_beside_the_plane_see_all_of_it(monkeypatch):
