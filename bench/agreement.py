@@ -344,7 +344,9 @@ def _pairs(answers: dict[str, Response]) -> Iterator[Pair]:
 
 
 def _is_bent(*answers: Response) -> bool:
-    return any("linear" in each for answer in answers for each in answer.effort.warnings)
+    return any(
+        "linear bending holds" in each for answer in answers for each in answer.effort.warnings
+    )
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
