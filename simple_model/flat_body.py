@@ -43,7 +43,7 @@ from simple_model.path_cells import (
 )
 from simple_model.pressure import MovingPressure, check_lines
 from simple_model.response import Effort, Response, step
-from simple_model.sampling import SLOWEST, below_half_the_rate, finer, is_folded, reached
+from simple_model.sampling import below_half_the_rate, finer, is_folded, reached
 from simple_model.trajectory import Floats
 from simple_model.wavenumber_integral import Field, normal_field, point_integrals
 
@@ -52,7 +52,9 @@ if TYPE_CHECKING:
 
 PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
 WRAPPED = 1e-5  # damped by this
-ABRUPT = 4  # samples of a load that jumps, or turns, in each of these
+FINEST = 20_000.0  # Hz of its samples
+BAND_END = 3.0  # of the error function that ends its band from half the highest frequency on
+ABRUPT = 2  # samples of a load that jumps, or turns, in each of these
 ENDING = 6.0  # of the error function that ends a load after the record
 FEW_DISTANCES = 40  # are integrated one by one, without a spline
 AT_ONCE = 2**22  # values that are transformed at a time, some hundred megabytes
@@ -247,11 +249,16 @@ def field_history(
     """
     _check(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
-    within = max(1, int(np.ceil(step(times) * SLOWEST - 1e-6)))
+    within = max(1, int(np.ceil(step(times) * FINEST - 1e-6)))
     dt, n = step(times) / within, (len(times) - 1) * within + 1
     padded = next_fast_len(PADDING[0] * n + PADDING[1], real=True)
     damping = -np.log(WRAPPED) / (padded * dt)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
+    folded = is_folded(pressure, times)
+    if not folded and finer(reached(pressure), step(times)) > 1:
+        passed = below_half_the_rate(w.real / (2 * np.pi), times).astype(float)
+    else:  # a spectrum that ended at once would ring after the start of an acceleration
+        passed = erfc(BAND_END * (4 * w.real * dt / np.pi - 3)) / 2
 
     def lasting(t: Floats) -> Floats:
         """Factor of the load at times (t,) in s, with the damping of the transform."""
@@ -261,7 +268,7 @@ def field_history(
 
     jumps = jump_times(pressure, 0.0, padded * dt)
     parts = finer(reached(pressure), dt)
-    if is_folded(pressure, times):
+    if folded:
         knots, of_load = _low_passed(pressure, 0.5 / step(times), padded, dt, lasting)
         parts = 1
     else:
@@ -280,6 +287,7 @@ def field_history(
                 transformed = rfft(x, axis=0)[: len(w)] / parts
                 u[:, i, m] += np.einsum("wj,wj->w", g[c][:, some], transformed)
     t = dt * np.arange(n)[::within]
+    u *= passed[:, None, None]
     return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
 
 
