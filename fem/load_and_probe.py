@@ -314,7 +314,10 @@ def _seen(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
     order = np.lexsort((barycentric.min(axis=1), level, who))
     last = order[np.append(np.diff(who[order]) > 0, True)[: len(order)]]
     owner, coordinates = np.full(len(points), -1), np.zeros((len(points), 3))
-    owner[who[last]], coordinates[who[last]] = which[last], barycentric[last]
+    # On an edge exactly: nodes off a clamped one would add round-off to what stays at rest.
+    barycentric = np.where(np.abs(barycentric) < CLOSE, 0.0, barycentric)[last]
+    owner[who[last]] = which[last]
+    coordinates[who[last]] = barycentric / barycentric.sum(axis=1, keepdims=True)
     return owner, coordinates
 
 

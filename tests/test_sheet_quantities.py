@@ -155,7 +155,7 @@ def test_a_scene_of_a_sheet_has_its_quantities_by_every_model_of_elements():
     modal = compute(bent, "fem-nonlinear", h=5e-3, dt=1e-4).values
     linear = compute(bent, "fem", h=5e-3).values
     assert modal.shape == linear.shape
-    assert (modal[0] == 0).all()  # from rest
+    assert (modal[0] < 1e-12 * modal.max(axis=0)).all()  # from rest, but for round-off
     assert (modal[1:] > 0).all()
     for model in ("flat-body", "plate-modes"):
         with pytest.raises(ValueError, match=f"{model} has no largest shear strain"):

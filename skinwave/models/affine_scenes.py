@@ -58,9 +58,9 @@ def _check_load(scene: Scene) -> None:
         )
     if scene.load.support_motion:
         raise ValueError(
-            f"a body with free materials has no {scene.load.support_motion.words}, whose inertial "
-            "force goes with the density; leave support_motion out, or reduce the body of each "
-            "material"
+            f"a body with free materials does not take {scene.load.support_motion.words}, whose "
+            "inertial force goes with the density; leave support_motion out, or reduce the body of "
+            "each material"
         )
 
 

@@ -96,7 +96,7 @@ def _limits(
     yield from of_air(scene.body)
     if scene.load.support_motion and not may_move:
         yield Limit(
-            why=f"has no {scene.load.support_motion.words}",
+            why=f"does not take {scene.load.support_motion.words}",
             cure="leave out support_motion",
             change=lambda scene: replace(scene, load=replace(scene.load, support_motion=None)),
         )
