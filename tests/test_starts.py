@@ -1,11 +1,14 @@
 """Starts from rest: models of the steady state leave them out, and state them."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from skinwave import SkinwaveWarning, plan, simulate
+from skinwave.comparison import compare
+from skinwave.models import Request, named
 from skinwave.scene_file import loads
 from skinwave.simulation import compute
 
@@ -71,6 +74,20 @@ def test_wavenumber_integrals_state_the_start_of_the_quantity(quantity):
     assert any("flat-body is enough" in sentence for sentence in said)
 
 
+@pytest.mark.parametrize("quantity", ["velocity", "acceleration"])
+def test_wavenumber_integrals_state_a_jump_above_their_band(quantity):
+    """Beside eight times the band."""
+    scene = loads(f'{LAYER}quantity = "{quantity}"')
+    found = compute(scene, "flat-body")
+    times = found.times[1] / 16 * np.arange(16 * len(found.times))
+    fine = named("flat-body").solve(
+        scene, Request(times=times, tolerance=1e-3, report=lambda phase, share: None)
+    )
+    true = compare(replace(found, values=fine.values[::16]), found).relative_l2.max()
+    assert true > (5e-3 if quantity == "acceleration" else 1e-3)
+    assert true < 1.1 * plan(scene, model="flat-body").error < 5 * true
+
+
 def test_elements_state_the_start_of_the_quantity():
     scene = loads(f'{BLOCK}quantity = "acceleration"')
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
@@ -91,7 +108,10 @@ def test_a_start_counts_over_the_times_that_are_asked_for():
 
 
 def test_an_unconstrained_body_states_a_drift_that_is_all_of_its_motion():
-    scene = loads(BLOCK.replace("[probes]", 'base = "free"\n[probes]'))
+    ends = (
+        'base = "free"\nsides = {left = "absorbing", right = "free", front = "free", back = "free"}'
+    )
+    scene = loads(BLOCK.replace("[probes]", f"{ends}\n[probes]"))
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
     assert 0.9 < left < 1.2
     assert left < error + 0.01 < 2.0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
+from simple_model.flat_body import FINEST
 from simple_model.focus import gaussian_width
 from simple_model.sampling import resolving_step
 from skinwave import notebook
@@ -37,13 +38,14 @@ from skinwave.planning.refinement import above_band, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
 from skinwave.planning.sheets import why_modes
-from skinwave.planning.start import start_left_out
+from skinwave.planning.start import start_left_out, sudden_left_out
 from skinwave.planning.warnings import (
     error_not_estimated,
     of_ends_and_band,
     of_mesh,
     over_tolerance,
     start_over_tolerance,
+    sudden_over_tolerance,
 )
 from skinwave.sample_grid import sample_grid
 from skinwave.scene import FLAT, Body, Scene
@@ -270,6 +272,7 @@ def _without_mesh(
     if asked is None:
         asked = HARMONIC if np.hypot(returned, start) <= tolerance else FLAT_BODY
     model, left = asked.name, start if asked.is_steady else 0.0
+    sudden = sudden_left_out(scene, asked, times)
     reason = f"{_section(scene.body)} without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
@@ -282,13 +285,14 @@ def _without_mesh(
             f"{takers(scene)[0]} is" if takers(scene) else "absorbing sides are",
         ),
         *start_over_tolerance(asked, left, tolerance),
+        *sudden_over_tolerance(scene, FINEST / 4, sudden, tolerance),
     )
     rows = [
         *rows,
         PlanRow(what="model", value=model, reason="as asked" if warnings else reason),
         *left_out(scene, highest),
     ]
-    error = float(np.linalg.norm([returned, left, INTEGRAL_ERROR]))
+    error = float(np.linalg.norm([returned, left, sudden, INTEGRAL_ERROR]))
     return Plan(
         model=model, body=scene.body, highest=highest, error=error,
         seconds=asked.seconds, memory=asked.memory, rows=tuple(rows), warnings=warnings,

@@ -1,14 +1,17 @@
-"""The start from rest of a response, which models of the steady state leave out."""
+"""The start from rest of a response: what models leave out of it, all of it or what is too fast."""
 
 from collections.abc import Callable
+from math import ceil
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes.tetmesh import Floats
+from simple_model.flat_body import FINEST
 from skinwave.effort import silent
 from skinwave.models import Model, Request, named
 from skinwave.models.prepared import Prepared, answer, steady_waveforms
+from skinwave.planning.refinement import relative_change
 from skinwave.sample_grid import sample_grid
 from skinwave.scene import Scene
 
@@ -52,6 +55,33 @@ def start_left_out(
         return _share(steady_waveforms(prepared, scene, grid), lambda n: whole[:n], first)
     whole_by = named(model.from_rest)
     return _share(solved(model, grid), lambda n: solved(whole_by, grid[:n]), first)
+
+
+def sudden_left_out(scene: Scene, model: Model, times: ArrayLike | None = None) -> float:
+    """Part of a wavenumber integral from rest that is above its band, relative and of the worst
+    probe.
+
+    Velocity and acceleration jump where a load begins at once; as the band doubles, their error
+    halves, and is twice the change.
+
+    Parameters
+    ----------
+    scene, model, times : as for `start_left_out`
+
+    Returns
+    -------
+    float; 0 of a quantity that does not jump, and of a steady state
+    """
+    if model.is_steady or not scene.reading.asked.rate:
+        return 0.0
+    grid, first = sample_grid(scene, times)
+    parts = max(2, ceil(2 * FINEST * grid[1]))  # of a step, with twice the band
+    fine = np.asarray(grid[1] / parts * np.arange(parts * (len(grid) - 1) + 1), np.float64)
+    usual, wide = (
+        model.solve(scene, Request(times=t, tolerance=EXACT, report=silent)).values
+        for t in (grid, fine)
+    )
+    return 2 * relative_change(usual[first:], wide[::parts][first:])
 
 
 def _share(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> float:

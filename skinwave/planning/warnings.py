@@ -63,10 +63,19 @@ def of_ends_and_band(
     """
     return (
         *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
-        *over_tolerance(
-            f"the {scene.quantity} above {BAND:g} Hz", sudden, tolerance,
-            "the displacement, or a load that begins smoothly, is",
-        ),
+        *sudden_over_tolerance(scene, BAND, sudden, tolerance),
+    )
+
+
+def sudden_over_tolerance(
+    scene: Scene, band: float, sudden: float, tolerance: float
+) -> tuple[str, ...]:
+    """Warning of motion above a band in Hz that a response leaves out, as a relative error, if it
+    is more than the tolerance.
+    """
+    return over_tolerance(
+        f"the {scene.quantity} above {band:g} Hz", sudden, tolerance,
+        "the displacement, or a load that begins smoothly, is",
     )  # fmt: skip
 
 
