@@ -101,7 +101,7 @@ def told(
         *sentences(scene, response, tolerance, h=size, error=error),
         *of_ends_and_band(scene, at_ends, sudden, tolerance),
     )
-    error += coarse.effort.estimate + series + at_ends + sudden
+    error += response.effort.estimate + series + at_ends + sudden
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)
 

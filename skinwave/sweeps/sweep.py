@@ -357,12 +357,10 @@ def _on_mesh(scene: Scene, model_options: ModelOptions, mesh: Mesh) -> tuple[Res
         scene, answer(prepared, scene), prepared, mesh.h, model_options.tolerance,
         model_options.solver, compared=(mesh.coarser or 0.0, coarse), meshed=mesh.meshed,
     )  # fmt: skip
-    if not mesh.family:
-        return response, mesh
-    error = response.expected_error + prepared.effort.estimate
-    if error > model_options.tolerance and not model_options.h:
+    is_shared = mesh.family and not model_options.h
+    if is_shared and response.expected_error > model_options.tolerance:
         return _on_mesh(scene, model_options, _mesh(model_options, scene))
-    return replace(response, expected_error=error), mesh
+    return response, mesh
 
 
 def _said(error: Exception) -> str:

@@ -1,0 +1,65 @@
+"""One scene gives the same numbers by Python, command line, sweep and a body with free keys."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import skinwave
+from skinwave.cli import main
+from skinwave.parametric import answer
+from skinwave.scene_file import loads
+from skinwave.simulation import compute
+
+SCENE = """
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+shape = "circle"
+size_mm = 8
+speed_m_per_s = 5
+[body]
+size_x_mm = 16
+size_y_mm = 16
+thickness_mm = 5
+sides = "clamped"
+[probes]
+points_mm = [[0, 0], [4, 0]]
+"""
+SIZE = 2e-3  # metre
+AM = "tacton.am_frequency_hz"
+MODULUS = "body.material.shear_modulus_pa"
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    return skinwave.simulate(loads(SCENE), "fem", h=SIZE)
+
+
+def test_a_sweep_of_one_scene_is_its_simulation(simulated):
+    table = skinwave.sweep(loads(SCENE), {AM: [140.0]}, model="fem", h=SIZE, workers=1)
+    (row,) = table.rows
+    peaks = 1e6 * np.abs(simulated.values).max(axis=0)
+    np.testing.assert_allclose(row["peak_um"], peaks, rtol=1e-6)
+    assert row["expected_error"] == pytest.approx(simulated.expected_error, rel=1e-6)
+
+
+def test_a_body_with_a_free_modulus_is_that_of_its_own_value():
+    scene = loads(SCENE)
+    own = compute(scene, "fem", 1e-4, h=SIZE)
+    body = skinwave.prepare(scene, {MODULUS: (1e4, 5e4)}, tolerance=1e-6, h=SIZE)
+    found = answer(body, {MODULUS: scene.body.solid.shear_modulus})
+    np.testing.assert_allclose(found.values, own.values, atol=2e-6 * np.abs(own.values).max())
+
+
+def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE)
+    size = ["--h", "2", "--quiet"]
+    assert main(["run", "scene.toml", "--model", "fem", *size, "--out", "run"]) == 0
+    with np.load("run/responses.npz") as arrays:
+        largest = np.abs(simulated.values).max()
+        np.testing.assert_allclose(arrays["fem"], simulated.values, atol=1e-6 * largest)
+    record = json.loads(Path("run/record.json").read_text())
+    assert record["expected_error"] == pytest.approx(simulated.expected_error, rel=1e-6)
