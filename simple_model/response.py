@@ -442,7 +442,7 @@ def fit_lines(
     Raises
     ------
     ValueError
-        If a frequency is not below half the sampling rate.
+        If a frequency is not below half the sampling rate, or the samples are too few.
     """
     t, x = response.times, response.values
     basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
@@ -485,6 +485,8 @@ def _weighted_waves(
         raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
     first = int(np.argmax(times >= times[0] + settle * np.ptp(times)))
     span = float(np.ptp(times[first:]))
+    if not span:
+        raise ValueError(f"{len(times)} samples are too few to fit lines to; record more")
     distinct, which = _distinct(frequencies, 1 / span)
     basis = _waves(distinct, times)
     kept = basis[:, first:]

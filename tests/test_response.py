@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from simple_model import Response, windows
+from simple_model import Response, phasors, windows
 from simple_model.response import LINE_BETA
 
 TIMES = np.arange(5) / 10_000
@@ -71,3 +71,9 @@ def test_what_few_commands_need_is_not_imported_by_all():
     assert {"fem", "simple_model", "scipy.sparse"} <= set(said.stdout.split())
     few = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "matplotlib"}
     assert not few & set(said.stdout.split())
+
+
+def test_lines_of_two_samples_are_refused():
+    two = made(times=TIMES[:2], values=np.ones((2, 2)))
+    with pytest.raises(ValueError, match="2 samples are too few to fit lines to; record more"):
+        phasors(two, (100.0,))

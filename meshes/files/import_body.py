@@ -76,9 +76,8 @@ def body_from_file(
     Raises
     ------
     MeshError
-        If the file cannot be read, or what is wrong with its surface cannot be repaired.
-    TimeoutError
-        If the mesher takes longer.
+        If the file cannot be read, what is wrong with its surface cannot be repaired, or the mesher
+        takes longer.
     """
     progress(f"reading {Path(path).name}", 0.0)
     if Path(path).suffix.lower() in mesh_files.VOLUME_FORMATS:

@@ -78,9 +78,8 @@ def tetrahedralise(
     ------
     MeshError
         If the surface is not closed, crosses itself or is not sound otherwise; h, a size or
-        epsilon is out of range; the mesher fails, or what it returns is not what was asked for.
-    TimeoutError
-        If the mesher takes longer than `timeout`.
+        epsilon is out of range; the mesher fails or takes longer than `timeout`, or what it returns
+        is not what was asked for.
     """
     check(surface)
     check_size(surface, "h", h)
@@ -207,7 +206,7 @@ def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndar
         try:
             subprocess_call.run(MESHER, source, target, timeout, folder=folder, timeout=timeout)
         except TimeoutError:
-            raise TimeoutError(
+            raise MeshError(
                 f"the mesher was stopped after {timeout:g} s; take larger elements or a longer "
                 "timeout"
             ) from None
