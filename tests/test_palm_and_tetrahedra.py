@@ -465,7 +465,7 @@ def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plain = inputs(SPHERE)
     infinite = {"h": np.array(1e-4), "grid_sizes": np.full_like(plain["grid_sizes"], 1e-4)}
-    with pytest.raises(meshes.MeshError, match="stopped after 3 s; take larger elements or a longer"):
+    with pytest.raises(MeshError, match="stopped after 3 s; take larger elements or a longer"):
         tetra._run(plain | infinite, 3.0)
     assert not list(tmp_path.iterdir())
 
