@@ -247,8 +247,15 @@ def test_what_is_expected_of_a_mesh_is_near_its_true_error(h):
     assert 0.4 < found.error / true < 2.5
 
 
+ADRIFT = """
+size_x_mm = 30
+base = "free"
+sides = {left = "absorbing", right = "free", front = "free", back = "free"}
+"""
+
+
 def test_a_body_that_nothing_holds_is_warned_of():
-    text = SHORT.replace("size_x_mm = 60", 'size_x_mm = 30\nbase = "free"')
+    text = SHORT.replace("size_x_mm = 60", ADRIFT)
     scene = loads(text)
     assert any(
         "is unconstrained" in said for said in plan(scene, 0.3, model="fem", h=0.01).warnings
@@ -259,8 +266,7 @@ def test_a_body_that_nothing_holds_is_warned_of():
 
 def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
     """However long the body has been pushed."""
-    text = SHORT.replace("size_x_mm = 60", 'size_x_mm = 30\nbase = "free"\nsides = "absorbing"')
-    text = text.replace("size_y_mm = 60", "size_y_mm = 30")
+    text = SHORT.replace("size_x_mm = 60", ADRIFT).replace("size_y_mm = 60", "size_y_mm = 30")
     scenes = [loads(text.replace("0.05", seconds)) for seconds in ("0.1", "1")]
     found = [refined(scene, scene.body, 0.05, h=0.0075).error for scene in scenes]
     assert found[0] == pytest.approx(found[1], rel=0.02)

@@ -15,7 +15,7 @@ from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
 from skinwave.effort import Progress
-from skinwave.models.prepared import answer, prepare, reduction_tolerance
+from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import spot_scale
 from skinwave.planning.extent import PlanRow, symmetry
 from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
@@ -24,6 +24,7 @@ from skinwave.scene import Body, Scene
 WIDER = 2.0  # times the width of the layer
 # Of the change: slabs on springs, free ones and half-spaces had 1.0 to 1.3 times it in error.
 MARGIN = 1.5
+REDUCTION = 0.2, 0.01  # of the tolerance, and at most: errors of the two reduced bodies
 SHARE = 0.25  # of the tolerance: what absorbing ends may leave before the body is extended
 MOST_EXTENSIONS = 2
 
@@ -59,7 +60,7 @@ def absorbing_error(
             answer(
                 prepare(
                     body, scene.probe_points, progress, h=size, symmetry=axes, solver=solver,
-                    tolerance=reduction_tolerance(tolerance), reading=scene.reading,
+                    tolerance=min(REDUCTION[0] * tolerance, REDUCTION[1]), reading=scene.reading,
                     load=scene.load, discretise=partial(discretise, wider=wider),
                 ),
                 scene,

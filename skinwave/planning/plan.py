@@ -160,21 +160,21 @@ def plan(
         return replace(found, rows=tuple(rows))
     body: Body = scene.body
     cut: list[PlanRow] = []
-    if model is None or h is None:
-        body, cut = extent(scene, tolerance, highest)
-        body, at_ends, more = extended(scene, body, tolerance, progress, solver=solver)
-        cut = more or cut
-    else:  # all of it is meshed, as asked
-        at_ends = absorbing_error(scene, body, tolerance, progress, solver=solver)
-    rows += [
-        PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
-        *cut,
-    ]
     reduced = asked is None or asked.is_reduced
     axes = symmetry(scene) if reduced else ""
-    goal = reduced and h is None and has_goal_oriented(scene, body)
-    for_mesh = max(tolerance - at_ends, tolerance / 2)
     try:
+        if model is None or h is None:
+            body, cut = extent(scene, tolerance, highest)
+            body, at_ends, more = extended(scene, body, tolerance, progress, solver=solver)
+            cut = more or cut
+        else:  # all of it is meshed, as asked
+            at_ends = absorbing_error(scene, body, tolerance, progress, solver=solver)
+        rows += [
+            PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
+            *cut,
+        ]
+        goal = reduced and h is None and has_goal_oriented(scene, body)
+        for_mesh = max(tolerance - at_ends, tolerance / 2)
         if goal:
             mesh = goal_refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver)
         else:
