@@ -73,10 +73,10 @@ def sudden_over_tolerance(
     """Warning of motion above a band in Hz that a response leaves out, as a relative error, if it
     is more than the tolerance.
     """
-    return over_tolerance(
-        f"the {scene.quantity} above {band:g} Hz", sudden, tolerance,
-        "the displacement, or a load that begins smoothly, is",
-    )  # fmt: skip
+    smooth = "a load that begins smoothly"
+    cure = f"the displacement, or {smooth}," if scene.reading.asked.rate else smooth
+    what = f"the {scene.quantity} above {band:g} Hz"
+    return over_tolerance(what, sudden, tolerance, f"{cure} is")
 
 
 def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple[str, ...]:
