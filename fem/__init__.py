@@ -34,7 +34,6 @@ from fem.boundary import Support
 from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
 from fem.finite_strain import Elastic, Membrane, finite_strain
-from fem.goal import GoalError, goal_error
 from fem.harmonic import LineSolver, harmonic
 from fem.interior import displacement_operator, is_inside, locate
 from fem.linear_solver import Factor, available, factorise
@@ -83,7 +82,6 @@ __all__ = [
     "Elastic",
     "EnergyBalance",
     "Factor",
-    "GoalError",
     "LineSolver",
     "Material",
     "MaxwellBranch",
@@ -109,7 +107,6 @@ __all__ = [
     "factorise",
     "finite_strain",
     "from_young",
-    "goal_error",
     "harmonic",
     "imbalance",
     "impulse_response",

@@ -7,7 +7,6 @@ from meshes.facets import seen_from_above, tag_boundary
 from meshes.files.import_body import body_from_file
 from meshes.files.mesh_files import read, write
 from meshes.files.surface_files import read_surface
-from meshes.shapes.equidistributed import equidistributed
 from meshes.shapes.fingertip import Fingertip
 from meshes.shapes.palm import Palm
 from meshes.shapes.structured import (
@@ -56,7 +55,6 @@ __all__ = [
     "curve_boundary",
     "dihedral_angles",
     "edge_lengths",
-    "equidistributed",
     "extrude",
     "extruded",
     "facet_set",

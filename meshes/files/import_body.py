@@ -19,7 +19,7 @@ from meshes.surface.winding import check_inside
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
 from meshes.volume.inner import REST
 from meshes.volume.quality import dihedral_angles, edge_lengths
-from meshes.volume.tetrahedralise import EPSILON, Sizing, check_size, graded, tetrahedralise
+from meshes.volume.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
 
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h
 SMALLEST, LARGEST = 5e-3, 2.0  # m: diagonal of what can be a hand, or part of one
@@ -40,7 +40,6 @@ def body_from_file(
     up: str = "+z",
     inner: Sequence[PathLike] = (),
     clip: Sequence[float] | None = None,
-    sizing: Sizing | None = None,
     timeout: float = 600.0,
     say: Say = _unsaid,
     progress: Progress = _unsaid,
@@ -61,8 +60,6 @@ def body_from_file(
     inner : files of closed surfaces inside that of a surface file, in its frame and unit, such as
         those of bones, each of which becomes a region by the name of its file
     clip : least and greatest x, least and greatest y, metre from the middle of the palm.
-    sizing : function of points (n, 3) to edge lengths (n,), metre, about the palm's middle, to aim
-        at in a surface in the place of h, which still sets how near the mesh lies to it.
     timeout : float, second, of the mesher.
     say : gets a sentence on each thing that was found or done.
     progress : gets the phase, and 0.
@@ -107,8 +104,7 @@ def body_from_file(
     progress("filling it with tetrahedra", 0.0)
     check_size(surface, "h", h)
     grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
-    sizing = sizing or graded(h, grading)
-    mesh = tetrahedralise(surface, h, inner=bones, sizing=sizing, timeout=timeout)
+    mesh = tetrahedralise(surface, h, inner=bones, sizing=graded(h, grading), timeout=timeout)
     return _described(_with_sides(mesh, planes, 2 * EPSILON * h), say)
 
 

@@ -30,6 +30,8 @@ from meshes.tetmesh import (
 CLOSEST = 0.4  # of a cell: a grid line nearer to a plane is replaced by it
 MOST_UNKNOWNS = 3_000_000  # of a mesh: beyond it no factorisation fits in a workstation
 
+Lines = tuple[Floats, Floats, Floats]  # metre, increasing, along x, y and z
+
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
@@ -117,8 +119,8 @@ def block(
         lines = _even(x_length, h), _even(y_length, h), _even(depth, h, least=1) - depth / 2
     else:
         lines = (
-            _mirrored(graded_axis(x_length / 2, h, grading)),
-            _mirrored(graded_axis(y_length / 2, h, grading)),
+            mirrored(graded_axis(x_length / 2, h, grading)),
+            mirrored(graded_axis(y_length / 2, h, grading)),
             -graded_axis(depth, h, Grading(radius=0, **_beyond(grading)))[::-1],
         )
     return _with_roles(extrude(*lines, order=order), clamped="bottom", absorbing="sides")
@@ -346,7 +348,8 @@ def round_up(ratio: float) -> int:
     return int(np.ceil(ratio - 1e-9))
 
 
-def _mirrored(half: Floats) -> Floats:
+def mirrored(half: Floats) -> Floats:
+    """A line (2 n - 1,) from its half (n,) that begins at 0."""
     return np.concatenate([-half[:0:-1], half])
 
 

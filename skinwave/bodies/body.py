@@ -11,6 +11,7 @@ import numpy as np
 
 from fem.materials import Material
 from meshes import Palm
+from meshes.shapes.structured import Lines
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.compliance import Compliance
@@ -18,7 +19,6 @@ from simple_model.dispersion import DispersionCurves
 from simple_model.material import NOT_SKIN, PRESETS
 from skinwave import extensions
 from skinwave.bodies.discretised import Discretise, Discretised
-from skinwave.bodies.grid import Grid, Sized
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
     FLAT,
@@ -289,8 +289,8 @@ class BodyKind:
         layers, so that its matrices are sums over few geometries, which are else interpolated
     equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
         density stand for it (`sheet.bending_equivalent`); None where each has its own mesh
-    grid : grid of its structured mesh, whose lines may be where the error is; None without one
-    sized : its unstructured mesh, whose elements may have any size anywhere; None without one
+    grid_lines : lines (n,) in metre along x, y and z of the grid of its mesh, with elements of a
+        size in metre; None without a grid
     check_size : raises a ValueError for an element size in metre that has too many elements
     default_size : default element size of a body, metre
     interactive_size : element size in metre for a response within seconds, with some per cent error
@@ -322,8 +322,7 @@ class BodyKind:
     check_morph: Callable[[Body, Body, float], None] = lambda thinnest, thickest, h: None
     moves_in_proportion: bool = True
     equivalent: Callable[[Body], float] | None = None
-    grid: Grid | None = None
-    sized: Sized | None = None
+    grid_lines: Callable[[Body, float], Lines] | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3

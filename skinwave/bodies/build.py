@@ -64,7 +64,7 @@ def build(
     h : metre, element size; the default of the body if not given
     symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
         part with positive coordinates is meshed, with symmetry conditions on these planes
-    discretise : instead of that of its kind, such as one that follows an error estimate
+    discretise : instead of that of its kind
 
     Returns
     -------

@@ -9,19 +9,16 @@ import fem
 from fem.load_and_probe import facet_normals
 from meshes import TetMesh, body_from_file, boundary_facets, quadratic
 from meshes.facets import seen_from_above
-from meshes.files.mesh_files import VOLUME_FORMATS
 from meshes.tetmesh import Ints
-from meshes.volume.tetrahedralise import Sizing
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.grid import Sized
 from skinwave.bodies.hands import hand_size, in_its_layers, support
 
 NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
 
 
-def discretise(body: Body, h: float, sizing: Sizing | None = None) -> Discretised:
-    """Ten-node tetrahedra about the middle of a hand, growing away from it, or as a sizing asks.
+def discretise(body: Body, h: float) -> Discretised:
+    """Ten-node tetrahedra about the middle of a hand, growing away from it.
 
     The facet sets are `top`, seen from above, the file's own `bottom`, and `sides` where it was cut
     or has a set of that name. All else that it rests on is its support.
@@ -29,9 +26,7 @@ def discretise(body: Body, h: float, sizing: Sizing | None = None) -> Discretise
     Parameters
     ----------
     body : Body
-    h : metre, size of the elements about the middle; of a sizing, that of the coarsest elements
-        which lie as near to the surface
-    sizing : function of points (n, 3) to edge lengths (n,), metre, in the place of h
+    h : metre, size of the elements about the middle
 
     Returns
     -------
@@ -42,7 +37,7 @@ def discretise(body: Body, h: float, sizing: Sizing | None = None) -> Discretise
     MeshError
         If the body cannot be meshed, or its regions are not those of its file.
     """
-    mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up, sizing=sizing))
+    mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
     cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
     facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
     if not _is_rest(mesh):
@@ -54,13 +49,6 @@ def discretise(body: Body, h: float, sizing: Sizing | None = None) -> Discretise
 def _support(body: Body, mesh: TetMesh) -> fem.Support:
     """Support below, by the normals of the facets."""
     return support(body, mesh, facet_normals(mesh, boundary_facets(mesh.tets)), [])
-
-
-def _has_surface(body: Body) -> bool:
-    """Whether a body is a surface to be filled, and has no layers, of which elements of one size
-    may leave some to a coat.
-    """
-    return not body.layers and Path(body.file).suffix.lower() not in VOLUME_FORMATS
 
 
 def _is_rest(mesh: TetMesh) -> bool:
@@ -81,7 +69,6 @@ MESH = register(
         keys=("file", "unit", "up", "regions"),
         words=lambda body: f"body from {Path(body.file).name}, {body.up} towards the device",
         discretise=discretise,
-        sized=Sized(discretise=discretise, has=_has_surface),
         default_size=hand_size,
         is_bounded=False,
         may_be_coated=True,

@@ -19,14 +19,13 @@ from meshes import (
     stretched_palm,
 )
 from meshes.files.import_body import GROWTH
-from meshes.shapes.equidistributed import Lines
 from meshes.shapes.palm import gradient
-from meshes.tetmesh import Floats, Ints
+from meshes.shapes.structured import Lines, mirrored
+from meshes.tetmesh import Floats
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.coat import meshed_strata, thickest_coat
 from skinwave.bodies.discretised import Discretise, Discretised
-from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
 
 COARSEST = 2.0  # elements far from the middle, over those of h
@@ -81,17 +80,6 @@ def _cure(body: Body, h: float) -> str:
             continue
         return "take " + " and ".join(f"{name}_mm = {1e3 * x:.3g}" for name, x in values.items())
     return "take a mesh from a file"
-
-
-def on_lines(body: Body, lines: Lines) -> Discretised:
-    """Mapped mesh on grid lines (n,) in metre of the box around a palm without layers.
-
-    Raises
-    ------
-    MeshError
-        If its relief is too steep for it.
-    """
-    return _supported(body, hand_size(body), mapped_palm(body.palm, *lines))
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
@@ -160,13 +148,6 @@ def _supported(body: Body, h: float, mesh: TetMesh) -> Discretised:
     return in_its_layers(body, h, mesh, partial(_support, body))
 
 
-def cells(lines: Lines, mesh: TetMesh) -> Ints:
-    """Cell (e, 3) of each element of all of a mapped mesh, which are numbered by `kuhn_tets`."""
-    counts = tuple(len(line) - 1 for line in lines)
-    places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
-    return np.tile(places, (len(mesh.tets) // len(places), 1))
-
-
 def _coarsest(body: Body, h: float) -> float:
     """Largest element: larger ones do not follow the rim, where waves reflect and the base's
     support ends.
@@ -220,13 +201,7 @@ PALM = register(
         morph=morph,
         check_morph=check_morph,
         moves_in_proportion=False,
-        grid=Grid(
-            lines=body_lines,
-            discretise=on_lines,
-            cells=cells,
-            coarsest=lambda body: body.palm.edge_radius,
-            has=lambda body: not body.layers,
-        ),
+        grid_lines=body_lines,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
         named_sides=("front", "back"),

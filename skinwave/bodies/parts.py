@@ -146,10 +146,6 @@ class Placement:
             return points
         return points @ self.rotation.T + [*self.offset, self.lift]
 
-    def undone(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) under the device where they lie in the body before it is placed."""
-        return points if self == FLAT else (points - [*self.offset, self.lift]) @ self.rotation
-
 
 STEEPEST, FURTHEST_LIFT = np.pi / 3, 0.05
 FLAT = Placement()

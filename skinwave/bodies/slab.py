@@ -4,11 +4,10 @@ from functools import partial
 
 import numpy as np
 
-from meshes import Grading, TetMesh, extrude, graded_axis
+from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
-from meshes.shapes.equidistributed import Lines
-from meshes.shapes.structured import check_size, with_planes
-from meshes.tetmesh import Floats, Ints
+from meshes.shapes.structured import Lines, check_size, mirrored, with_planes
+from meshes.tetmesh import Floats
 from simple_model.compliance import layered
 from skinwave.bodies.absorbing_layer import (
     far_springs,
@@ -20,7 +19,6 @@ from skinwave.bodies.absorbing_layer import (
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers
-from skinwave.bodies.grid import Grid, mirrored
 from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.parts import Layer
 
@@ -101,15 +99,6 @@ def slab_lines(body: Body, h: float) -> Lines:
     return _extended(body, body_lines(body, h))
 
 
-def cells(lines: Lines, mesh: TetMesh) -> Ints:
-    """Cell (e, 3) of each element; of those in an absorbing layer the nearest one."""
-    middles = mesh.points[mesh.tets[:, :4]].mean(axis=1)
-    each = zip(lines, middles.T, strict=True)
-    return np.column_stack([
-        np.clip(np.searchsorted(line, x) - 1, 0, len(line) - 2) for line, x in each
-    ])  # fmt: skip
-
-
 def _extended(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
     """Grid lines through a body, with an absorbing layer where an end has one."""
     if not has_layer(body):
@@ -165,7 +154,7 @@ SLAB = register(
         },
         discretise=discretise,
         morph=morph,
-        grid=Grid(lines=body_lines, discretise=on_lines, cells=cells),
+        grid_lines=body_lines,
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),

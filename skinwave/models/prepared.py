@@ -115,7 +115,7 @@ def prepare(
     symmetry : as in `bodies.build.build`: of the load of all Tactons, wherever the probes lie
     reading : what the probes read; with symmetry, of normal motion alone
     load : what pushes, with its gravity; with symmetry, a pressure
-    discretise : as in `bodies.build.build`, of elements of no one size
+    discretise : as in `bodies.build.build`
 
     Returns
     -------
@@ -130,7 +130,7 @@ def prepare(
     name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
     with clock("read from cache"):
         entry = cache.load(name)
-    size = 0.0 if discretise else h or default_size(body)
+    size = h or default_size(body)
     report = progress or silent
     found = _from_cache(entry, size, probes, outputs.shape[0], clock) if entry else None
     if not found:

@@ -4,7 +4,6 @@ from skinwave.models.prepared import reduction_tolerance
 from skinwave.models.reduction import BAND
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
 from skinwave.planning.extent import PlanRow, coat_rows, left_out
-from skinwave.planning.goal_meshes import GoalMesh
 from skinwave.planning.refinement import Convergence, Refined
 from skinwave.scene import Scene
 
@@ -31,7 +30,7 @@ def element_rows(
     kept = "" if "factorise and reduce" in effort.seconds else ", which is cached"
     return [
         _symmetry_row(scene, axes),
-        _goal_row(found, found.goal) if found.goal else _uniform_row(found, tolerance, h),
+        _size_row(found, tolerance, h),
         *coat_rows(scene.body, found.h),
         PlanRow(
             what="reduction",
@@ -65,7 +64,7 @@ def _symmetry_row(scene: Scene, axes: str) -> PlanRow:
     )
 
 
-def _uniform_row(found: Refined, tolerance: float, h: float | None) -> PlanRow:
+def _size_row(found: Refined, tolerance: float, h: float | None) -> PlanRow:
     return PlanRow(
         what="element size",
         value=f"{1e3 * found.h:.2f} mm, {found.prepared.effort.dofs:,} dofs",
@@ -74,18 +73,6 @@ def _uniform_row(found: Refined, tolerance: float, h: float | None) -> PlanRow:
         f"{100 * found.error:.2g} % is left"
         if found.convergence is not Convergence.SINGLE_MESH
         else "the file's own, without another to compare it with",
-    )
-
-
-def _goal_row(found: Refined, mesh: GoalMesh) -> PlanRow:
-    """Row of a goal-oriented mesh, with its range of sizes."""
-    return PlanRow(
-        what="element size",
-        value=f"{mesh.words}, {found.prepared.effort.dofs:,} dofs",
-        reason=f"goal-oriented: small where the dual solutions of the probes say their error comes "
-        f"from; a mesh of {found.compared_dofs:,} dofs differs by so "
-        f"much that an error of {100 * found.error:.2g} % is left, as of equal elements of about "
-        f"{1e3 * found.h:.1f} mm",
     )
 
 

@@ -32,7 +32,6 @@ from skinwave.planning.estimates import (
     side_reflections,
 )
 from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
-from skinwave.planning.goal_oriented import goal_refined, has_goal_oriented
 from skinwave.planning.mesh_rows import element_rows
 from skinwave.planning.refinement import above_band, refined
 from skinwave.planning.sensitivity import sensitivity
@@ -41,8 +40,8 @@ from skinwave.planning.sheets import why_modes
 from skinwave.planning.start import start_left_out, sudden_left_out
 from skinwave.planning.warnings import (
     error_not_estimated,
+    of_elements,
     of_ends_and_band,
-    of_mesh,
     over_tolerance,
     start_over_tolerance,
     sudden_over_tolerance,
@@ -59,8 +58,7 @@ class Plan:
     """Plan of a simulation.
 
     `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
-    element size `h` in metre (None without a mesh; of a goal-oriented one that of uniform elements
-    that are predicted to be as accurate); the `highest` line in Hz that matters; the
+    element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
     expected relative `error`; predicted `seconds` and bytes of `memory` of the first response;
     a reason for each; `warnings` where a request is not met; and the reduced body, `prepared`,
     on the mesh that was found.
@@ -173,12 +171,8 @@ def plan(
             PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
             *cut,
         ]
-        goal = reduced and h is None and has_goal_oriented(scene, body)
         for_mesh = max(tolerance - at_ends, tolerance / 2)
-        if goal:
-            mesh = goal_refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver)
-        else:
-            mesh = refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver, h=h)
+        mesh = refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver, h=h)
     except fem.NotReduced as error:
         limit = Limit(why=f"cannot reduce this body: {error}")
         raise refusal(scene, named(model or "fem"), [limit]) from None
@@ -195,7 +189,7 @@ def plan(
         memory=mesh.prepared.effort.peak_memory,
         rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
         warnings=(
-            *of_mesh(scene, mesh, tolerance),
+            *of_elements(scene, mesh.h, mesh.error, tolerance),
             *of_ends_and_band(scene, at_ends, sudden, tolerance),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),

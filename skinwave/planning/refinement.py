@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from meshes.shapes.equidistributed import Lines
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
@@ -32,7 +31,6 @@ from skinwave.models.prepared import (
     reduction_tolerance,
 )
 from skinwave.models.reduction import BAND, oscillating
-from skinwave.planning.goal_meshes import GoalMesh
 from skinwave.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
@@ -104,10 +102,6 @@ class Refined:
     """Refined mesh: element size `h` in metre, the `convergence` and the expected relative `error`
     with it, the size in metre that it was `compared` with, and the reduced body, `prepared` with
     it.
-
-    A goal-oriented mesh is the `goal`, and the one that it was compared with has `compared_dofs`
-    degrees of freedom; h is then the size of uniform elements that are predicted to be as accurate,
-    and `compared` that of the coarse mesh.
     """
 
     h: float
@@ -115,8 +109,6 @@ class Refined:
     error: float
     compared: float
     prepared: Prepared
-    goal: GoalMesh | None = None
-    compared_dofs: int = 0
 
 
 def refined(
@@ -246,21 +238,12 @@ def coarser_by(body: Body, other: float, h: float) -> float:
     """
     if actual := body.of_kind.actual_size:
         return actual(body, other) / actual(body, h)
-    grid = body.of_kind.grid
-    if not (grid and grid.has(body)):
+    lines = body.of_kind.grid_lines
+    if lines is None:
         return other / h
-    cells = (cell_count(grid.lines(body, size)) for size in (other, h))
-    return min(other / h, mean_ratio(*cells), key=lambda ratio: abs(np.log(ratio)))
-
-
-def cell_count(lines: Lines) -> float:
-    """Number of cells between grid lines."""
-    return float(np.prod([len(line) - 1 for line in lines]))
-
-
-def mean_ratio(coarse: float, fine: float) -> float:
-    """Refinement ratio on average of the axes, of two numbers of cells."""
-    return float((fine / coarse) ** (1 / 3))
+    coarse, fine = (np.prod([len(line) - 1 for line in lines(body, size)]) for size in (other, h))
+    mean = float((fine / coarse) ** (1 / 3))
+    return min(other / h, mean, key=lambda ratio: abs(np.log(ratio)))
 
 
 def about_its_rest(scene: Scene, waveforms: NDArray[Any]) -> NDArray[Any]:

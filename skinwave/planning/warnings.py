@@ -11,39 +11,13 @@ from skinwave.models.advice import cures_for, in_words
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.extent import mean_sag
-from skinwave.planning.refinement import Refined, enough
+from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
 
 NONLINEAR = "fem-nonlinear"
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LEFT_OUT = 0.05  # of the strongest line of a load: weaker ones are left out without a warning
-
-
-def of_mesh(scene: Scene, mesh: Refined, tolerance: float) -> tuple[str, ...]:
-    """Warnings of linear elements on the mesh of a plan.
-
-    Parameters
-    ----------
-    scene : Scene, with the body that is meshed
-    mesh : Refined, uniform or goal-oriented
-    tolerance : relative error that is asked for
-
-    Returns
-    -------
-    sentences
-    """
-    if mesh.goal is None:
-        return of_elements(scene, mesh.h, mesh.error, tolerance)
-    size = 1e3 * enough(scene.body, mesh.h, mesh.error, tolerance)
-    return (
-        *rigid_body_drift(scene),
-        *over_tolerance(
-            f"the goal-oriented mesh of {mesh.prepared.effort.dofs:,} dofs", mesh.error, tolerance,
-            f"an element size of about {size:.2g} mm is",
-        ),
-        *under_resolved(mesh.goal.widest, spot_scale(scene.pressure)),
-    )  # fmt: skip
 
 
 def of_ends_and_band(
