@@ -44,8 +44,17 @@ def of_ends_and_band(
 def sudden_over_tolerance(
     scene: Scene, band: float, sudden: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warning of motion above a band in Hz that a response leaves out, as a relative error, if it
-    is more than the tolerance.
+    """Warning of motion above the band of a response, which it leaves out.
+
+    Parameters
+    ----------
+    scene : Scene
+    band : float, Hz, its highest frequency
+    sudden, tolerance : relative error by what is left out, and the one that is asked for
+
+    Returns
+    -------
+    one sentence, or none
     """
     smooth = "a load that begins smoothly"
     cure = f"the displacement, or {smooth}," if scene.reading.asked.rate else smooth
