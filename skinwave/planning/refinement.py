@@ -273,10 +273,12 @@ def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> N
 
 
 def above_band(waveforms: Floats, step: float) -> float:
-    """Share of waveforms above `BAND`, up to which a reduced body is held to its tolerance.
+    """Error of waveforms by what moves above `BAND`, up to which a reduced body is held to its
+    tolerance.
 
-    Velocity and acceleration have such a share where a load begins, or jumps, at once. A series of
-    cosines continues the record without a jump at its ends.
+    Velocity and acceleration have such a part where a load begins, or jumps, at once. The reduced
+    body's own is as large as the true one and has no relation to it. A series of cosines continues
+    the record without a jump at its ends.
 
     Parameters
     ----------
@@ -285,13 +287,13 @@ def above_band(waveforms: Floats, step: float) -> float:
 
     Returns
     -------
-    float, root of the share of the energy of the worst probe
+    float, relative, of the worst probe: the root of twice the share of the energy
     """
     energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
     frequencies = np.arange(len(energy)) / (2 * step * len(energy))
     above, whole = energy[frequencies > BAND].sum(axis=0), energy.sum(axis=0)
     whole = np.maximum(whole, max(NO_MOTION**2 * whole.max(), 1e-300))
-    return float(np.sqrt((above / whole).max()))
+    return float(np.sqrt(2 * (above / whole).max()))
 
 
 def convergence(
