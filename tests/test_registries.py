@@ -116,8 +116,6 @@ def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
     assert "Cylinder of 80 x 20 mm" in Path("compared/index.html").read_text()
     vary = ["--vary", "tacton.am_frequency_hz=80,120", "--model", "fem", "--out", "swept"]
     assert main(["sweep", "disc.toml", *vary, "--workers", "2", *MESH, "--json"]) == 0
-    bodies = ["--vary", "body=silicone-cylinder,skin-slab", *vary[2:4], "--out", "bodies"]
-    assert main(["sweep", "disc.toml", *bodies, *MESH, "--scheduler", "threads"]) == 0
 
 
 def test_a_new_model_runs(disc, capsys, static_deflection):

@@ -240,7 +240,7 @@ def test_a_model_without_an_exact_map_gives_probes_alone():
 
 def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own():
     scene = loads(SMALL)
-    found = propagate(scene, 80, model="fem", h=0.006)
+    found = propagate(scene, 80, model="fem", h=0.01)
     assert [s.key for s in found.spreads] == [
         "body.thickness_mm", PRESSURE, "body.material.modulus_scale", "body.material.loss_scale",
     ]  # fmt: skip
@@ -263,7 +263,7 @@ def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own
 def test_samples_beyond_a_shared_range_are_in_the_steady_state_too():
     path = 'duration_s = 0.05\nshape = "circle"\nsize_mm = 10\nspeed_m_per_s = 4.2'
     scene = loads(SMALL.replace("duration_s = 0.25", path))
-    found = propagate(scene, 80, model="fem", h=0.006)
+    found = propagate(scene, 80, model="fem", h=0.01)
     inside = found.values[:1]
     together, alone, from_rest = (
         ensemble(scene, found.spreads, inside, method).rms
