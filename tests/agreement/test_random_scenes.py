@@ -6,7 +6,12 @@ import pytest
 
 from bench.agreement import Outcome, Pair, outcome, table
 
-SEED = 39
+SEED = 4711
+# Of the first hundred, those that take few seconds, and six sheets by all their fast models.
+NUMBERS = (
+    2, 4, 6, 12, 14, 15, 17, 18, 19, 21, 25, 27, 30, 35, 37, 45, 46, 58, 63, 64, 65, 73, 74, 75, 76,
+    78, 80,
+)  # fmt: skip
 # The slow checks, every line or step a solution of its own, are left to `bench.agreement`.
 MODELS = (
     "flat-body", "flat-body-harmonic", "fem", "plate-modes", "plate-modes-transient",
@@ -14,7 +19,7 @@ MODELS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("number", [0, 1, 2, 3, 5, 7, 8, 9])
+@pytest.mark.parametrize("number", NUMBERS)
 def test_models_agree_within_their_stated_errors(number):
     found = outcome(number, table(number, SEED), MODELS, slowest=math.inf)
     assert not found.faults
