@@ -412,7 +412,7 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
     if not plate.clips:
         return None
     if plate.clip_radius:
-        return sparse.csr_array(np.eye(x.size * y.size)[:, _outside(plate, x, y)])
+        return sparse.csr_array(np.eye(x.size * y.size)[:, outside_clips(plate, x, y)])
     xs, ys = np.array(plate.clips).T
     rows = np.einsum("pi,pj->pij", x(xs), y(ys)).reshape(len(xs), -1)
     _, strength, known = linalg.svd(rows, full_matrices=False)
@@ -421,7 +421,7 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
     return np.asarray(everything[:, len(independent) :])
 
 
-def _outside(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
+def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
     """Products (n,) of functions that are zero on all clips."""
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:

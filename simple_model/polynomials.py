@@ -49,6 +49,20 @@ class LineBasis:
 
     def __call__(self, x: Floats) -> Floats:
         """Values (p, i) in m^-1/2 at x (p,) in metre from the middle."""
+        return self._values(x, self.legendre)
+
+    def slopes(self, x: Floats) -> Floats:
+        """First derivatives (p, i) in m^-3/2 at x (p,) in metre from the middle."""
+        per_piece = (2 / np.diff(self.breaks))[:, None, None]
+        d = _derivative(self.legendre.shape[1] - 1)
+        return self._values(x, per_piece * (d @ self.legendre))
+
+    def integrals(self) -> Floats:
+        """Integrals (i,) of the functions along the line, in m^1/2."""
+        return np.asarray(np.sqrt(np.diff(self.breaks)) @ self.legendre[:, 0])
+
+    def _values(self, x: Floats, legendre_coefficients: Floats) -> Floats:
+        """Values (p, i) at x (p,) of functions with coefficients (e, n, i)."""
         x = np.asarray(x, np.float64)
         piece = np.searchsorted(self.breaks[1:-1], x)
         low, size = self.breaks[piece], np.diff(self.breaks)[piece]
@@ -56,7 +70,7 @@ class LineBasis:
         polynomials = legendre.legvander(2 * (x - low) / size - 1, len(n) - 1)
         polynomials *= np.sqrt((2 * n + 1) / size[:, None])
         values = np.empty((len(x), self.size))
-        for e, coefficients in enumerate(self.legendre):
+        for e, coefficients in enumerate(legendre_coefficients):
             values[piece == e] = polynomials[piece == e] @ coefficients
         return values
 
@@ -114,6 +128,50 @@ def piecewise_basis(
     return tuple(_basis(breaks, part) for part in _symmetric(functions))
 
 
+def continuous_basis(
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
+) -> tuple[LineBasis, ...]:
+    """Functions that are continuous at the breaks of a line, with kinks there.
+
+    Parameters
+    ----------
+    breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
+    ends : two of "simply", which holds the value, and "free"
+    degrees : (e,) the highest of each piece, 2 or more
+    split : whether even and odd functions are apart, where both ends and all breaks are alike
+
+    Returns
+    -------
+    One basis, or that of even and that of odd functions; `mixed` has no meaning across kinks
+    """
+    breaks = np.asarray(breaks, np.float64)
+    if len(breaks) == 2:
+        return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
+    inner = _inner(degrees, ("simply", "simply"))
+    functions = np.stack([*_hats(breaks, ends, degrees), *inner], axis=2)
+    if not split:
+        return (_basis(breaks, functions),)
+    return tuple(_basis(breaks, part) for part in _symmetric(functions))
+
+
+def _hats(breaks: Floats, ends: Sequence[str], degrees: Sequence[int]) -> Iterator[Floats]:
+    """Coefficients (e, n) of a function of each value at a break that is not held, orthogonal to
+    the bubbles.
+    """
+    last = len(breaks) - 1
+    for k in range(last + 1):
+        if {0: ends[0], last: ends[1]}.get(k, "free") != "free":
+            continue
+        found = np.zeros((last, max(degrees) + 1))
+        for piece, side in ((k - 1, 1), (k, -1)):
+            if 0 <= piece < last:
+                n = np.arange(degrees[piece] + 1)
+                rows = np.array([_at_end(n, 0, side), _at_end(n, 0, -side)])
+                size = breaks[piece + 1] - breaks[piece]
+                found[piece, : len(n)] = np.sqrt(size) * np.linalg.pinv(rows)[:, 0]
+        yield found / np.linalg.norm(found)
+
+
 def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
     """Basis of functions with coefficients (e, n, i), and their integrals."""
     d = _derivative(coefficients.shape[1] - 1)
@@ -158,14 +216,16 @@ def _end_functions(degree: int, size: float) -> Floats:
     return np.asarray(np.linalg.pinv(rows / strength[:, None]) / strength / scale).T
 
 
-def _inner(degrees: Sequence[int]) -> Iterator[Floats]:
-    """Coefficients (e, n) of the bubbles of each piece: those without value and slope at its ends,
+def _inner(
+    degrees: Sequence[int], ends: Sequence[str] = ("clamped", "clamped")
+) -> Iterator[Floats]:
+    """Coefficients (e, n) of the bubbles of each piece: those that meet the supports of its ends,
     orthonormal, each even or odd about its middle.
     """
     for piece, degree in enumerate(degrees):
         n = np.arange(degree + 1)
         for orders in (n[::2], n[1::2]):
-            for bubble in _bubbles(max(degrees), orders, ("clamped", "clamped")).T:
+            for bubble in _bubbles(max(degrees), orders, ends).T:
                 found = np.zeros((len(degrees), max(degrees) + 1))
                 found[piece] = bubble
                 yield found
