@@ -19,6 +19,7 @@ from simple_model.karman_motion import (
 from simple_model.load_spectrum import synthesise
 from simple_model.plate_modes import Plate, plate_modes
 from simple_model.plate_response import plate_lines
+from simple_model.polynomials import continuous_basis
 from simple_model.von_karman import area_forces, karman_plate
 
 YOUNG, THICKNESS, SIDE, MASS = 4e9, 1e-4, 0.1, 0.08  # Pa, m, m, kg/m2
@@ -96,6 +97,16 @@ def test_a_strip_between_two_edges_stretches_as_in_its_closed_form(support, tens
         )
         found = middle_deflection(karman, pressure) * THICKNESS
         assert found == pytest.approx(exact, rel=tolerance)
+
+
+def test_edges_that_may_move_in_the_plane_do_not_stretch_a_strip():
+    D = YOUNG * THICKNESS**3 / 12
+    plate = Plate(
+        size_x=SIDE, size_y=0.02, d11=D, d22=D, d12=0.0, d66=D / 2, mass_per_area=MASS,
+        air_density=0.0, left="simply", right="simply", front="free", back="free",
+    )  # fmt: skip
+    found = middle_deflection(reduced(plate, 20, "movable"), 1.0) * THICKNESS
+    assert found == pytest.approx(5 / 384 * SIDE**4 / D, rel=1e-6)
 
 
 def least_energy_deflection(plate, pressure, terms, guess):
@@ -315,6 +326,36 @@ def test_a_plate_on_points_at_its_corners_bends_to_a_cylinder():
         rise.append(plate.modes.at([[SIDE / 2, 0.0], [0.0, SIDE / 2]]) @ q)
     assert rise[0][0] == pytest.approx(rise[0][1], rel=1e-6)
     assert min(rise[1]) < 0.5 * max(rise[1])
+
+
+@pytest.mark.parametrize("breaks", [(-0.5, 0.5), (-0.5, -0.2, 0.2, 0.5)])
+@pytest.mark.parametrize("ends", [("simply", "simply"), ("free", "free"), ("free", "simply")])
+def test_in_plane_functions_are_continuous_and_complete(breaks, ends):
+    breaks, degrees = np.array(breaks), [5] * (len(breaks) - 1)
+    split = ends[0] == ends[1]
+    x = np.linspace(-0.5, 0.5, 400)  # no break is one of them
+    lines = continuous_basis(breaks, ends, degrees, split)
+    values = np.hstack([line(x) for line in lines])
+    slopes = np.hstack([line.slopes(x) for line in lines])
+    if split:
+        for line, parity in zip(lines, (1, -1), strict=True):
+            np.testing.assert_allclose(line(-x), parity * line(x), atol=1e-9)
+    at, weights = np.polynomial.legendre.leggauss(600)
+    for line in lines:
+        np.testing.assert_allclose(line.integrals(), weights / 2 @ line(at / 2), atol=1e-3)
+    near = 1e-9
+    for b in breaks[1:-1]:
+        jumps = np.hstack([np.diff(line([b - near, b + near]), axis=0) for line in lines])
+        np.testing.assert_allclose(jumps, 0, atol=1e-6)
+    middle = np.gradient(values, x, axis=0)[1:-1]
+    kinked = [np.abs(x[1:-1] - b) < 2 * (x[1] - x[0]) for b in breaks[1:-1]]
+    smooth = ~np.any(kinked, axis=0) if kinked else np.ones(len(x) - 2, bool)
+    np.testing.assert_allclose(slopes[1:-1][smooth], middle[smooth], atol=2e-3 * np.ptp(slopes))
+    bend = np.interp(x, breaks, np.arange(len(breaks)) % 2) + x**4
+    low, high = (0.0 if end == "simply" else 1.0 for end in ends)
+    held = bend - (1 - low) * bend[0] * (0.5 - x) - (1 - high) * bend[-1] * (0.5 + x)
+    left = held - values @ np.linalg.lstsq(values, held, rcond=None)[0]
+    assert np.abs(left).max() < 1e-8
 
 
 def test_it_refuses_what_is_out_of_range():
