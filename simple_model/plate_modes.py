@@ -422,7 +422,17 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
-    """Products (n,) of functions that are zero on all clips."""
+    """Whether products of functions are zero on all clips.
+
+    Parameters
+    ----------
+    plate : Plate
+    x, y : LineBasis along both sides, with breaks at the sides of the clips
+
+    Returns
+    -------
+    (x y,) bool, the index of y the faster
+    """
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:
         moved = (
