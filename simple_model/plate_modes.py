@@ -422,7 +422,7 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
-    """Whether products of functions are zero on all clips.
+    """Products of functions that are zero on all clips.
 
     Parameters
     ----------
