@@ -207,7 +207,7 @@ def test_a_sheet_is_linear_up_to_half_its_thickness():
     (said,) = beyond_linear(quiet, deflected(1.2e-3, quiet))
     assert said == (
         "this sheet deflects 12 times its thickness, and linear bending holds to half of it; "
-        "use --model fem-nonlinear"
+        "use --model plate-modes-nonlinear"
     )
     assert beyond_linear(quiet, deflected(1.2e-3, quiet, "fem-nonlinear")) == ()
     assert beyond_linear(loud, deflected(0.0, loud))  # its middle sags, wherever the probes are

@@ -33,6 +33,7 @@ BUILT_IN = {  # name -> the file that registers it
     "fem-nonlinear-transient": "nonlinear_elements",
     "plate-modes": "plate_modes",
     "plate-modes-transient": "plate_modes",
+    "plate-modes-nonlinear": "stretched_plate",
 }
 
 

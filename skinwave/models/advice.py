@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 # Models in the order in which advice names them: from rest first, then those of the steady state.
 ADVISED = (
     "fem", "flat-body", "plate-modes-transient", "fem-transient", "fem-nonlinear",
-    "fem-nonlinear-transient", "fem-harmonic", "flat-body-harmonic", "plate-modes",
+    "plate-modes-nonlinear", "fem-nonlinear-transient", "fem-harmonic", "flat-body-harmonic",
+    "plate-modes",
 )  # fmt: skip
 MOST_CURES = 2  # in one sentence
 

@@ -47,7 +47,7 @@ def check_laws(body: Body, pressure: MovingPressure) -> None:
         solid.series()
         if isinstance(solid.law, ModulusTable):
             first, last = solid.law.frequencies[0], solid.law.frequencies[-1]
-            lowest, highest = _slowest_and_fastest(pressure)
+            lowest, highest = slowest_and_fastest(pressure)
             if lowest < first / OCTAVE or highest > last * (1 + 1e-9):
                 raise ValueError(
                     f"a table of complex moduli is from {first:g} to {last:g} Hz, and the load has "
@@ -57,7 +57,7 @@ def check_laws(body: Body, pressure: MovingPressure) -> None:
 
 
 @lru_cache(maxsize=8)
-def _slowest_and_fastest(pressure: MovingPressure) -> tuple[float, float]:
+def slowest_and_fastest(pressure: MovingPressure) -> tuple[float, float]:
     """Strong lines of a load, but for its mean, in Hz."""
     f = load_lines(pressure, STRONG).frequencies
     return float(f[f > 0].min(initial=np.inf)), float(f.max(initial=0.0))

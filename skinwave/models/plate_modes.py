@@ -53,12 +53,12 @@ def plate_of(body: Body) -> Plate:
     )  # fmt: skip
 
 
-_modes = lru_cache(maxsize=4)(plate_modes)
+modes_of = lru_cache(maxsize=4)(plate_modes)
 
 
 def middle_compliance(body: Body) -> float:
     """Static deflection of the middle of a held sheet per force there, m/N."""
-    modes = _modes(plate_of(replace(body, air=False)))
+    modes = modes_of(plate_of(replace(body, air=False)))
     at_rest = relative_modulus(body, 0.0).real
     stiffness = modes.squared * (1 + (at_rest - 1) * modes.elastic)
     return float((modes.at([[0.0, 0.0]]) ** 2 / stiffness).sum())
@@ -109,7 +109,7 @@ def answer_from_rest(scene: Scene, request: Request) -> Response:
 def _driven(scene: Scene, request: Request) -> Driven:
     body, pressure = scene.body, scene.pressure
     request.report("modes", 0.0)
-    modes: PlateModes = _modes(plate_of(body))
+    modes: PlateModes = modes_of(plate_of(body))
     request.report("lines", 0.0)
     middle = body.placement.offset
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
@@ -168,7 +168,8 @@ def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> 
     return fem.exponential_sum(free.poles[vibrates], amplitudes, times)
 
 
-def _limits(scene: Scene) -> Iterator[Limit]:
+def limits(scene: Scene) -> Iterator[Limit]:
+    """Limits of thin plates in their modes: flat sheets that are held, read at the surface."""
     body = scene.body
     if not body.of_kind.is_plate:
         yield Limit(why=f"takes a sheet, not a {body.kind}")
@@ -188,7 +189,7 @@ MODES = register(
         method="modes of a thin plate by Ritz's method, line by line",
         words="the steady state of a thin plate, in its modes by Ritz's method",
         solve=steady_answer,
-        limits=_limits,
+        limits=limits,
         error=lambda scene, h: ERROR,
         seconds=0.5,
         memory=2e8,

@@ -26,3 +26,8 @@ MACROELEMENTS = (
     "approach. Mathematics of Computation 42 (1984) 9-23"
 )
 PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
+KARMAN = (
+    "S. Bilbao, O. Thomas, C. Touze, M. Ducceschi: Conservative numerical methods for the full von "
+    "Karman plate equations. Numerical Methods for Partial Differential Equations 31 (2015) "
+    "1948-1970. doi 10.1002/num.21974"
+)

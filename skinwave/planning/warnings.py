@@ -14,7 +14,7 @@ from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
 from skinwave.scene import Scene
 
-NONLINEAR = "fem-nonlinear"
+NONLINEAR = "plate-modes-nonlinear"
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LEFT_OUT = 0.05  # of the strongest line of a load: weaker ones are left out without a warning
