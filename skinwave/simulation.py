@@ -55,9 +55,10 @@ def simulate(
         "point-kernel-published", the same under the paper's load (linear drive, main lobe);
         "flat-body", the wavenumber integral of an infinite body; "fem", the reduced-order model;
         "fem-transient", direct time integration; "flat-body-harmonic" and "fem-harmonic", the
-        steady state line by line; "fem-nonlinear", a sheet at large deflection, in its modes;
-        "fem-nonlinear-transient", the same with all dofs; or "auto": the choice of `plan`, which is
-        linear
+        steady state line by line; "plate-modes" and "plate-modes-transient", a thin plate in its
+        modes; "plate-modes-nonlinear", the same at large deflection; "fem-nonlinear", modes of
+        elements at large deflection; "fem-nonlinear-transient", the same with all dofs; or "auto":
+        the choice of `plan`, which is linear
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : True for a bar; or called with the name of the phase and the fraction done
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;

@@ -70,7 +70,7 @@ def _count(scene: Scene, modes: PlateModes) -> int:
     """Number of modes that stretch the sheet: those that the load drives, and more above them."""
     _, highest = slowest_and_fastest(scene.pressure)
     driven = np.count_nonzero(modes.squared < (2 * pi * BEYOND * highest) ** 2)
-    return int(min(max(driven, FEWEST), MOST, len(modes.squared)))
+    return min(max(int(driven), FEWEST), MOST, len(modes.squared))
 
 
 def _added(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:

@@ -66,7 +66,7 @@ from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, t
 
 TAIL = 0.4  # s that motion may last after the Tacton
 # What a warning says instead of the name of a model, of which a page has linear ones alone.
-ON_PAGE = "save the scene and compute it with the model fem-nonlinear, which a page has not"
+ON_PAGE = f"save the scene and compute it with the model {NONLINEAR}, which a page has not"
 FINER = 8  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
