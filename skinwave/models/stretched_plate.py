@@ -28,7 +28,7 @@ from skinwave.models.sources import KARMAN, PLATES
 from skinwave.scene import Scene
 
 LONGEST = 5e-5  # s, of time steps
-FEWEST, MOST = 60, 200  # modes that stretch a sheet
+FEWEST, MOST = 60, 120  # modes that stretch a sheet
 BEYOND = 2.0  # times the highest strong line of a load: modes up to there count
 FEWER = 0.7  # of these modes, beside which their number is judged
 CHECKED = 0.2  # s of an answer, of which errors are measured
