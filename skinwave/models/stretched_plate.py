@@ -25,6 +25,7 @@ from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST, limits, modes_of, plate_of
 from skinwave.models.sources import KARMAN, PLATES
+from skinwave.models.stretching import relative
 from skinwave.scene import Scene
 
 LONGEST = 5e-5  # s, of time steps
@@ -50,11 +51,11 @@ def _answer(scene: Scene, request: Request) -> Response:
     values = linear.values + added
     size, part = values[: len(checked)], added[: len(checked)]
     by_steps, by_modes = (
-        _relative(_added(scene, checked, modes, *given) - part, size)
+        relative(_added(scene, checked, modes, *given) - part, size).max()
         for given in ((count, parts // 2), (ceil(FEWER * count), parts))
     )
     # Steps are of second order: four times the error with steps twice as long.
-    error = PLATE_ERROR + by_steps / 3 + by_modes
+    error = float(PLATE_ERROR + by_steps / 3 + by_modes)
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=count, steps=parts * (len(times) - 1), dt=step(times) / parts,
@@ -85,13 +86,6 @@ def _added(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: in
     if rate := scene.reading.asked.rate:
         read = make_interp_spline(steps, read, DEGREE)(steps, rate)
     return np.asarray(read[::parts])
-
-
-def _relative(change: Floats, values: Floats) -> float:
-    """Relative size of a change (t, p) at the worst probe."""
-    sizes = np.linalg.norm(values, axis=0)
-    moves = sizes > 0
-    return float((np.linalg.norm(change, axis=0)[moves] / sizes[moves]).max(initial=0.0))
 
 
 STRETCHED = register(

@@ -188,8 +188,8 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
             plain, request, _from_rest(motion, shapes, times, plain.reading.asked, ()), size
         )
     # Steps of the linear part are corrected: what they do to the rest is as small as it is.
-    share = np.minimum(_relative(values - exact, values), 1)
-    error = elements + float((share * _relative(stepped - exact, values)).max())
+    share = np.minimum(relative(values - exact, values), 1)
+    error = elements + float((share * relative(stepped - exact, values)).max())
     return _response(
         "fem-nonlinear", scene, request, clock, sheet.made, size, values=values, error=error,
         effort=replace(
@@ -330,12 +330,12 @@ def _plate_error(plain: Scene, request: Request, linear: Floats, h: float) -> fl
     if beyond(FROM_REST, plain):
         return expected_error(plain.body, h)
     plate = FROM_REST.solve(plain, request).values
-    error = float(_relative(linear - plate, plate).max())
+    error = float(relative(linear - plate, plate).max())
     return error + PLATE_ERROR
 
 
-def _relative(change: Floats, values: Floats) -> Floats:
-    """Relative changes (p,) of waveforms; 0 where nothing moves."""
+def relative(change: Floats, values: Floats) -> Floats:
+    """Relative changes (p,) of waveforms (t, p); 0 where nothing moves."""
     sizes = np.linalg.norm(values, axis=0)
     moves = sizes > STANDSTILL * sizes.max()
     found = np.linalg.norm(change, axis=0) / np.where(moves, sizes, 1)

@@ -61,8 +61,9 @@ def sudden_left_out(scene: Scene, model: Model, times: ArrayLike | None = None) 
     """Part of a wavenumber integral from rest that is above its band, relative and of the worst
     probe.
 
-    Velocity and acceleration jump where a load begins at once; as the band doubles, their error
-    halves, and is twice the change.
+    Velocity and acceleration jump where a load begins at once. As the band doubles, the error of a
+    velocity halves, and is twice the change. The first sample of an acceleration may have no limit:
+    three times the change is its error beside sixteen times the band.
 
     Parameters
     ----------
@@ -81,7 +82,8 @@ def sudden_left_out(scene: Scene, model: Model, times: ArrayLike | None = None) 
         model.solve(scene, Request(times=t, tolerance=EXACT, report=silent)).values
         for t in (grid, fine)
     )
-    return 2 * relative_change(usual[first:], wide[::parts][first:])
+    change = relative_change(usual[first:], wide[::parts][first:])
+    return (1 + scene.reading.asked.rate) * change
 
 
 def _share(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> float:
