@@ -39,7 +39,7 @@ MARGIN = 8  # polynomials beyond those that products of two modes require
 BESIDE = 4  # the same on a piece between the sides of clips
 MOST_PAIRS = 500  # of modes, of one symmetry, from which states of stress are made
 EQUAL_BELOW = 2 * np.pi * 200.0  # rad/s: modes below it are taken to have equal amplitudes
-SMALLEST_STATE = 1e-2  # of the energy norm of the largest
+SMALLEST_STATE = 0.03  # of the energy norm of the largest
 ROUND_OFF = 1e-10  # of the largest energy of states of stress
 
 
@@ -68,20 +68,17 @@ class KarmanPlate:
     left_out: float
 
     @cached_property
-    def _blocks(self) -> list[tuple[slice, slice, slice, Floats]]:
-        """Blocks of H that are not zero, as matrices (k r, r), with their states, rows and
-        columns.
+    def _parts(self) -> list[tuple[slice, Floats, NDArray[np.int_]]]:
+        """For the modes of each symmetry: which they are, what of H is not zero in their columns,
+        as a matrix (p, columns), and where its product (p,) belongs in (k r,).
         """
-        of_modes, of_states = (
-            {bits: slice(*np.searchsorted(each, (bits, bits + 1))) for bits in np.unique(each)}
-            for each in self.symmetries
-        )
-        return [
-            (states, rows, columns, self.H[states, rows, columns].reshape(-1, _length(columns)))
-            for turn, states in of_states.items()
-            for bits, rows in of_modes.items()
-            if (columns := of_modes.get(bits ^ turn)) is not None
-        ]
+        of_modes, of_states = self.symmetries
+        found = []
+        for bits in np.unique(of_modes):
+            columns = slice(*np.searchsorted(of_modes, (bits, bits + 1)))
+            states, rows = np.nonzero((of_states ^ bits)[:, None] == of_modes)
+            found.append((columns, self.H[states, rows, columns], states * len(of_modes) + rows))
+        return found
 
     def shapes(self, points: ArrayLike) -> Floats:
         """Shapes (p, r) in kg^-1/2 of the chosen modes at points (p, 2) in metre."""
@@ -89,10 +86,10 @@ class KarmanPlate:
 
     def gradients(self, z: Floats) -> Floats:
         """Derivatives H z (k, r) of the states of stress y at coordinates z (r,)."""
-        found = np.zeros(self.H.shape[:2])
-        for states, rows, columns, block in self._blocks:
-            found[states, rows] = (block @ z[columns]).reshape(_length(states), -1)
-        return found
+        found = np.empty(self.H.shape[0] * self.H.shape[1])
+        for columns, part, places in self._parts:
+            found[places] = part @ z[columns]
+        return found.reshape(self.H.shape[:2])
 
     def slow_stiffness(self, modulus: float) -> Floats:
         """Stiffness K (r, r) in rad2/s2 with a real modulus of bending over that of the modes."""
@@ -147,10 +144,6 @@ def karman_plate(
         symmetries=(slopes.symmetries, np.concatenate(turns)[kept]),
         left_out=float(np.sqrt(energy[~kept].sum() / energy.sum())),
     )  # fmt: skip
-
-
-def _length(part: slice) -> int:
-    return int(part.stop - part.start)
 
 
 def membrane_stiffness(plate: Plate, thickness: float) -> Floats:

@@ -20,10 +20,10 @@ from skinwave.models.laws import check_laws
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import Plan, plan
 from skinwave.planning.warnings import (
-    beyond_linear,
     beyond_prediction,
     beyond_sampling,
     implausible,
+    of_stretching,
 )
 from skinwave.progress_bar import reported
 from skinwave.sample_grid import from_first, sample_grid
@@ -58,7 +58,7 @@ def simulate(
         steady state line by line; "plate-modes" and "plate-modes-transient", a thin plate in its
         modes; "plate-modes-nonlinear", the same at large deflection; "fem-nonlinear", modes of
         elements at large deflection; "fem-nonlinear-transient", the same with all dofs; or "auto":
-        the choice of `plan`, which is linear
+        the choice of `plan`
     tolerance : float, relative error that may be made; reduction takes at most a fiftieth of it
     progress : True for a bar; or called with the name of the phase and the fraction done
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;
@@ -193,7 +193,8 @@ def follow(
     error = float(np.fmax(required.error, found.expected_error))
     told = (
         *required.warnings, *beyond_prediction(scene, found, required.error, tolerance),
-        *beyond_linear(scene, found), *beyond_sampling(scene, found), *implausible(scene),
+        *of_stretching(scene, found, tolerance), *beyond_sampling(scene, found),
+        *implausible(scene),
     )  # fmt: skip
     found = replace(found, expected_error=error, load=scene.pressure)
     return warned(found, told)

@@ -19,8 +19,13 @@ from simple_model.load_spectrum import load_lines, pressure_lines
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
+from skinwave.models.advice import takes
 from skinwave.models.loads import surface_motion
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import steady_lines as plate_lines
+from skinwave.models.stretched_plate import STRETCHED, vibration
 from skinwave.pictures.motion import DrivenBody, driven, line_amplitudes
+from skinwave.planning.stretching import beyond_linear
 from skinwave.scene import Scene
 
 REACH, STEP = 0.044, 0.001  # m of a map either way from the middle, and between its places
@@ -43,7 +48,8 @@ class SurfaceMap:
     x, y : (nx,), (ny,) float, metre, equally spaced
     rms : (ny, nx) float, in `unit`, "m" or "Pa"; nan off the body
     level : (ny, nx) float, dB, the sensation level of the component where it is highest,
-        were the body skin; nan off the body, minus infinity of a pressure
+        were the body skin; nan off the body, minus infinity of a pressure, and of a
+        sheet that stretches
     note : str, how it was computed, if another way than the probes
     """
 
@@ -87,7 +93,8 @@ def body_map(
     h: float | None = None,
     solver: str = "auto",
 ) -> SurfaceMap:
-    """The body's motion, in m; x (nx,) and y (ny,) in metre. Finite elements are coarser
+    """The body's motion, in m; x (nx,) and y (ny,) in metre: by a wavenumber integral, by the modes
+    of a thin plate, stretched where it deflects that far, or by finite elements. These are coarser
     than by default, and at least `h` large.
 
     Raises
@@ -95,6 +102,8 @@ def body_map(
     ValueError
         If there is no body, or none that can be meshed.
     """
+    if h is None and takes(FROM_REST, scene):
+        return _plate_map(scene, x, y)
     if not has_wavenumber_integral(scene):
         size = max(h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
         moved = driven(scene, REDUCED, progress, h=size, solver=solver)
@@ -106,6 +115,22 @@ def body_map(
 
     found = _mapped(scene.pressure, answer, x, y, "m")
     return replace(found, note="laterally infinite layer")
+
+
+def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceMap:
+    """Map of a thin plate in its modes."""
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    flat, shape = places.reshape(-1, 2), places.shape[:2]
+    if beyond_linear(scene, REDUCED):
+        rms, level = vibration(scene, flat), np.full(len(flat), -np.inf)
+        note = STRETCHED.words
+    else:
+        lines, amplitudes = plate_lines(scene, flat)
+        rms, level = _rms_and_level((lines, np.abs(amplitudes)), "m")
+        note = FROM_REST.words
+    return SurfaceMap(
+        x=x, y=y, rms=rms.reshape(shape), level=level.reshape(shape), unit="m", note=note
+    )
 
 
 def has_wavenumber_integral(scene: Scene) -> bool:

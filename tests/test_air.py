@@ -27,7 +27,7 @@ from skinwave.studies.tradeoff import candidates
 from skinwave.verify import references
 from skinwave.verify.exact import PAPER
 
-SHEET = replace(BODIES["paper-sheet"], width=0.06, height=0.05, air=True)
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.05, air=True)
 PATH = Trajectory(shape="circle", size=0.01, speed=4.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
 SCENE = Scene(pressure=LOAD, body=SHEET, probes=((0.01, 0.0), (0.0, 0.012)))
@@ -36,7 +36,7 @@ H = 5e-3
 
 def test_a_scene_says_it_and_comes_back():
     scene = loads('[body]\nkind = "sheet"\nair = true')
-    assert scene.body == replace(BODIES["paper-sheet"], air=True)
+    assert scene.body == replace(BODIES["paper-sheet-loose"], air=True)
     assert loads(dumps(scene)) == scene
     assert "air = true" in dumps(scene)
     assert not loads('[body]\nkind = "sheet"').body.air

@@ -44,7 +44,7 @@ from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
 SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.04, height=0.04), probes=((0.01, 0.0),))
-PAPER = replace(SKIN, body=replace(BODIES["paper-sheet"], width=0.05, height=0.05))
+PAPER = replace(SKIN, body=replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05))
 
 
 def test_a_slab_and_a_sheet_have_their_own_ladders():
@@ -426,7 +426,7 @@ def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_n
     monkeypatch.setattr(mechanisms, "DURATION", 0.2)  # s; after half of it these bodies are steady
     monkeypatch.setattr(mechanisms, "AMPLITUDES", (0.25, 1.0))
     bodies = {
-        "paper-sheet": replace(BODIES["paper-sheet"], width=0.06, height=0.06),
+        "paper-sheet-loose": replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06),
         "skin-slab": Body(width=0.042, height=0.042, depth=0.01, sides="clamped"),
     }
     still = [("am140", Tacton(am_frequency=140, trajectory=Trajectory()))]
@@ -436,7 +436,7 @@ def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_n
         assert ratio[body, "linear load", 1.0] < 1e-5
         quiet, loud = (ratio[body, "squared load", a] for a in (0.25, 1.0))
         assert quiet == pytest.approx(loud, rel=1e-3)
-    quiet, loud = (ratio["paper-sheet", "squared load, stretching", a] for a in (0.25, 1.0))
+    quiet, loud = (ratio["paper-sheet-loose", "squared load, stretching", a] for a in (0.25, 1.0))
     assert abs(loud / quiet - 1) > 0.05
     write(tmp_path, found)
     assert "a line of the sheet" in (tmp_path / "index.html").read_text()

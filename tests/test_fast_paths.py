@@ -274,7 +274,7 @@ def test_many_lines_push_a_stretching_sheet_as_their_sum_does(monkeypatch):
     load = MovingPressure(
         tacton=Tacton(duration=0.01, rhythm=Rhythm(pulses=((0.0033, 0.0031),))), peak_pressure=0.1
     )
-    sheet = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=False)
+    sheet = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06, air=False)
     scene = Scene(pressure=load, body=sheet, probes=((0.005, 0.0),))
     found, expected = [], []
     for most, values in ((10, found), (10_000, expected)):

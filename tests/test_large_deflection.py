@@ -21,7 +21,7 @@ from skinwave.planning.plan import plan
 from skinwave.scene import BODIES, Body, Placement, Scene
 from skinwave.simulation import compute
 
-PAPER = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+PAPER = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06)
 CIRCLING = MovingPressure(
     tacton=Tacton(
         am_frequency=140, duration=0.02, trajectory=Trajectory(shape="circle", size=0.02, speed=12)

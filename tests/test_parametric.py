@@ -390,6 +390,6 @@ def test_scenes_that_an_affine_sum_cannot_answer_are_refused(slab):
 
 @pytest.mark.parametrize("mounting", ["tension_x_n_per_m = 60", 'edges = ["left", "right"]'])
 def test_a_sheet_that_is_stretched_or_not_framed_is_refused(mounting):
-    scene = skinwave.loads(f"[body]\npreset = 'paper-sheet'\n[body.mounting]\n{mounting}")
+    scene = skinwave.loads(f"[body]\npreset = 'paper-sheet-loose'\n[body.mounting]\n{mounting}")
     with pytest.raises(ValueError, match="an isotropic sheet in a frame"):
         skinwave.prepare(scene, free={"body.material.density_kg_m3": (700, 900)})

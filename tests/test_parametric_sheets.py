@@ -42,7 +42,7 @@ RANGES = {
     THICKNESS: (0.08, 0.14),
 }
 H = 6e-3
-SHEET = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=True)
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06, air=True)
 PATH = Trajectory(shape="circle", size=0.012, speed=5.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
 SCENE = Scene(pressure=LOAD, body=SHEET, probes=((0.0, 0.0), (0.01, 0.004)))

@@ -64,7 +64,7 @@ def moved(scene):
 def folder(scene, tmp_path_factory):
     """Folder that the report of a scene is built from, on coarse meshes."""
     out = tmp_path_factory.mktemp("album")
-    asked = {"h": 0.015, "frames": 12, "beside": ["paper-sheet"], "command": "as tested"}
+    asked = {"h": 0.015, "frames": 12, "beside": ["paper-sheet-loose"], "command": "as tested"}
     album.make(out, scene, lambda phase, done: None, **asked)
     return out
 
@@ -84,14 +84,16 @@ def page(folder, tmp_path_factory):
 
 
 def test_models_stand_side_by_side_with_the_scenes_own_body(scene, seen):
-    assert list(seen) == ["point-kernel", "paper-sheet", "skin-slab"]
+    assert list(seen) == ["point-kernel", "paper-sheet-loose", "skin-slab"]
     assert seen["skin-slab"].scene == scene
     assert {view.unit for view in seen.values()} == {"Pa", "m"}
 
 
 def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
     loads = {run.column: run.scene.pressure for run in album.open_album(folder).runs}
-    assert list(loads) == ["point-kernel-published", "point-kernel", "paper-sheet", "skin-slab"]
+    assert list(loads) == [
+        "point-kernel-published", "point-kernel", "paper-sheet-loose", "skin-slab",
+    ]  # fmt: skip
     assert loads.pop("point-kernel-published") == published(scene.pressure) != scene.pressure
     assert set(loads.values()) == {scene.pressure}
 
@@ -105,8 +107,8 @@ def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene, drive):
     bare = album.shown_scenes(replace(scene, pressure=own, body=Body(kind="none")))
     assert list(bare)[2:] == ["paper-sheet", "skin-slab"]
     assert {its.pressure for its in list(bare.values())[1:]} == {own}
-    asked = album.shown_scenes(scene, ["paper-sheet", "skin-slab"])
-    assert list(asked)[2:] == ["skin-slab", "paper-sheet"]
+    asked = album.shown_scenes(scene, ["paper-sheet-loose", "skin-slab"])
+    assert list(asked)[2:] == ["skin-slab", "paper-sheet-loose"]
     with pytest.raises(ValueError, match="body 'paper' is unknown"):
         album.shown_scenes(scene, ["paper"])
 
@@ -171,7 +173,7 @@ def test_the_kernels_brightest_place_lies_on_the_path(seen):
 def test_waves_spread_further_than_the_kernel(seen):
     radii = {name: views.spread_radius(view, -20.0) for name, view in seen.items()}
     assert radii["skin-slab"] > 1.5 * radii["point-kernel"]
-    assert radii["paper-sheet"] > 1.5 * radii["point-kernel"]
+    assert radii["paper-sheet-loose"] > 1.5 * radii["point-kernel"]
     assert all(views.spread_radius(v, -6.0) <= views.spread_radius(v, -20.0) for v in seen.values())
 
 
@@ -280,7 +282,7 @@ def test_a_signed_field_shows_both_signs(seen):
 
 @draws
 def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
-    view = seen["paper-sheet"]
+    view = seen["paper-sheet-loose"]
     panel = render.prepared(view)
     render.place([panel], 5, 1.0)
     drawn = np.asarray(panel.skin.points) - 1e3 * view.points[panel.nodes]

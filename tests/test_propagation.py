@@ -237,7 +237,7 @@ def test_the_strongest_component_is_one_of_amplitude_in_kernel_and_body():
 
 
 def test_paper_has_no_sensation_level():
-    scene = Scene(pressure=MovingPressure(tacton=BOTH), body=BODIES["paper-sheet"])
+    scene = Scene(pressure=MovingPressure(tacton=BOTH), body=BODIES["paper-sheet-loose"])
     first = shown({"one": beside_kernels(_run(scene, "flat-body-harmonic"))}, quick_maps)
     assert first.changes["sheet"].strongest.level is None
     assert "say nothing of paper" in sentences(first)[2]

@@ -156,7 +156,7 @@ def scenes(draw):
 
 
 SMALL = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
-SHEET = replace(BODIES["paper-sheet"], width=0.03, height=0.03)
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.03, height=0.03)
 WATCHED = ((0.0, 0.0), (0.006, 0.003))
 
 

@@ -236,7 +236,7 @@ def test_silicone_is_no_skin_but_layers_of_skin_and_own_materials_are():
     for body in (BODIES["silicone-disc"], replace(slab, material=PRESETS["ecoflex"])):
         assert body.is_solid
         assert not body.is_skin
-    assert not BODIES["paper-sheet"].is_solid
+    assert not BODIES["paper-sheet-loose"].is_solid
 
 
 def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):

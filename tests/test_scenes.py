@@ -48,7 +48,7 @@ def test_a_material_of_ones_own_comes_back():
 
 def test_missing_keys_take_the_presets_value():
     assert loads("").body == BODIES["skin-slab"]
-    assert loads("[body]\nkind = 'sheet'").body == BODIES["paper-sheet"]
+    assert loads("[body]\nkind = 'sheet'").body == BODIES["paper-sheet-loose"]
     # A body, or none, never changes the load.
     assert loads("[body]\nkind = 'none'").pressure == loads("").pressure
     assert loads("").pressure.drive == "pressure_squared"

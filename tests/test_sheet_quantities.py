@@ -29,14 +29,14 @@ from skinwave.pictures.nodal import shade
 from skinwave.scene import BODIES, Reading, Scene
 from skinwave.simulation import compute
 
-PAPER = BODIES["paper-sheet"].solid
+PAPER = BODIES["paper-sheet-loose"].solid
 PEAK = 30.0  # Pa
 STRETCHED = ("strain_xx", "stress_yy")
 SCENE = Scene(
     pressure=MovingPressure(
         tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.01, speed=4.0), duration=0.01)
     ),
-    body=replace(BODIES["paper-sheet"], width=0.05, height=0.05),
+    body=replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05),
     probes=((0.011, 0.004), (-0.007, 0.013)),
 )
 

@@ -90,7 +90,7 @@ def test_exact_waves_have_the_modulus_of_the_material():
     ):
         found, expected = (body(solid, **size)(k, w)[0, 0] for solid in (ZENER, twin))
         assert found == pytest.approx(expected, rel=1e-12)
-    paper = replace(BODIES["paper-sheet"], material=ZENER)
+    paper = replace(BODIES["paper-sheet-loose"], material=ZENER)
     stiffness = paper.bending_stiffness * mu / 25e3
     plain = 1 / (stiffness * k**4 - paper.mass_per_area * w**2)
     assert compliance(paper)(k, w)[0, 0] == pytest.approx(plain[0, 0], rel=1e-12)
@@ -118,7 +118,7 @@ def test_a_sheet_bends_with_the_law_of_its_material():
     """The thicker twin that stands for a sheet: its steady motion is that of a real modulus."""
     stiff = fem.PRESETS["paper"]
     solid = replace(stiff, loss_factor=0.0, prony=(PronyTerm(modulus=4e8, time=1e-3),))
-    sheet = replace(BODIES["paper-sheet"], width=0.05, height=0.05, material=solid)
+    sheet = replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05, material=solid)
     still = Tacton(am_frequency=140, duration=0.02)
     scene = skinwave.Scene(
         pressure=MovingPressure(tacton=still, drive="linear"), body=sheet, probes=((0.0, 0.0),)

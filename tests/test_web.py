@@ -294,7 +294,7 @@ def test_a_main_lobe_on_a_slab_is_refused_rather_than_answered_as_a_gaussian():
 # What is shown
 
 
-@pytest.mark.parametrize("body", ["skin-slab", "paper-sheet"])
+@pytest.mark.parametrize("body", ["skin-slab", "paper-sheet-loose"])
 def test_dispersion_curves_follow_the_load_and_are_computed_once_a_body(body):
     here = STARTS | {"body": body, "shape": "circle", "size": 20, "speed": 12}
     scene = scenes.scene_of(here)
@@ -388,7 +388,7 @@ def test_nothing_is_felt_of_what_does_not_vibrate_nor_on_paper():
         np.full((1, model.SIDE**2), 1e-6) * np.linspace(0, 1, model.SIDE**2),
     )
     assert waves.motion_map(scene, f, motion).threshold
-    paper = replace(scene, body=BODIES["paper-sheet"])
+    paper = replace(scene, body=BODIES["paper-sheet-loose"])
     assert waves.motion_map(paper, f, motion).threshold == ()
 
 
@@ -535,7 +535,7 @@ def meshed_with(monkeypatch, kind, h):
 @pytest.mark.slow
 def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
     meshed_with(monkeypatch, "sheet", 5e-3)
-    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06)
+    own = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06)
     paths = "circle/10/-10/0, square/8/10/0, line/12/0/12"
     values = STARTS | OWN | {"body": controls.OWN_BODY, "duration": 0.1, "paths": paths}
     answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
@@ -558,7 +558,7 @@ def test_a_reduced_body_follows_paths_of_their_own(monkeypatch):
 @pytest.mark.parametrize("air", [False, True])
 def test_a_reduced_body_answers_as_simulate_does(air, monkeypatch):
     meshed_with(monkeypatch, "sheet", 5e-3)
-    own = replace(BODIES["paper-sheet"], width=0.06, height=0.06, air=air)
+    own = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06, air=air)
     values = STARTS | {"body": controls.OWN_BODY, "duration": 0.1, "x": 12.0, "size": 12.0}
     answered, scene = waves.BodyResponses(), scenes.scene_of(values, own)
     shown = answered(scene, nothing)
@@ -1234,7 +1234,7 @@ def test_a_figure_is_as_wide_as_asked_and_shows_what_the_plots_show(session, mon
 
 
 def test_a_figure_has_the_colours_of_the_page(session):
-    here = saved_figure._colours("paper-sheet")
+    here = saved_figure._colours("paper-sheet-loose")
     assert here["waves"] == "#d55e00"
     assert saved_figure._colours("skin-slab")["waves"] == "#0072b2"
     roles = {curve["role"] for curve in session.state.spectrum_plot["data"]}

@@ -61,7 +61,7 @@ def test_layers_come_back_from_their_text():
     assert epidermis.viscosity / before.viscosity == pytest.approx(90e3 / before.shear_modulus)
     assert rows(stiff, "")[0]["modulus"] == "90"
     assert with_layers(BODIES["skin-slab"], "inf/25").depth == np.inf
-    assert rows(BODIES["paper-sheet"], "") == []
+    assert rows(BODIES["paper-sheet-loose"], "") == []
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_layers_are_moved_one_by_one(session):
     assert len(session.state.body_layers) == 1
     with session.state:
         moves.own_layer(session, 2, "modulus", "40")  # of the body before
-        moves.turn(session, {"body": "paper-sheet"})
+        moves.turn(session, {"body": "paper-sheet-loose"})
     assert session.state.body_layers == []
 
 

@@ -111,7 +111,7 @@ def test_nothing_is_above_threshold_of_silence_and_nothing_is_said_of_paper(resp
     found = responses(silence, silent)
     assert levels.reach(silence, found.map) is None
     assert "no, next to nothing moves" in levels.above_threshold(silence, (kernel, found))
-    paper = scenes.scene_of(AT_20 | {"body": "paper-sheet"})
+    paper = scenes.scene_of(AT_20 | {"body": "paper-sheet-loose"})
     assert levels.above_threshold(paper, (kernel, found)) == ""
     assert levels.above_threshold(paper, (kernel,)) == "", "nor while its waves are computed"
 

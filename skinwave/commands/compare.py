@@ -1,4 +1,4 @@
-"""The point kernel beside finite elements: the main job."""
+"""The point kernel beside bodies whose waves propagate: the main job."""
 
 import argparse
 import shlex
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from skinwave.commands.common import add_mesh, add_output, metre, progress_of, summarise, warn
+from skinwave.models import names
 
 if TYPE_CHECKING:
     from skinwave.scene import Body
@@ -38,6 +39,10 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gain", type=float, metavar="G", help="of the record over the body (default: fitted)"
     )
+    parser.add_argument(
+        "--model", choices=("auto", *names()), default="auto",
+        help="of the bodies: the one that a plan takes (default), or one by name, such as fem",
+    )  # fmt: skip
     add_mesh(parser)
     add_output(parser)
 
@@ -81,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
             scenes, folder, progress,
             title=TITLE.format(against) if scene is None else scene.name,
             command=_again(options),
-            h=metre(options.h), solver=options.solver, measured=measured,
+            model=options.model, h=metre(options.h), solver=options.solver, measured=measured,
         )  # fmt: skip
         record.write(folder, record.of_command(options), scene=asked)
     warn(outcome.warnings)
@@ -111,6 +116,7 @@ def _again(options: argparse.Namespace) -> str:
     words = ["--body", options.body] if options.body else []
     if options.body and Path(options.body).is_file():
         words += ["--unit", options.unit, "--up", options.up]
+    words += ["--model", options.model] if options.model != "auto" else []
     for name in ("measured", "delay", "gain"):
         if (given := getattr(options, name)) is not None:
             words += [f"--{name}={given}"]

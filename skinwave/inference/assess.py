@@ -139,7 +139,7 @@ def run_of(candidate: Candidate, tacton: str, times: Floats, values: Floats) -> 
     """Run of a waveform (t, p) of the quantity that a candidate reads."""
     places, read = probes(candidate), candidate["quantity"]
     scene = Scene(
-        pressure=pressure(candidate, dict(tactons())[tacton]), body=BODIES["paper-sheet"],
+        pressure=pressure(candidate, dict(tactons())[tacton]), body=BODIES["paper-sheet-loose"],
         probes=tuple(map(tuple, places.tolist())), quantity=read,
     )  # fmt: skip
     response = Response(model=MODEL, times=times, probes=places, values=values, quantity=read)

@@ -90,11 +90,14 @@ def steady_answer(scene: Scene, request: Request) -> Response:
     return _response(scene, request, MODES.name, driven, values, started)
 
 
-def steady_lines(scene: Scene) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity, in the steady
-    state; a ValueError of a load without lines.
+def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
+    """Frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the steady
+    state, at places (p, 2) in metre, or its probes; a ValueError of a load without lines.
     """
     driven = _driven(scene, Request(times=sample_times(scene), tolerance=ERROR, report=silent))
+    if places is not None:
+        outputs = driven.modes.at(places - scene.body.placement.offset)
+        driven = replace(driven, outputs=outputs)
     return driven.frequencies, _amplitudes(scene, driven, _motion(scene, driven))
 
 

@@ -1,91 +1,168 @@
 """Thin plate of von Karman in its modes: a sheet at large deflection, from rest, without a mesh.
 
 The motion without stretching is that of `plate-modes-transient`, of all modes and without time
-steps. To it is added the difference that stretching makes, by time steps of the lowest modes. With
-each answer two errors are measured over its first part: by steps twice as long, and by fewer modes.
+steps. To it is added the difference that stretching makes, by time steps of the lowest modes. Their
+number and the steps are as the tolerance asks: over the first part of each answer two errors are
+measured, by steps half as long and by fewer modes.
 """
 
 import time
+from dataclasses import replace
 from functools import lru_cache
-from math import ceil, pi
+from itertools import pairwise
+from math import ceil
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from meshes.tetmesh import Floats
-from simple_model import Effort, Response
+from simple_model import Effort, MovingPressure, Response
 from simple_model.karman_motion import linear_motion, stretched_motion
 from simple_model.plate_modes import PlateModes
-from simple_model.response import step
+from simple_model.response import SETTLE, step
 from simple_model.sampling import resolving_step
-from simple_model.von_karman import karman_plate
-from skinwave.effort import peak_memory
+from simple_model.von_karman import KarmanPlate, karman_plate
+from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST, limits, modes_of, plate_of
+from skinwave.models.prepared import sample_times
 from skinwave.models.sources import KARMAN, PLATES
 from skinwave.models.stretching import relative
 from skinwave.scene import Scene
 
-LONGEST = 5e-5  # s, of time steps
-FEWEST, MOST = 60, 120  # modes that stretch a sheet
-BEYOND = 2.0  # times the highest strong line of a load: modes up to there count
-FEWER = 0.7  # of these modes, beside which their number is judged
-CHECKED = 0.2  # s of an answer, of which errors are measured
+LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
+COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number judged beside the one before
+CHECKED = 0.2  # s of an answer at the least, of which errors are measured
+SHARE = 0.3  # of the tolerance, for steps and for modes
 DEGREE = 5  # of the splines that are differentiated
+COARSE, EVERY = 0.1, 3  # tolerance of a map, and of which samples it is the mean
 
-_karman = lru_cache(maxsize=4)(karman_plate)
+_karman = lru_cache(maxsize=6)(karman_plate)
 
 
 def _answer(scene: Scene, request: Request) -> Response:
     started, times = time.perf_counter(), request.times
     linear = FROM_REST.solve(scene, request)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    count = _count(scene, modes)
-    dt = request.dt or resolving_step(scene.pressure, LONGEST)
-    parts = 2 * ceil(step(times) / (2 * dt) - 1e-9)  # of a sample, in half as many for the check
     request.report("large deflection", 0.0)
-    added = _added(scene, times, modes, count, parts)
-    checked = times[: max(2, round(CHECKED / step(times)))]
-    values = linear.values + added
-    size, part = values[: len(checked)], added[: len(checked)]
-    by_steps, by_modes = (
-        relative(_added(scene, checked, modes, *given) - part, size).max()
-        for given in ((count, parts // 2), (ceil(FEWER * count), parts))
-    )
-    # Steps are of second order: four times the error with steps twice as long.
-    error = float(PLATE_ERROR + by_steps / 3 + by_modes)
+    count, parts, error = _resolved(scene, request, modes, linear.values)
+    request.report("large deflection", 0.2)
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=count, steps=parts * (len(times) - 1), dt=step(times) / parts,
         peak_memory=peak_memory(),
     )  # fmt: skip
+    values = linear.values + _added(scene, times, modes, count, parts)
+    seconds = {"evaluate": time.perf_counter() - started}
     return Response(
         model=STRETCHED.name, times=times, probes=scene.probe_points, values=values,
-        quantity=scene.reading.asked.name, expected_error=error, effort=effort,
+        quantity=scene.reading.asked.name, expected_error=PLATE_ERROR + error,
+        effort=replace(effort, seconds=seconds),
     )  # fmt: skip
 
 
-def _count(scene: Scene, modes: PlateModes) -> int:
-    """Number of modes that stretch the sheet: those that the load drives, and more above them."""
-    _, highest = slowest_and_fastest(scene.pressure)
-    driven = np.count_nonzero(modes.squared < (2 * pi * BEYOND * highest) ** 2)
-    return min(max(int(driven), FEWEST), MOST, len(modes.squared))
+def first_part(pressure: MovingPressure, times: Floats) -> Floats:
+    """Times (s,) in s of the part of a response in which errors are measured: a period of the
+    slowest strong line, and `CHECKED` at the least.
+    """
+    slowest, _ = slowest_and_fastest(pressure)
+    return times[: max(2, round(max(CHECKED, 1 / slowest) / step(times)) + 1)]
+
+
+def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
+    """Relative error of linear bending: what stretching adds to it.
+
+    Parameters
+    ----------
+    scene : Scene, which this model takes
+    times : (t,) s
+    linear : (t, p) the linear response from rest
+
+    Returns
+    -------
+    float, of the probe where it is largest
+    """
+    modes: PlateModes = modes_of(plate_of(scene.body))
+    parts = ceil(step(times) / resolving_step(scene.pressure, LONGEST) - 1e-9)
+    added = _added(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)
+    return float(relative(added, linear + added).max())
+
+
+def vibration(scene: Scene, places: Floats) -> Floats:
+    """RMS (p,) in metre of a sheet's motion about its mean at places (p, 2) in metre, after the
+    first part of the scene.
+    """
+    times = sample_times(scene)
+    request = Request(times=times, tolerance=COARSE, report=silent)
+    modes: PlateModes = modes_of(plate_of(scene.body))
+    count, parts, _ = _resolved(scene, request, modes, FROM_REST.solve(scene, request).values)
+    settled = slice(int(SETTLE * len(times)), None, EVERY)
+    middle = scene.body.placement.offset
+    z = linear_motion(modes, scene.pressure, scene.body.solid, times[settled], middle=middle)
+    plate, added = _moved(scene, times, modes, count, parts)
+    z[:, plate.chosen] += added[::parts][settled]
+    spread = np.cov(z, rowvar=False)
+    shapes = modes.at(places - middle)
+    return np.asarray(np.sqrt(np.einsum("pi,ij,pj->p", shapes, spread, shapes, optimize=True)))
+
+
+def _resolved(
+    scene: Scene, request: Request, modes: PlateModes, linear: Floats
+) -> tuple[int, int, float]:
+    """Number of modes that stretch the sheet and of time steps a sample, and the error they make:
+    measured over the first part of an answer, and as small as the tolerance asks or as can be had.
+    """
+    sample, fastest = step(request.times), resolving_step(scene.pressure, LONGEST)
+    parts = ceil(sample / (request.dt or fastest) - 1e-9)
+    counts = [min(count, len(modes.squared)) for count in COUNTS]
+    times = first_part(scene.pressure, request.times)
+    known: dict[tuple[int, int], Floats] = {}
+
+    def added(count: int, parts: int) -> Floats:
+        if (count, parts) not in known:
+            known[count, parts] = _added(scene, times, modes, count, parts)
+        return known[count, parts]
+
+    for fewer, count in pairwise(counts):
+        while True:
+            part = added(count, parts)
+            size = linear[: len(times)] + part
+            # Steps are of second order: a quarter of the error with steps half as long.
+            by_steps = 4 / 3 * float(relative(added(count, 2 * parts) - part, size).max())
+            by_modes = float(relative(added(fewer, parts) - part, size).max())
+            may_be_shorter = request.dt is None and sample / parts > SHORTEST
+            if by_steps <= SHARE * request.tolerance or not may_be_shorter:
+                break
+            parts *= 2
+        if by_modes <= SHARE * request.tolerance:
+            break
+    return count, parts, by_steps + by_modes
 
 
 def _added(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
     """Part (t, p) of the scene's quantity that stretching adds, by steps of a part of a sample."""
-    body, middle = scene.body, scene.body.placement.offset
-    plate, solid = _karman(modes, body.depth, count), body.solid
-    dt = step(times) / parts
-    steps = np.asarray(dt * np.arange(parts * (len(times) - 1) + 1), np.float64)
-    linear = linear_motion(modes, scene.pressure, solid, steps, middle=middle, chosen=plate.chosen)
-    moved = stretched_motion(plate, linear, dt, solid).coordinates - linear
-    read = moved @ plate.shapes(scene.probe_points - middle).T
+    plate, moved = _moved(scene, times, modes, count, parts)
+    read = moved @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
     if rate := scene.reading.asked.rate:
+        steps = step(times) / parts * np.arange(len(moved))
         read = make_interp_spline(steps, read, DEGREE)(steps, rate)
     return np.asarray(read[::parts])
+
+
+def _moved(
+    scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int
+) -> tuple[KarmanPlate, Floats]:
+    """The plate, and the coordinates (n, r) in kg^1/2 m at all steps that stretching adds."""
+    body, dt = scene.body, step(times) / parts
+    plate = _karman(modes, body.depth, count)
+    steps = np.asarray(dt * np.arange(parts * (len(times) - 1) + 1), np.float64)
+    linear = linear_motion(
+        modes, scene.pressure, body.solid, steps, middle=body.placement.offset,
+        chosen=plate.chosen,
+    )  # fmt: skip
+    return plate, stretched_motion(plate, linear, dt, body.solid).coordinates - linear
 
 
 STRETCHED = register(

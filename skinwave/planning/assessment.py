@@ -26,7 +26,8 @@ from skinwave.planning.refinement import (
     quantity_of_interest,
 )
 from skinwave.planning.series import series_error
-from skinwave.planning.warnings import beyond_linear, of_elements, of_ends_and_band
+from skinwave.planning.stretching import stretching_left_out
+from skinwave.planning.warnings import of_elements, of_ends_and_band, of_stretching
 from skinwave.scene import Body, Load, Reading, Scene
 
 Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
@@ -102,6 +103,7 @@ def told(
         *of_ends_and_band(scene, at_ends, sudden, tolerance),
     )
     error += response.effort.estimate + series + at_ends + sudden
+    error += stretching_left_out(scene, named(response.model), tolerance)
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)
 
@@ -152,7 +154,7 @@ def sentences(
         known = of_elements(scene, h, error, tolerance)
     else:
         known = plan(scene, tolerance, model=response.model, times=response.times).warnings
-    return (*known, *beyond_linear(scene, response))
+    return (*known, *of_stretching(scene, response, tolerance))
 
 
 def _coarser(body: Body, h: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +23,9 @@ from skinwave.models.laws import check_laws
 from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import Prepared, answer, sample_times
+from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.boundaries import absorbing_error, extended
 from skinwave.planning.estimates import (
     NO_BOUND,
@@ -38,6 +41,7 @@ from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
 from skinwave.planning.sheets import why_modes
 from skinwave.planning.start import start_left_out, sudden_left_out
+from skinwave.planning.stretching import beyond_linear, deflection, stretching_left_out
 from skinwave.planning.warnings import (
     error_not_estimated,
     of_elements,
@@ -117,13 +121,32 @@ def plan(
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
+    found = _planned(
+        scene, tolerance, model=model, h=h, dt=dt, solver=solver, progress=progress, times=times
+    )
+    left = stretching_left_out(scene, named(found.model), tolerance)
+    return replace(found, error=found.error + left)
+
+
+def _planned(
+    scene: Scene,
+    tolerance: float,
+    *,
+    model: str | None,
+    times: ArrayLike | None,
+    h: float | None = None,
+    dt: float | None = None,
+    solver: str = "auto",
+    progress: Progress | None = None,
+) -> Plan:
+    """The plan, but for what linear bending of a sheet leaves out."""
     asked = named(model) if model else None
     if dt is not None:
         step_count(float(sample_times(scene)[-1]), dt)
     if not scene.body.of_kind.discretise:
         if asked and asked.needs_body:
             check_taken(asked, scene)
-        kernel = model or "point-kernel"
+        kernel = model or SAME_LOAD.name
         row = PlanRow(what="model", value=kernel, reason="there is no body to move")
         return Plan(model=kernel, body=scene.body, rows=(row,))
     if asked:
@@ -133,6 +156,9 @@ def plan(
     check_laws(scene.body, scene.pressure)
     if asked and asked.error:
         return _unplanned(scene, tolerance, asked, h, times)
+    chosen = asked or named(chosen_model(scene, tolerance, times))
+    if chosen is STRETCHED:
+        return _stretched(scene, tolerance, times)
     spectrum = response_spectrum(scene, tolerance)
     motion = scene.load.support_motion
     highest = max(cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0)
@@ -144,18 +170,17 @@ def plan(
             f"than {100 * tolerance / 3:.2g} % of the whole",
         )
     ]
-    returned = side_reflections(scene) if has_wavenumber_solution(scene) else NO_BOUND
-    exact = returned <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene)
-    if asked.is_infinite if asked else exact:
-        found = _without_mesh(scene, tolerance, asked, highest, returned, rows, times)
+    if chosen.is_infinite:
+        found = _without_mesh(scene, tolerance, chosen, highest, rows, times)
         return with_series(found, scene, tolerance)
-    if asked is None and (reason := why_modes(scene)):
-        return _by_modes(scene, tolerance, highest, reason, rows)
-    if asked is None and (other := default_model(scene)) != FEM.name:
-        found = plan(scene, tolerance, model=other, dt=dt, solver=solver, times=times)
+    if chosen is FROM_REST:
+        return _by_modes(scene, tolerance, highest, rows)
+    if asked is None and chosen is not FEM:
+        found = _planned(scene, tolerance, model=chosen.name, dt=dt, solver=solver, times=times)
         why = f"{FEM.name} {beyond(FEM, scene)[0].why}"
         rows = [replace(row, reason=why) if row.what == "model" else row for row in found.rows]
         return replace(found, rows=tuple(rows))
+    returned = _returned(scene)
     body: Body = scene.body
     cut: list[PlanRow] = []
     reduced = asked is None or asked.is_reduced
@@ -200,6 +225,42 @@ def plan(
     return with_series(found, scene, tolerance)
 
 
+def chosen_model(scene: Scene, tolerance: float = 0.05, times: ArrayLike | None = None) -> str:
+    """Name of the model that a plan takes: the cheapest within the tolerance.
+
+    Parameters
+    ----------
+    scene, tolerance, times : as for `plan`
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        If no model takes the scene.
+    """
+    if not scene.body.of_kind.discretise:
+        return SAME_LOAD.name
+    if beyond_linear(scene, tolerance):
+        return STRETCHED.name
+    if _returned(scene) <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene):
+        try:  # reflections are of the load's lines, the start of the body's own: their powers add
+            start = start_left_out(scene, HARMONIC, times=times)
+        except (ValueError, ArithmeticError):  # no steady state
+            return FLAT_BODY.name
+        steady = np.hypot(_returned(scene), start) <= tolerance
+        return HARMONIC.name if steady else FLAT_BODY.name
+    return FROM_REST.name if why_modes(scene, tolerance) else default_model(scene)
+
+
+@lru_cache(maxsize=64)
+def _returned(scene: Scene) -> float:
+    """Relative reflections from the sides that a wavenumber integral leaves out."""
+    return side_reflections(scene) if has_wavenumber_solution(scene) else NO_BOUND
+
+
 def _unplanned(
     scene: Scene, tolerance: float, model: Model, h: float | None, times: ArrayLike | None
 ) -> Plan:
@@ -231,10 +292,21 @@ def _unplanned(
     )  # fmt: skip
 
 
-def _by_modes(
-    scene: Scene, tolerance: float, highest: float, reason: str, rows: list[PlanRow]
-) -> Plan:
+def _stretched(scene: Scene, tolerance: float, times: ArrayLike | None) -> Plan:
+    """Plan of a sheet at large deflection."""
+    found = _unplanned(scene, tolerance, STRETCHED, None, times)
+    left = stretching_left_out(scene, FROM_REST, tolerance)
+    reason = (
+        f"a linear sheet would deflect by {deflection(scene):.2g} thicknesses, and stretching "
+        f"changes its motion by {100 * left:.2g} %"
+    )
+    rows = [replace(row, reason=reason) if row.what == "model" else row for row in found.rows]
+    return replace(found, rows=tuple(rows))
+
+
+def _by_modes(scene: Scene, tolerance: float, highest: float, rows: list[PlanRow]) -> Plan:
     """Plan of a sheet by its modes, from rest."""
+    reason = why_modes(scene, tolerance)
     rows = [
         *rows, PlanRow(what="model", value=FROM_REST.name, reason=reason),
         *left_out(scene, highest),
@@ -250,21 +322,12 @@ def _by_modes(
 def _without_mesh(
     scene: Scene,
     tolerance: float,
-    asked: Model | None,
+    asked: Model,
     highest: float,
-    returned: float,
     rows: list[PlanRow],
     times: ArrayLike | None,
 ) -> Plan:
-    # Reflections are of the load's lines, the start of the body's own: their powers add.
-    try:
-        start = start_left_out(scene, asked or HARMONIC, times=times)
-    except (ValueError, ArithmeticError):  # no steady state
-        if asked:
-            raise
-        start = np.inf
-    if asked is None:
-        asked = HARMONIC if np.hypot(returned, start) <= tolerance else FLAT_BODY
+    returned, start = _returned(scene), start_left_out(scene, asked, times=times)
     model, left = asked.name, start if asked.is_steady else 0.0
     sudden = sudden_left_out(scene, asked, times)
     reason = f"{_section(scene.body)} without reflecting sides: wavenumber integral, no mesh"

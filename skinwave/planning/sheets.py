@@ -1,16 +1,11 @@
-"""Held sheets whose modes are computed rather than a reduced-order model of elements."""
+"""Held sheets, whose modes are computed rather than elements."""
 
 from math import pi
 
 from skinwave.bodies.sheet import bending_wavenumber
 from skinwave.models.advice import takes
-from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.reduction import BAND
+from skinwave.models.plate_modes import ERROR, FROM_REST
 from skinwave.scene import Body, Scene
-
-# Moments of a lightly damped sheet are 0.6 to 0.8 times its modes below `BAND` and at most 200, the
-# cost goes with their square: 136 modes took a minute a mesh, Ritz's modes of that sheet a second.
-MANY_MODES = 100
 
 
 def modes_below(body: Body, frequency: float) -> float:
@@ -21,16 +16,11 @@ def modes_below(body: Body, frequency: float) -> float:
     return body.width * body.height * bending_wavenumber(body, frequency) ** 2 / (4 * pi)
 
 
-def why_modes(scene: Scene) -> str:
+def why_modes(scene: Scene, tolerance: float) -> str:
     """Reason for the modes of a scene's sheet instead of elements; none if elements do."""
     body = scene.body
-    if not takes(FROM_REST, scene):
+    if not takes(FROM_REST, scene) or tolerance < ERROR:
         return ""
     if body.air and not body.mounting.is_frame:
         return f"elements have air around a sheet in a frame, not one {body.mounting.words}"
-    if (count := modes_below(body, BAND)) > MANY_MODES:
-        return (
-            f"a thin sheet with about {count:.0f} modes below {BAND:.0f} Hz, more than a "
-            "reduced-order model of elements is made for"
-        )
-    return ""
+    return "a flat sheet that is held: modes of a thin plate need no mesh"

@@ -4,19 +4,17 @@ import numpy as np
 
 from simple_model import Response
 from simple_model.line_names import line_names
-from simple_model.quantities import DISPLACEMENT
 from simple_model.response import step
 from skinwave.models import Model, named
 from skinwave.models.advice import cures_for, in_words
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import mean_gain, spot_scale
-from skinwave.planning.extent import mean_sag
 from skinwave.planning.refinement import enough
+from skinwave.planning.stretching import LINEAR, bent, stretching_left_out
 from skinwave.scene import Scene
 
-NONLINEAR = "plate-modes-nonlinear"
+NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
-LINEAR = 0.5  # deflection over thickness up to which bending of a sheet is taken as linear
 LEFT_OUT = 0.05  # of the strongest line of a load: weaker ones are left out without a warning
 
 
@@ -87,26 +85,23 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
     )
 
 
-def beyond_linear(scene: Scene, response: Response) -> tuple[str, ...]:
-    """Warning of a sheet that a linear model deflects by more than `LINEAR` times its thickness: at
-    its probes or, clamped, in the middle under its mean load. The rigid-body motion of an
-    unconstrained sheet is no deflection.
+def of_stretching(scene: Scene, response: Response, tolerance: float) -> tuple[str, ...]:
+    """Warning of a linear model of a sheet that deflects by more than `LINEAR` thicknesses, or
+    whose stretching changes its motion by more than the tolerance.
     """
-    body, moves = scene.body, response.record is DISPLACEMENT
-    linear = response.record.of_body and not named(response.model).is_nonlinear
-    if not (body.of_kind.is_plate and linear):
+    model = named(response.model)
+    if model.is_nonlinear or not response.record.of_body:
         return ()
-    u = response.displacement if moves else np.zeros((1, 1))
-    bent = u if body.is_held else u - u.mean(axis=1, keepdims=True)
-    clamped = body.sides == "clamped"
-    factor = max(float(np.abs(bent).max()), mean_sag(scene) if clamped else 0.0) / body.depth
-    if factor <= LINEAR:
+    factor, left = bent(scene, response), stretching_left_out(scene, model, tolerance)
+    if factor <= LINEAR and left <= tolerance:
         return ()
-    cures = cures_for(scene, named(NONLINEAR)) if clamped else []
+    makers = [cures_for(scene, named(name)) for name in NONLINEAR] if scene.body.is_held else []
+    cures = next(filter(None, makers), [])
     cure = in_words(cures, "") if cures else "take a thicker sheet or a lower pressure"
+    change = f"changes its motion by about {100 * left:.2g} %" if left else "is left out"
     return (
-        f"this sheet deflects {factor:.2g} times its thickness, and linear bending holds to half "
-        f"of it; {cure}",
+        f"this sheet deflects {factor:.2g} times its thickness, and its stretching {change}; "
+        f"{cure}",
     )
 
 

@@ -127,8 +127,8 @@ def content_of(body: Body) -> str:
     return digest(Path(body.file)) if body.file else ""
 
 
-def element_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
-    """A body's map by elements, cached, and the kernel's."""
+def slow_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
+    """A body's map by the modes of a plate or by elements, cached, and the kernel's."""
     x, y = grid(scene)
     below = kernel_map(scene.pressure, x, y)
     name = cache.key(

@@ -4,21 +4,27 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 
+from simple_model import Response
 from skinwave import document
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.effort import Progress, one_thread, peak_memory
 from skinwave.files import write_lines, write_responses, write_run
+from skinwave.models import named
+from skinwave.models.advice import check_taken
+from skinwave.models.linear_elements import FEM
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
+from skinwave.planning.plan import chosen_model
 from skinwave.processes import helper
 from skinwave.run import Run
 from skinwave.scene import BODIES, Body, Scene, body_name, check_load, with_body
-from skinwave.simulation import answered, check_options, compute, has_elements
+from skinwave.simulation import answered, check_options, compute
 from skinwave.studies import measured_page, measured_tables, paper15, study_page
-from skinwave.studies.changes import Drawn, Maps, element_maps, first_of, quick_maps, shown
+from skinwave.studies.changes import Drawn, Maps, first_of, quick_maps, shown, slow_maps
 from skinwave.studies.claims import claimed, evaluate, write_claims
 from skinwave.studies.measured_runs import beside, in_quantity, measured_places
 from skinwave.studies.measured_study import (
@@ -28,6 +34,12 @@ from skinwave.studies.measured_study import (
 )
 from skinwave.studies.study_page import StudyOutcome
 from skinwave.surface import has_wavenumber_integral
+
+# Of the models that plans choose, those that leave out more come first.
+COMPLETE = (
+    "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
+)  # fmt: skip
+SLOW = 3.0  # s of a model: from there on responses are computed in two processes
 
 
 def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str, Scene]]:
@@ -60,6 +72,7 @@ def run_study(
     *,
     title: str,
     command: str,
+    model: str = "auto",
     h: float | None = None,
     solver: str = "auto",
     measured: Measured | None = None,
@@ -67,15 +80,18 @@ def run_study(
     """Run every scene, writing each run as it is finished, then the tables and the page; with a
     measurement beside the models, if there is one of that Tacton.
 
-    An interrupt ends the runs early; those that are finished are still compared and written.
+    Each body has one model: the given one, or of those that plans take for its scenes the one that
+    leaves out least; elements if their size h in metre is given. An interrupt ends the runs early;
+    those that are finished are still compared and written.
     """
     check_options(solver, h=h)
-    for scene in (s for group in scenes.values() for s in group.values()):
-        has_elements(scene, h)  # which refuses before any run
+    models = _models(scenes, FEM.name if h and model == "auto" else model, h)
     started = time.perf_counter()
     with helper() as aside, one_thread():
-        bodies = _begun_bodies(scenes, aside, progress, h, solver)
-        maps = _begun_maps(scenes, aside, progress, h, solver)
+        how = _How(models=models, h=h, solver=solver)
+        bodies = _begun_bodies(scenes, aside, progress, how)
+        begun = _begun_responses(scenes, aside, how)
+        maps = _begun_maps(scenes, aside, progress, how)
         figures: dict[str, Future[bytes]] = {}
         drawn: dict[str, list[Run]] = {}
         found: list[MeasuredComparison] = []
@@ -89,7 +105,7 @@ def run_study(
                 drawn[name] = beside(found[-1], runs)
             figures[name] = aside.submit(study_page.tacton_png, name, drawn[name])
 
-        groups, prepared = _answered(scenes, folder, bodies, progress, h, solver, finished)
+        groups, prepared = _answered(scenes, folder, bodies, begun, progress, how, finished)
         drawn = {**groups, **drawn}
         figures["overview"] = aside.submit(study_page.overview_png, drawn)
         runs = [run for group in groups.values() for run in group]
@@ -123,21 +139,57 @@ def run_study(
     return spent
 
 
+@dataclass(frozen=True, kw_only=True)
+class _How:
+    """By column the model, and the element size in metre and solver that are asked for."""
+
+    models: Mapping[str, str]
+    h: float | None
+    solver: str
+
+    def is_reduced(self, column: str) -> bool:
+        """Whether a column is of bodies that are reduced once for all Tactons."""
+        return named(self.models[column]).is_reduced
+
+
+def _models(
+    scenes: Mapping[str, Mapping[str, Scene]], model: str, h: float | None
+) -> dict[str, str]:
+    """Model of each column; a ValueError of a scene that it does not take, before any run."""
+    if model != "auto" and not named(model).needs_body:
+        raise ValueError(f"{model} moves no body, and is compared with anyway; give another model")
+    found: dict[str, str] = {}
+    for column, scene in (each for group in scenes.values() for each in group.items()):
+        if not scene.body.of_kind.discretise:
+            found[column] = column
+            continue
+        mine = model
+        if model == "auto":
+            mine = chosen_model(scene) if found.get(column) != COMPLETE[-1] else COMPLETE[-1]
+        check_taken(named(mine), scene)
+        if named(mine).is_reduced:
+            check_mesh(scene.body, h or default_size(scene.body))
+        found[column] = max(found.get(column, mine), mine, key=_completeness)
+    return found
+
+
+def _completeness(model: str) -> int:
+    """How little a model that plans choose leaves out."""
+    return COMPLETE.index(model) if model in COMPLETE else -1
+
+
 Bodies = Callable[[Scene], tuple[Prepared, Coarser]]  # reduced, and the one on a coarser mesh
 
 
 def _begun_bodies(
-    scenes: Mapping[str, Mapping[str, Scene]],
-    aside: Executor,
-    progress: Progress,
-    h: float | None,
-    solver: str,
+    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, how: _How
 ) -> Bodies:
     """Reduced bodies: the last is reduced here when it is first asked for; meanwhile the others and
     the coarser ones that responses are assessed by, are reduced in other processes.
     """
+    h, solver = how.h, how.solver
     every = [each for group in scenes.values() for each in group.items()]
-    solids = {s.body: (column, s) for column, s in every if has_elements(s, h)}
+    solids = {s.body: (column, s) for column, s in every if how.is_reduced(column)}
     others, last = list(solids)[:-1], next(reversed(solids), None)
     begun = {body: aside.submit(_prepared, solids[body][1], h, solver) for body in others}
     coarse = {
@@ -171,19 +223,41 @@ def _prepared(
     )
 
 
-def _begun_maps(
-    scenes: Mapping[str, Mapping[str, Scene]],
-    aside: Executor,
-    progress: Progress,
-    h: float | None,
-    solver: str,
-) -> Maps:
-    """Maps of the Tacton that is shown first; those by finite elements are begun at once, aside."""
-    begun = {
-        scene.body: aside.submit(element_maps, scene, h, solver)
-        for scene in scenes[first_of(scenes)].values()
-        if has_elements(scene, h) and scene.reading.is_plain and not has_wavenumber_integral(scene)
+def _begun_responses(
+    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, how: _How
+) -> dict[Scene, Future[Response]]:
+    """Responses of slow models without a reduced body. The last are begun first, aside, while the
+    first are computed here.
+    """
+    slow = [
+        (scene, how.models[column])
+        for group in scenes.values() for column, scene in group.items()
+        if not how.is_reduced(column) and named(how.models[column]).seconds > SLOW
+    ]  # fmt: skip
+    return {
+        scene: aside.submit(_response, scene, model, how.h, how.solver)
+        for scene, model in reversed(slow)
     }
+
+
+def _response(
+    scene: Scene, model: str, h: float | None, solver: str, progress: Progress | None = None
+) -> Response:
+    if not scene.body.of_kind.discretise:
+        return compute(scene, model)
+    return answered(scene, model, progress=progress, h=h, solver=solver)
+
+
+def _begun_maps(
+    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, how: _How
+) -> Maps:
+    """Maps of the Tacton that is shown first; slow ones are begun at once, aside."""
+    begun = {
+        scene.body: aside.submit(slow_maps, scene, how.h, how.solver)
+        for scene in scenes[first_of(scenes)].values()
+        if scene.body.of_kind.discretise and scene.reading.is_plain
+        and not has_wavenumber_integral(scene)
+    }  # fmt: skip
 
     def maps(run: Run) -> Drawn:
         if run.scene.body not in begun:
@@ -198,9 +272,9 @@ def _answered(
     scenes: Mapping[str, Mapping[str, Scene]],
     folder: Path,
     bodies: Bodies,
+    begun: Mapping[Scene, Future[Response]],
     progress: Progress,
-    h: float | None,
-    solver: str,
+    how: _How,
     finished: Callable[[str, list[Run], Mapping[str, Prepared]], None],
 ) -> tuple[dict[str, list[Run]], dict[str, Prepared]]:
     """Every run, both kernels of all Tactons first, and the reduced bodies behind them; `finished`
@@ -209,20 +283,19 @@ def _answered(
     groups: dict[str, list[Run]] = {}
     prepared: dict[str, Prepared] = {}
     every = [(name, column, scene) for name, g in scenes.items() for column, scene in g.items()]
+    quick = sorted(every, key=lambda each: (how.is_reduced(each[1]), each[2] in begun))
     with suppress(KeyboardInterrupt):
-        for k, (name, column, scene) in enumerate(
-            sorted(every, key=lambda each: has_elements(each[2], h))
-        ):
-            if not scene.body.of_kind.discretise:
-                response = compute(scene, column)
-            elif not has_elements(scene, h):
-                response = answered(scene, solver=solver)
-            else:
+        for k, (name, column, scene) in enumerate(quick):
+            if how.is_reduced(column):
                 prepared[column], coarser = bodies(scene)
                 found = answer(prepared[column], scene)
                 response = assessed(
-                    scene, found, prepared[column], h, solver=solver, compared=coarser
+                    scene, found, prepared[column], how.h, solver=how.solver, compared=coarser
                 )
+            elif scene in begun and not begun[scene].cancel():
+                response = begun[scene].result()
+            else:
+                response = _response(scene, how.models[column], how.h, how.solver)
             body = column if scene.body.of_kind.discretise else "none"
             run = Run(tacton=name, body=body, scene=scene, response=response)
             write_run(folder / name / column, run)

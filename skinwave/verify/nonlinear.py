@@ -20,7 +20,7 @@ from skinwave.verify.case import Case, Check, Plot, below, described, misfit, re
 from skinwave.verify.deflected import elastica as bent
 from skinwave.verify.deflected import karman_disc
 
-PAPER = BODIES["paper-sheet"]
+PAPER = BODIES["paper-sheet-loose"]
 SMALL = replace(PAPER, width=0.06, height=0.06)
 BONET = "Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (1997)"
 AM = 140.0  # Hz

@@ -66,7 +66,7 @@ from skinwave.web.slabs import FURTHEST, HIGHEST, Table, is_tabulated, lowest, t
 
 TAIL = 0.4  # s that motion may last after the Tacton
 # What a warning says instead of the name of a model, of which a page has linear ones alone.
-ON_PAGE = f"save the scene and compute it with the model {NONLINEAR}, which a page has not"
+ON_PAGE = "save the scene and compute it with the model {}, which a page has not"
 FINER = 8  # places of a map's table in each interval of the table
 FAINTEST = 1e-4  # of the largest harmonic of the path
 MAPPED = 60  # lines that a map is made of, the strongest
@@ -208,8 +208,10 @@ def warned_of(scene: Scene, answer: Answer) -> Answer:
     if is_tabulated(scene.body) and scene.body.sides == "absorbing":
         return answer  # an infinite slab, whose sides reflect nothing
     found = sentences(scene, response, h=default_size(scene.body))
-    said = tuple(sentence.replace(f"use --model {NONLINEAR}", ON_PAGE) for sentence in found)
-    effort = replace(response.effort, warnings=said)
+    for model in NONLINEAR:
+        cure = f"use --model {model}"
+        found = tuple(sentence.replace(cure, ON_PAGE.format(model)) for sentence in found)
+    effort = replace(response.effort, warnings=found)
     return replace(answer, response=replace(response, effort=effort))
 
 
