@@ -10,7 +10,7 @@ import fem
 from bench.stated_errors import MOST, stated_and_true
 from meshes import cache
 from simple_model import Trajectory
-from skinwave import SkinwaveWarning, loads, simulate
+from skinwave import loads, simulate
 from skinwave.bodies.analytic import has_exact_waves
 from skinwave.bodies.build import build
 from skinwave.bodies.coat import coarsest_size
@@ -36,7 +36,7 @@ from skinwave.planning.refinement import (
     refined,
 )
 from skinwave.planning.sensitivity import sensitivity
-from skinwave.scene import Body, Layer
+from skinwave.scene import BODIES, Body, Layer
 from skinwave.simulation import compute, follow, required_plan
 from skinwave.studies.paper15 import scenes, tactons
 from skinwave.studies.tradeoff import Candidate, sentences, study, write

@@ -153,7 +153,7 @@ def test_scenes_with_it_come_back_from_their_files_and_are_planned():
         (SHAKEN.replace("um = 5", "um = 0"), "above 0 and at most 10000 um; give amplitude_um"),
         (SHAKEN, 'absorbing sides, too, .* take sides = "free" or "clamped"'),
         (SHAKEN + '[body]\nbase = "absorbing"\nsides = "clamped"', "beyond absorbing sides, too"),
-        (SHAKEN + '[body]\npreset = "paper-sheet-loose"', "is for a solid, not a body of kind 'sheet'"),
+        (SHAKEN + '[body]\npreset = "paper-sheet"', "is for a solid, not a body of kind 'sheet'"),
         (SHAKEN + '[body]\nkind = "none"', "is for a solid, not a body of kind 'none'"),
         (SHAKEN + '[body]\nbase = "free"\nsides = { left = "free", right = "free", front = "free"'
          ', back = "absorbing" }', "and this one is unconstrained"),
