@@ -93,6 +93,7 @@ def linear_motion(
     *,
     middle: Sequence[float] = MIDDLE,
     chosen: NDArray[np.int_] | None = None,
+    highest: float = np.inf,
 ) -> Floats:
     """Modal coordinates from rest of a plate that does not stretch, without time steps.
 
@@ -104,6 +105,7 @@ def linear_motion(
     times : (t,) s, 0 or above
     middle : (2,) metre, of the plate in the scene
     chosen : (r,) int, indices of the modes to return; all if not given
+    highest : Hz, lines of the load from there on are left out
 
     Returns
     -------
@@ -115,6 +117,7 @@ def linear_motion(
 
     chosen = np.arange(len(modes.squared)) if chosen is None else chosen
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
+    f, forces = f[f < highest], forces[f < highest]
     motion = modal_motion(modes, f, forces, modulus)[:, chosen]
     beside = motion - modal_motion_apart(modes, f, forces, modulus)[:, chosen]
     every = free_modes(modes, material)

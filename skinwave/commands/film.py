@@ -85,16 +85,17 @@ def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
 def _computed(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """Views of a scene, coloured by the quantity that is asked for."""
     from skinwave.document import worst_warnings
-    from skinwave.reports.album import answers, coloured, shown_scenes
+    from skinwave.reports.album import answers, coloured, plans_of, shown_scenes
     from skinwave.scene_file import read
 
     scene = read(options.source)
     if options.quantity is not None:
         scene = replace(scene, quantity=options.quantity)
     scene = replace(scene, depth=0.0)  # what is seen is the surface
+    shown, h = shown_scenes(scene, options.beside), metre(options.h)
+    plans = plans_of(shown, progress, h=h, solver=options.solver)
     found = list(answers(
-        scene, shown_scenes(scene, options.beside), progress, h=metre(options.h),
-        solver=options.solver, frames=options.frames,
+        scene, shown, plans, progress, h=h, solver=options.solver, frames=options.frames
     ))  # fmt: skip
     views, said = coloured([(view, run.scene) for view, run in found if view])
     warn([*worst_warnings((run.body, run.response.effort) for _, run in found), *said])

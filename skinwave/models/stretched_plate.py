@@ -20,7 +20,6 @@ from simple_model import Effort, MovingPressure, Response
 from simple_model.karman_motion import linear_motion, stretched_motion
 from simple_model.plate_modes import PlateModes
 from simple_model.response import SETTLE, step
-from simple_model.sampling import resolving_step
 from simple_model.von_karman import KarmanPlate, karman_plate
 from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, register
@@ -37,7 +36,6 @@ COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number judged besid
 CHECKED = 0.2  # s of an answer at the least, of which errors are measured
 SHARE = 0.3  # of the tolerance, for steps and for modes
 DEGREE = 5  # of the splines that are differentiated
-COARSE, EVERY = 0.1, 3  # tolerance of a map, and of which samples it is the mean
 
 _karman = lru_cache(maxsize=6)(karman_plate)
 
@@ -85,27 +83,33 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     float, of the probe where it is largest
     """
     modes: PlateModes = modes_of(plate_of(scene.body))
-    parts = ceil(step(times) / resolving_step(scene.pressure, LONGEST) - 1e-9)
+    parts = ceil(step(times) / LONGEST - 1e-9)
     added = _added(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)
     return float(relative(added, linear + added).max())
 
 
-def vibration(scene: Scene, places: Floats) -> Floats:
-    """RMS (p,) in metre of a sheet's motion about its mean at places (p, 2) in metre, after the
-    first part of the scene.
+def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
+    """Motion of a whole sheet about its mean, after the first part of the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    tolerance : relative error that may be made
+
+    Returns
+    -------
+    times (t,) in s, coordinates (t, m) in kg^1/2 m of all modes, and the modes
     """
     times = sample_times(scene)
-    request = Request(times=times, tolerance=COARSE, report=silent)
+    request = Request(times=times, tolerance=tolerance, report=silent)
     modes: PlateModes = modes_of(plate_of(scene.body))
     count, parts, _ = _resolved(scene, request, modes, FROM_REST.solve(scene, request).values)
-    settled = slice(int(SETTLE * len(times)), None, EVERY)
+    kept = slice(int(SETTLE * len(times)), None)
     middle = scene.body.placement.offset
-    z = linear_motion(modes, scene.pressure, scene.body.solid, times[settled], middle=middle)
+    z = linear_motion(modes, scene.pressure, scene.body.solid, times[kept], middle=middle)
     plate, added = _moved(scene, times, modes, count, parts)
-    z[:, plate.chosen] += added[::parts][settled]
-    spread = np.cov(z, rowvar=False)
-    shapes = modes.at(places - middle)
-    return np.asarray(np.sqrt(np.einsum("pi,ij,pj->p", shapes, spread, shapes, optimize=True)))
+    z[:, plate.chosen] += added[::parts][kept]
+    return times[kept], z - z.mean(axis=0), modes
 
 
 def _resolved(
@@ -114,8 +118,8 @@ def _resolved(
     """Number of modes that stretch the sheet and of time steps a sample, and the error they make:
     measured over the first part of an answer, and as small as the tolerance asks or as can be had.
     """
-    sample, fastest = step(request.times), resolving_step(scene.pressure, LONGEST)
-    parts = ceil(sample / (request.dt or fastest) - 1e-9)
+    sample = step(request.times)
+    parts = ceil(sample / (request.dt or LONGEST) - 1e-9)
     counts = [min(count, len(modes.squared)) for count in COUNTS]
     times = first_part(scene.pressure, request.times)
     known: dict[tuple[int, int], Floats] = {}
@@ -158,9 +162,10 @@ def _moved(
     body, dt = scene.body, step(times) / parts
     plate = _karman(modes, body.depth, count)
     steps = np.asarray(dt * np.arange(parts * (len(times) - 1) + 1), np.float64)
+    # Faster lines hardly deflect the sheet, and do not stretch it.
     linear = linear_motion(
         modes, scene.pressure, body.solid, steps, middle=body.placement.offset,
-        chosen=plate.chosen,
+        chosen=plate.chosen, highest=0.5 / dt,
     )  # fmt: skip
     return plate, stretched_motion(plate, linear, dt, body.solid).coordinates - linear
 

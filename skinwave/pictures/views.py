@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 import fem
 from meshes import reading
@@ -22,8 +23,10 @@ from simple_model.load_spectrum import Complex, pressure_lines, synthesise
 from skinwave.bodies.analytic import compliance
 from skinwave.fitting import effort_of, fitting
 from skinwave.models.loads import surface_motion
+from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduction import oscillating, read_at
 from skinwave.models.speeds import repeated, shown_part, strongest_tone
+from skinwave.models.stretched_plate import STRETCHED, settled
 from skinwave.pictures.motion import Waves, check_values, vibration
 from skinwave.pictures.nodal import Shade, Tensors, shade, tensors
 from skinwave.run import Run
@@ -37,6 +40,7 @@ NEGLIGIBLE = 1e-4  # of the load's strongest line: lines that are not shown
 ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
 TYPICAL = 140.0  # Hz, where nothing vibrates
 FIELD_FRAMES = 8  # of those that are shown, written for other programs
+PLATE_TOLERANCE = 0.05  # of the motion of a sheet at large deflection
 ROOM = 5e-3  # m beside the path that waves can be watched in
 
 Singles = NDArray[np.float32]
@@ -258,12 +262,27 @@ def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
     def trace(places: Floats, t: Floats) -> Floats:
         return synthesise(*lines(places), t)
 
+    return _surface_view(run, (points, triangles), (period, times), lines, trace, reach)
+
+
+def _surface_view(
+    run: Run,
+    shape: tuple[Floats, Ints],
+    shown: tuple[float, Floats],
+    lines: Callable[[Floats], tuple[Floats, Complex]],
+    trace: Motion,
+    reach: Floats,
+) -> View:
+    """The view of a flat surface of points (p, 3) and triangles, for a period with its times, from
+    the lines (f,), (f, p) and the motion of any places.
+    """
+    scene, body, (points, triangles), (period, times) = run.scene, run.scene.body, shape, shown
     f, found = lines(points[:, :2])
     amplitudes, levels = np.abs(found), np.full(len(points), -np.inf)
     if body.is_skin:
         levels = sensation_level(amplitudes, f[:, None]).max(axis=0, initial=-np.inf)
-    motion = np.zeros((frames, len(points), 3), np.float32)
-    motion[:, :, 2] = -synthesise(f, found, times)
+    motion = np.zeros((len(times), len(points), 3), np.float32)
+    motion[:, :, 2] = -trace(points[:, :2], times)
     tone = strongest_tone(f, amplitudes)
     return View(
         body=run.body, model=run.model, unit="m", scene=scene, points=points,
@@ -272,6 +291,43 @@ def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
         sensation=levels, tone=tone, speed=body.of_kind.wave_speed(body, tone or TYPICAL),
         effort=run.response.effort, ray=_ray(scene, reach, trace), track=_track(scene, trace),
     )  # fmt: skip
+
+
+def plate_view(run: Run, part: tuple[float, int]) -> View:
+    """The view of a sheet by the modes of a thin plate; `part` as `kernel_view` takes it.
+
+    A sheet at large deflection is shown as it moves after the first part of the scene.
+    """
+    scene, body = run.scene, run.scene.body
+    middle, reach = body.placement.offset, np.array([body.width, body.height]) / 2
+    points, triangles = _grid(reach, LAYER_GRID)
+    points[:, :2] += middle
+    period, frames = part
+    times = np.arange(frames) * period / frames
+    if run.model == STRETCHED.name:
+        at, z, modes = settled(scene, PLATE_TOLERANCE)
+        steady = CubicSpline(at - at[0], z)
+        f = plate_lines(scene, points[:1, :2])[0]
+        window = np.hanning(len(at))
+        waves = np.exp(-2j * np.pi * np.multiply.outer(f, at)) * window
+        coordinates = 2 / window.sum() * waves @ z
+
+        def lines(places: Floats) -> tuple[Floats, Complex]:
+            return f[f > 0], (coordinates @ modes.at(places - middle).T)[f > 0]
+
+        def trace(places: Floats, t: Floats) -> Floats:
+            return np.asarray(steady(np.mod(t, at[-1] - at[0])) @ modes.at(places - middle).T)
+
+    else:
+
+        def lines(places: Floats) -> tuple[Floats, Complex]:
+            f, a = plate_lines(scene, places)
+            return f[f > 0], a[f > 0]
+
+        def trace(places: Floats, t: Floats) -> Floats:
+            return synthesise(*lines(places), t)
+
+    return _surface_view(run, (points, triangles), (period, times), lines, trace, reach)
 
 
 def spread_radius(view: View, drop: float) -> float:

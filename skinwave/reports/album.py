@@ -18,16 +18,17 @@ from simple_model import Response, published
 from simple_model.choices import choose
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave import record, surface
+from skinwave.bodies.sizes import default_size
 from skinwave.document import worst_warnings
 from skinwave.effort import Progress
-from skinwave.fields import assessed_probes
 from skinwave.files import write_lines, write_run
 from skinwave.fitting import EFFORT, PLAN, TRUST, effort_of, fitting
 from skinwave.models import named
+from skinwave.models.advice import takes
+from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.models.prepared import answer
 from skinwave.models.speeds import repeated, shown_part
-from skinwave.pictures.motion import Waves, waves
+from skinwave.pictures.motion import Waves, probe_response, waves
 from skinwave.pictures.views import (
     View,
     body_view,
@@ -35,6 +36,7 @@ from skinwave.pictures.views import (
     kernel_view,
     layer_view,
     load,
+    plate_view,
     save,
     shaded,
 )
@@ -45,12 +47,13 @@ from skinwave.quantity_map import save as save_map
 from skinwave.run import Run
 from skinwave.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.scene_file import dumps, read
-from skinwave.simulation import answered, compute, has_elements
+from skinwave.simulation import compute, follow, has_elements, required_plan
 from skinwave.studies import description, paper15
 from skinwave.surface import SurfaceMap, body_map, element_map, grid
 from skinwave.verify.suite import suite
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
+LARGER = 1.5  # times the default size are the elements of pictures, for a fifth of the time
 PLANNED = 0.05  # tolerance of the plan that stands on the page
 CASES = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a second or two in all
 
@@ -132,13 +135,17 @@ def make(
     """
     shown = shown_scenes(scene, beside)
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
-    runs = []
-    for view, run in answers(scene, shown, progress, h=h, solver=solver, frames=frames):
+    plans = plans_of(shown, progress, h=h, solver=solver)
+    runs, misfit = [], np.nan
+    for view, run in answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames):
         also = None if view is None else partial(keep_view, view)
         write_run(folder / run.column, run, by="waves", also=also)
         runs.append(run)
+        if run.scene == scene and view and view.moved:
+            misfit = _misfit(run, view.moved)
     write_lines(folder / "lines.csv", runs)
-    _plan(folder, scene, runs, progress, solver, command)
+    own = next((plans[column] for column in plans if shown[column] == scene), None)
+    _plan(folder, own or plan(scene, PLANNED), misfit, progress, command)
     return worst_warnings((run.body, run.response.effort) for run in runs)
 
 
@@ -155,40 +162,61 @@ def keep_view(view: View, folder: Path) -> None:
         surface.save(folder / "map.npz", found)
 
 
+def plans_of(
+    shown: Mapping[str, Scene], progress: Progress, *, h: float | None, solver: str
+) -> dict[str, Plan]:
+    """Plan of each scene with a body, by column."""
+    return {
+        column: required_plan(its, "auto", PLANNED, progress, h=h, solver=solver)
+        for column, its in shown.items() if its.body.of_kind.discretise
+    }  # fmt: skip
+
+
 def answers(
     scene: Scene,
     shown: Mapping[str, Scene],
+    plans: Mapping[str, Plan],
     progress: Progress,
     *,
     h: float | None = None,
     solver: str = "auto",
     frames: int | None = None,
 ) -> Iterator[tuple[View | None, Run]]:
-    """The runs of `shown_scenes`, one at a time, each with its view; there is none of the published
-    kernel, whose load is another one. Raises what `make` does.
+    """The runs of `shown_scenes` by `plans_of` them, one at a time, each with its view; there is
+    none of the published kernel, whose load is another one. Raises what `make` does.
+
+    Views of bodies are by finite elements that are larger than those of responses, or by the modes
+    of a plate.
     """
     moved = {
         body: _moved(its, body, progress, h, solver)
         for body, its in shown.items()
-        if has_elements(its, h)
+        if has_elements(its, h) and not _is_plate(its, h)
     }
     tones = max(repeated(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
     part = shown_part(scene.pressure, fastest, frames)  # the same for all, side by side
     for column, its in shown.items():
         progress(f"response of {column}", 0.0)
-        if column in moved:
-            progress(f"{column}: compare with a coarser mesh", 0.0)
-            response = assessed_probes(its, moved[column], h, PLANNED, solver)
-            run = Run(tacton=scene.name, body=column, scene=its, response=response)
-            yield body_view(its, column, moved[column], part), run
-        elif its.body.of_kind.discretise:
-            response = answered(its, tolerance=PLANNED, solver=solver)
-            run = Run(tacton=scene.name, body=column, scene=its, response=response)
-            yield layer_view(run, KERNEL_REACH, part), run
-        else:
+        if column not in plans:
             run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
             yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
+            continue
+        response = follow(its, plans[column], PLANNED, h=h, solver=solver)
+        run = Run(tacton=scene.name, body=column, scene=its, response=response)
+        progress(f"pictures of {column}", 0.0)
+        if column in moved:
+            yield body_view(its, column, moved[column], part), run
+        else:
+            seen = plate_view(run, part) if _is_plate(its, h) else None
+            yield seen or layer_view(run, KERNEL_REACH, part), run
+
+
+def _is_plate(scene: Scene, h: float | None) -> bool:
+    """Whether pictures are by the modes of a plate: of its displacement, unless the size of
+    elements is asked for.
+    """
+    return h is None and scene.reading.is_plain and takes(FROM_REST, scene)
 
 
 def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
@@ -208,23 +236,24 @@ def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver:
     def named(phase: str, fraction: float) -> None:
         progress(f"{body}: {phase}", fraction)
 
-    return waves(scene, progress=named, h=h, solver=solver)
+    size = h or LARGER * default_size(scene.body)
+    return waves(scene, progress=named, h=size, solver=solver)
 
 
-def _plan(
-    folder: Path, scene: Scene, runs: Sequence[Run], progress: Progress, solver: str, command: str
-) -> None:
-    """Requirements of the scene by `plan`, and the difference of its response from that drawn."""
-    progress("plan", 0.0)
-    required = plan(scene, PLANNED, solver=solver)
+def _misfit(run: Run, moved: Waves) -> float:
+    """How far the motion in pictures is from the response, over all probes, relative."""
+    values = run.response.values
+    away = probe_response(run.scene, moved).values - values
+    return float(np.linalg.norm(away)) / (float(np.linalg.norm(values)) or 1.0)
+
+
+def _plan(folder: Path, required: Plan, misfit: float, progress: Progress, command: str) -> None:
+    """Requirements of the scene, and how far the motion in pictures is from the response."""
     table = asdict(replace(required, prepared=None)) | {"tolerance": PLANNED}
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     trust: dict[str, Any] = {"command": command, "model": required.model}
-    drawn = [run.response.values for run in runs if run.scene == scene]
-    if drawn and scene.body.of_kind.discretise:
-        planned = _planned_answer(scene, required, solver).values
-        size = float(np.linalg.norm(planned)) or 1.0
-        trust["misfit"] = float(np.linalg.norm(drawn[0] - planned)) / size
+    if np.isfinite(misfit):
+        trust["misfit"] = misfit
     trust["cases"] = _verified(progress)
     (folder / "trust.json").write_text(json.dumps(trust, indent=1), encoding="utf-8")
 
@@ -237,12 +266,6 @@ def _verified(progress: Progress) -> list[dict[str, Any]]:
         {"title": case.title, "source": case.source, "passed": case.passed, **asdict(case.worst)}
         for case in cases
     ]
-
-
-def _planned_answer(scene: Scene, required: Plan, solver: str) -> Response:
-    if required.prepared:
-        return answer(required.prepared, scene)
-    return compute(scene, required.model, PLANNED, h=required.h, solver=solver)
 
 
 def open_album(folder: Path) -> Album:

@@ -173,8 +173,7 @@ def _modelled(album: Album) -> list[str]:
     rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
     heading = (
         f"What the scene requires for a relative error of {100 * planned['tolerance']:g} % at its "
-        "probes, and why. Pictures need the motion of the whole body, and so are by finite "
-        "elements whatever is planned."
+        "probes, and why. Pictures show the whole body, by finite elements or the modes of a plate."
     )
     warned = [document.paragraph(f"Warning: {text}.") for text in planned["warnings"]]
     return [*parts, document.paragraph(heading), document.table(["", "", "reason"], rows), *warned]
@@ -225,8 +224,8 @@ def _trust(album: Album) -> list[str]:
     trust: Mapping[str, Any] = album.trust or {}
     if {"misfit", "model"} <= trust.keys():
         found.append(
-            f"The waveforms drawn here differ from those of the planned model, {trust['model']}, "
-            f"by {significant(100 * trust['misfit'], 2)} % over all probes."
+            f"At the probes, the motion in pictures, which have larger elements, differs from the "
+            f"response by {trust['model']} by {significant(100 * trust['misfit'], 2)} %."
         )
     found.append("The pressure of a device is uncertain by a factor of 2, and all motion with it.")
     parts: list[str] = [document.paragraph(text) for text in dict.fromkeys(found)]

@@ -15,7 +15,9 @@ from meshes import Palm
 from simple_model import MovingPressure, Trajectory
 from simple_model.drive import PUBLISHED, beyond_published
 from simple_model.material import PRESETS, Material, PronyTerm
-from skinwave.bodies.sheet import check_alike
+from skinwave.models.advice import takes
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import response_spectrum
 from skinwave.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
 
@@ -28,6 +30,7 @@ ASSUMPTIONS = {
     "at the strongest line",
     "laterally-infinite": "the body has its own size and side conditions, and is meshed with "
     "finite elements",
+    "alike in all directions": "the sheet has the stiffness and tension of each direction",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
@@ -35,7 +38,10 @@ ASSUMPTIONS = {
     "flat": "the palm is curved, and its layers are merged into one of their mean stiffness",
     "small deflection": "the sheet stretches as it bends",
 }
-ELEMENTS = {"laterally-infinite", "continuous path", "one material", "flat", "small deflection"}
+ELEMENTS = {
+    "laterally-infinite", "alike in all directions", "continuous path", "one material", "flat",
+    "small deflection",
+}  # fmt: skip
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LOSS_LEFT = 0.1  # of the material's own: an undamped resonance is unbounded
 RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
@@ -53,17 +59,16 @@ def droppable(scene: Scene) -> tuple[str, ...]:
     Raises
     ------
     ValueError
-        If the scene has no body, or one whose directions differ, without a wavenumber integral.
+        If the scene has no body.
     """
     body, path = scene.body, scene.tacton.trajectory
     if not body.of_kind.discretise:
         raise ValueError("a scene without a body keeps every assumption; give it one")
-    if body.of_kind.is_plate:
-        check_alike(body)
     sheet, slab, solid = body.of_kind.is_plate, body.of_kind.is_layer, body.solid
     kept = {
         "little loss": slab and solid.has_loss,
         "viscous loss": slab and solid.fast_modulus > 0,
+        "alike in all directions": sheet and as_alike(body) != body,
         "vacuum": sheet and body.mounting.is_frame,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
@@ -71,7 +76,7 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         and (bool(body.layers) or sum(x.thickness for x in LAYERS) < body.depth),
         # The palm that stands for a hand has mounds, which a thin body has no room for.
         "flat": slab and body.placement == FLAT and Palm.thenar_height < body.depth < np.inf,
-        "small deflection": sheet and body.sides == "clamped",
+        "small deflection": sheet and takes(STRETCHED, scene),
     }
     return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
 
@@ -137,9 +142,12 @@ def relaxed(
     model = "fem" if elements else "flat-body"
     if elements and body.of_kind.is_layer and "laterally-infinite" not in dropped:
         body = replace(body, sides="absorbing")
+    changed = replace(scene, pressure=pressure, body=body)
     if "small deflection" in dropped:
-        model = "fem-nonlinear"
-    return replace(scene, pressure=pressure, body=body), model
+        model = STRETCHED.name
+    elif elements and takes(FROM_REST, changed):
+        model = FROM_REST.name
+    return changed, model
 
 
 def held(
@@ -191,6 +199,8 @@ def check_rate(update_rate: float) -> None:
 
 def _body(scene: Scene, dropped: Collection[str]) -> Body:
     body = scene.body
+    if body.of_kind.is_plate and "alike in all directions" not in dropped:
+        body = as_alike(body)
     solid, line = body.solid, strongest_line(scene)
     law = as_relaxing if "viscous loss" in dropped else as_viscous
 
@@ -217,6 +227,16 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
         width = min(body.width, BODIES["palm"].width)
         changes |= {"kind": "palm", "width": width}
     return replace(body, **changes)  # type: ignore[arg-type]
+
+
+def as_alike(body: Body) -> Body:
+    """A flat sheet of the mean stiffness and tension of its directions."""
+    held, tension = body.mounting, body.mounting.mean_tension
+    mean = replace(held, tension_x=tension, tension_y=tension, curl_x=0.0, curl_y=0.0)
+    found = replace(body, mounting=mean)
+    if body.solid.orthotropy is not None:
+        found = replace(found, material=replace(body.solid, orthotropy=None))
+    return found
 
 
 def as_one(layers: Sequence[Layer]) -> Layer:

@@ -19,7 +19,9 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
 from skinwave import document
 from skinwave.effort import Progress
+from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import answer, prepare
+from skinwave.models.stretched_plate import STRETCHED
 from skinwave.pictures.figures import png
 from skinwave.plain_text import csv_table
 from skinwave.run import ASSESSED
@@ -85,7 +87,7 @@ def paper_vs_skin(
 
     Parameters
     ----------
-    h : float, metre, element size; each model's own if not given
+    h : float, metre, element size of solids; that of the body if not given
     """
     on = dict(bodies or {name: BODIES[name] for name in MEASURED_ON})
     patterns = [(n, replace(t, duration=DURATION)) for n, t in (chosen or tactons())]
@@ -121,12 +123,15 @@ def _mechanisms(
     def report(phase: str, done: float) -> None:
         progress(f"{name}: {phase}", done)
 
-    linear = partial(answer, prepare(body, np.array(PROBES), report, h=h))
-    found = {"linear load": ("linear", linear), "squared load": ("pressure_squared", linear)}
-    if body.of_kind.is_plate:
-        stretching = partial(compute, model="fem-nonlinear", h=h)
-        found["squared load, stretching"] = ("pressure_squared", stretching)
-    return found
+    if not body.of_kind.is_plate:
+        linear = partial(answer, prepare(body, np.array(PROBES), report, h=h))
+        return {"linear load": ("linear", linear), "squared load": ("pressure_squared", linear)}
+    bending, stretching = (partial(compute, model=each.name) for each in (FROM_REST, STRETCHED))
+    return {
+        "linear load": ("linear", bending),
+        "squared load": ("pressure_squared", bending),
+        "squared load, stretching": ("pressure_squared", stretching),
+    }
 
 
 def _scene(name: str, tacton: Tacton, body: Body, drive: str) -> Scene:

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from fem import NotReduced
-from simple_model import MovingPressure, Response, lines, resolved_lines
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure, Response, lines, resolved_lines, sensation_level
 from simple_model.drive import beyond_published
 from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
@@ -42,7 +43,9 @@ from skinwave.studies.assumptions import (
 )
 
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
+TINY = np.finfo(float).tiny
 FIRST = "as published"  # by the model point-kernel-published
+LARGER = 1.25  # times the default element size, for a third of the time
 # With a tenth of the damping a body may take more moments than a reduced one has; in elements so
 # much larger it takes as many, and that is known at a tenth of the cost.
 ALMOST_UNDAMPED, COARSER = "all but: little loss", 3.0
@@ -66,16 +69,18 @@ class HierarchyStep:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """Effect of dropping one assumption, at the probe where it is largest.
+    """Effect of dropping one assumption, of the step without it against the step with it.
 
-    `waveform` relative L2 at probe `where` (x, y) in metre, `decibel` by line, both of the step
-    without it against the step with it (after the factor that fits best where units differ);
-    `alone` the waveform's change if it is the only assumption made; `seconds` that dropping costs.
+    `waveform` change in L2 at probe `where` (x, y) in metre, where it is largest, relative to the
+    probe that moves most (after the factor that fits best where units differ); `level` in dB, by
+    which the sensation level grows, None of what is not skin; `decibel` by line; `alone` the
+    waveform's change if it is the only assumption made; `seconds` that dropping costs.
     """
 
     name: str
     waveform: float
     where: tuple[float, float]
+    level: float | None
     decibel: dict[str, float]
     alone: float | None
     seconds: float
@@ -135,7 +140,8 @@ def hierarchy_of(
 
     Parameters
     ----------
-    h : float, metre, element size of all steps; the default of the scene's body if not given
+    h : float, metre, element size of all steps; `LARGER` times the default of the scene's body if
+        not given
     update_rate, points : float, Hz, and how many on the path: of the device, as `held` takes them
 
     Raises
@@ -191,7 +197,7 @@ def _asked(
         changed, model = drawn(scene, dropped)
         step |= {"model": model, "body": changed.body}
         is_reduced = named(model).is_reduced
-        size = h or default_size(scene.body) if is_reduced else h
+        size = h or LARGER * default_size(scene.body) if is_reduced else h
     except (ValueError, ArithmeticError) as error:
         return _Asked(step=HierarchyStep(**step, error=str(error)))
     tried = COARSER * size if size and is_reduced and name == ALMOST_UNDAMPED else None
@@ -291,19 +297,39 @@ def effect(
     """Effect of the assumption that a step is named by."""
     assert before.response
     assert after.response
-    change = compare(after.response, before.response)
-    worst = int(np.argmax(change.relative_l2))
+    changed, scale = _changes(after.response, before.response)
+    most = int(np.argmax(changed))
     alone = None
     if kept_alone and kept_alone.response and richest.response:
-        alone = float(compare(richest.response, kept_alone.response).relative_l2.max())
+        alone = float(_changes(richest.response, kept_alone.response)[0].max())
+    level = None
+    if scene.body.is_skin:
+        of_both = [_level(scene, each) for each in (before.response, after.response)]
+        level = of_both[1] - of_both[0] if np.isfinite(of_both).all() else None
     return Effect(
-        name=after.name,
-        waveform=float(change.relative_l2[worst]),
-        where=scene.probes[worst],
-        decibel=line_changes(scene, before.response, after.response, change.scale),
-        alone=alone,
+        name=after.name, waveform=float(changed[most]), where=scene.probes[most], level=level,
+        decibel=line_changes(scene, before.response, after.response, scale), alone=alone,
         seconds=after.seconds - before.seconds,
-    )
+    )  # fmt: skip
+
+
+def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
+    """Change (p,) of waveforms relative to that of the probe that moves most, and the factor of the
+    candidate.
+    """
+    change = compare(reference, candidate)
+    sizes = np.linalg.norm(reference.values, axis=0)
+    return np.asarray(change.relative_l2 * sizes / max(sizes.max(), TINY)), change.scale
+
+
+def _level(scene: Scene, response: Response) -> float:
+    """Highest sensation level in dB of a line at any probe; minus infinity without one."""
+    names = followed_lines(scene, response)
+    if not names:
+        return -np.inf
+    f = np.array([*names.values()])
+    unit = "m" if response.record.of_body else "Pa"
+    return float(sensation_level(lines(response, f), f[:, None], unit=unit).max())
 
 
 def followed_lines(scene: Scene, response: Response) -> dict[str, float]:

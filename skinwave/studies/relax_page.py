@@ -22,12 +22,16 @@ LINE_COLUMNS = (
     "from_richest_db",
 )  # fmt: skip
 
+BARS = "What dropping each assumption changes: the waveform, and the sensation level (SL)."
+
 
 def sentence(e: Effect) -> str:
     """Sentence on the effect and the cost of dropping an assumption."""
     x, y = (1e3 * v for v in e.where)
     text = f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at "
-    text += f"({x:g}, {y:g}) mm by {significant(100 * e.waveform)} %"
+    text += f"({x:g}, {y:g}) mm by {significant(100 * e.waveform)} % of the strongest probe's"
+    if e.level is not None:
+        text += f", the sensation level by {decibel(e.level, signed=True)} dB"
     if e.decibel:
         line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
         text += f" and the {line} line by {decibel(e.decibel[line], signed=True)} dB"
@@ -58,7 +62,7 @@ def write(folder: Path, found: Hierarchy) -> None:
             "pressure and the other a displacement."
         ),
         document.section("What each assumption changes", *said),
-        document.picture(drawn, "Effect of dropping an assumption against its cost.", "effects"),
+        document.picture(drawn, BARS, "effects"),
         document.table(*effect_table(effects)),
         document.section("Steps", document.table(*step_table(found))),
     ]
@@ -76,14 +80,15 @@ def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]
     rows = [
         [
             e.name, significant(100 * e.waveform), f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
+            "" if e.level is None else decibel(e.level, signed=True),
             "" if e.alone is None else significant(100 * e.alone), f"{e.seconds:+.1f}",
             ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
         ]
         for e in effects
     ]  # fmt: skip
-    header = ["assumption dropped", "waveform changes by, %", "at, mm"]
-    header += ["if it is the only one made, %", "costs, s", "lines change by, dB"]
-    return header, rows
+    header = ["assumption dropped", "waveform changes by, % of the strongest probe's", "at, mm"]
+    header += ["sensation level changes by, dB", "waveform, if it is the only one made, %"]
+    return [*header, "costs, s", "lines change by, dB"], rows
 
 
 def step_table(found: Hierarchy) -> tuple[list[str], list[list[str]]]:
@@ -97,20 +102,21 @@ def step_table(found: Hierarchy) -> tuple[list[str], list[list[str]]]:
 
 
 def figure(effects: list[Effect]) -> Figure:
-    """Effect against cost, one point an assumption, its name beside it."""
-    drawn = Figure(figsize=(8, 4.6), layout="constrained")
+    """A bar for each assumption, the greatest effect at the top."""
+    drawn = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
     axes = drawn.add_subplot()
-    for e in effects:
-        axes.plot(max(e.seconds, 0.01), 100 * e.waveform, "o", color="#0072B2")
-    changes = [100 * e.waveform for e in effects] or [1.0]
-    axes.set(xscale="log", yscale="log", xlabel="cost of dropping it, s (0.01 or less at the left)",
-             ylabel="change of the worst probe's waveform, %")  # fmt: skip
-    axes.set_ylim(max(min(changes) / 2, 1e-6), 2 * max(changes))
-    axes.margins(x=0.35)
-    for e in effects:
-        axes.annotate(e.name, (max(e.seconds, 0.01), 100 * e.waveform), (6, 5),
-                      textcoords="offset points", fontsize=9)  # fmt: skip
-    axes.grid(alpha=0.3)
+    changes = [100 * e.waveform for e in effects]
+    bars = axes.barh([e.name for e in effects], changes, color="#0072B2", height=0.7)
+    texts = [
+        f"{significant(change)} %"
+        + ("" if e.level is None else f",  {decibel(e.level, signed=True)} dB SL")
+        for e, change in zip(effects, changes, strict=True)
+    ]
+    axes.bar_label(bars, texts, padding=4, fontsize=9)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1.3 * max(changes, default=1.0))
+    axes.set_xlabel("change of the waveform, % of the strongest probe's")
+    axes.spines[["top", "right"]].set_visible(False)
     return drawn
 
 
