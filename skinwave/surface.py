@@ -23,7 +23,7 @@ from skinwave.models.advice import takes
 from skinwave.models.loads import surface_motion
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
-from skinwave.models.stretched_plate import STRETCHED, settled
+from skinwave.models.stretched_plate import settled
 from skinwave.pictures.motion import DrivenBody, driven, line_amplitudes
 from skinwave.planning.stretching import beyond_linear
 from skinwave.scene import Scene
@@ -125,11 +125,11 @@ def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceMap:
         _, z, modes = settled(scene, REDUCED)
         shapes, spread = modes.at(flat - scene.body.placement.offset), np.cov(z, rowvar=False)
         rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, spread, shapes, optimize=True))
-        level, note = np.full(len(flat), -np.inf), STRETCHED.words
+        level, note = np.full(len(flat), -np.inf), "stretching plate"
     else:
         lines, amplitudes = plate_lines(scene, flat)
         rms, level = _rms_and_level((lines, np.abs(amplitudes)), "m")
-        note = FROM_REST.words
+        note = "thin plate"
     return SurfaceMap(
         x=x, y=y, rms=rms.reshape(shape), level=level.reshape(shape), unit="m", note=note
     )

@@ -138,7 +138,7 @@ def test_all_dropped_is_the_richest():
     assert scene.tacton.trajectory.hold
     assert len(scene.body.layers) == 1
     sheet, model = relaxed(PAPER, droppable(PAPER))
-    assert model == "fem-nonlinear"
+    assert model == "plate-modes-nonlinear"
     assert sheet.body == replace(PAPER.body, air=True)
 
 

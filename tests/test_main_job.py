@@ -35,15 +35,16 @@ def test_all_runs_are_there(job):
     assert len(list(folder.glob("*/*/scene.toml"))) == 60
     assert len(list((folder / "figures").glob("*.png"))) == 17
     responses = np.load(folder / "responses.npz")
-    assert responses["am140/skin-slab/fem"].shape == (10_000, 5)
+    assert responses["am140/skin-slab/flat-body"].shape == (10_000, 5)
+    assert responses["am140/paper-sheet/plate-modes-nonlinear"].shape == (10_000, 5)
 
 
-def test_the_meshes_are_fine_enough_and_the_memory_is_bounded(job):
+def test_every_response_is_within_the_tolerance_and_the_memory_is_bounded(job):
     folder, summary = job
+    assert summary["warnings"] == []
     for body in ("paper-sheet", "skin-slab"):
-        effort = json.loads((folder / "am140" / body / "effort.json").read_text())
-        assert effort["dofs"] >= 60_000
-        assert effort["estimate"] <= 1e-3
+        for record in folder.glob(f"*/{body}/record.json"):
+            assert 0 < json.loads(record.read_text())["expected_error"] <= 0.05
     assert summary["peak_memory_gib"] <= 6
 
 
@@ -59,15 +60,17 @@ def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
 
 
 def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):
-    """The same components exist in the kernel under the same load and in linear bodies."""
+    """The same components exist in the kernel under the same load and in a linear body."""
     for claim in ("S1", "S2", "S3", "S5", "M1", "M2", "M3"):
-        assessed_claims = {
-            column: claims[column, claim]["holds"]
-            for column in ("point-kernel", "paper-sheet", "skin-slab")
-        }
-        assert len(set(assessed_claims.values())) == 1, (claim, assessed_claims)
+        of_both = [claims[column, claim]["holds"] for column in ("point-kernel", "skin-slab")]
+        assert of_both[0] == of_both[1], claim
     assert claims["point-kernel", "M3"]["holds"] == "True"
     assert claims["point-kernel", "M1"]["holds"] == "False"  # a square has no third harmonic
+
+
+def test_a_sheet_that_stretches_has_harmonics_that_the_load_lacks(claims):
+    """M1 was measured on paper: 2 f_AM and 3 f_AM under AM alone."""
+    assert claims["paper-sheet", "M1"]["holds"] == "True"
 
 
 def test_second_harmonic_is_the_loads_times_the_bodys(job):
@@ -86,7 +89,7 @@ def test_waves_spread_further_than_the_point_kernel(job):
         return 20 * np.log10(motion[2:] / motion[0])  # 10 mm and beyond
 
     kernel = level("none", "point-kernel")
-    assert (level("skin-slab", "fem") > kernel + 10).all()
+    assert (level("skin-slab", "flat-body") > kernel + 10).all()
 
 
 def test_the_centre_of_a_circle_does_not_feel_the_drawing_frequency(job):

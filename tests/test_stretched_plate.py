@@ -66,7 +66,7 @@ def test_the_error_of_steps_and_modes_is_stated(monkeypatch, quantity):
     strong = scene(20, quantity)
     found = compute(strong, NAME)
     monkeypatch.setattr(stretched_plate, "LONGEST", 1.25e-5)
-    monkeypatch.setattr(stretched_plate, "FEWEST", 110)
+    monkeypatch.setattr(stretched_plate, "COUNTS", (80, 110))
     fine = compute(strong, NAME)
     true = compare(fine, found).relative_l2.max()
     assert true < 1.1 * (found.expected_error - ERROR)

@@ -35,12 +35,13 @@ def run(options: argparse.Namespace) -> int:
     from dataclasses import asdict, replace
 
     from skinwave.planning.budget import mesh_row
+    from skinwave.planning.costs import rows
     from skinwave.scene_file import read
 
     scene = read(options.scene)
     required = required_plan(options, scene)
     row = mesh_row(replace(scene, body=required.body), required.h, required.error)
-    required = replace(required, rows=(*required.rows, row))
+    required = replace(required, rows=(*required.rows, row, *rows(scene, required)))
     if options.json:
         table = asdict(replace(required, prepared=None))
         say(json.dumps({key: value for key, value in table.items() if key != "prepared"}))

@@ -105,7 +105,7 @@ def plan(
     scene : Scene
     tolerance : that error, 0..1
     model, h, dt : given choices: a model's name, element size in metre, time step in s; with both
-        a model and h all of the body is modelled
+        a model and h all of the body is modelled, and h alone asks for elements of a sheet
     solver, progress : for the meshes that are tried where the scene needs elements
     times : (t,) float, s, of the response, as for `simulate`: over which a start counts
 
@@ -156,7 +156,8 @@ def _planned(
     check_laws(scene.body, scene.pressure)
     if asked and asked.error:
         return _unplanned(scene, tolerance, asked, h, times)
-    chosen = asked or named(chosen_model(scene, tolerance, times))
+    meshed = h is not None and scene.body.of_kind.is_plate and takes(FEM, scene)
+    chosen = asked or (FEM if meshed else named(chosen_model(scene, tolerance, times)))
     if chosen is STRETCHED:
         return _stretched(scene, tolerance, times)
     spectrum = response_spectrum(scene, tolerance)
