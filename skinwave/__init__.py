@@ -25,7 +25,8 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.scene_file import dumps, loads, read
     from skinwave.simulation import simulate
     from skinwave.support_motion import SupportMotion
-    from skinwave.sweeps.in_python import SweepTable, sweep
+    from skinwave.sweeps.best import Best
+    from skinwave.sweeps.in_python import SweepTable, best_value, sweep
 
 _HOMES = {
     "BODIES": "scene",
@@ -50,12 +51,14 @@ _HOMES = {
     "cite": "citations",
     "paper": "pictures.styles",
     "sweep": "sweeps.in_python",
+    "best_value": "sweeps.in_python",
+    "Best": "sweeps.best",
     "SweepTable": "sweeps.in_python",
 }
 __all__ = [
-    "BODIES", "Agreement", "Body", "Field", "Load", "ParametricBody", "Plan", "Scene", "Sides",
-    "SkinwaveWarning", "SupportMotion", "SweepTable", "cite", "compare", "dumps", "field", "loads",
-    "paper", "plan", "prepare", "read", "simulate", "sweep",
+    "BODIES", "Agreement", "Best", "Body", "Field", "Load", "ParametricBody", "Plan", "Scene",
+    "Sides", "SkinwaveWarning", "SupportMotion", "SweepTable", "best_value", "cite", "compare",
+    "dumps", "field", "loads", "paper", "plan", "prepare", "read", "simulate", "sweep",
 ]  # fmt: skip
 
 

@@ -17,16 +17,21 @@ import pytest
 
 import fem.affine_solution
 import fem.reduced
-from simple_model import MovingPressure, Tacton
+import skinwave
+from simple_model import MovingPressure, Response, Tacton
+from skinwave import models
 from skinwave.cli import main
+from skinwave.models import Model, register
 from skinwave.models.free_keys import free_keys, with_values
 from skinwave.pictures.styles import style
 from skinwave.scene import BODIES, Body, Layer, Scene
 from skinwave.scene_file import read, to_table
 from skinwave.simulation import compute
-from skinwave.sweeps import dataset, engine, families, sweep_figures
+from skinwave.spreads import spreads_of
+from skinwave.sweeps import best, dataset, engine, families, sweep_figures
 from skinwave.sweeps import sweep as sweeping
 from skinwave.sweeps.variation import cases, cases_of, combinations, parse
+from skinwave.uncertainty.sampling import samples
 
 THREADS = ["--scheduler", "threads", "--quiet"]
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
@@ -401,6 +406,85 @@ def test_the_forearm_gives_way_most_near_the_rayleigh_speed(tmp_path, monkeypatc
     assert figure.axes[1].get_xlabel() == "drawing speed, m/s"
     dashed = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
     assert dashed[0].get_xdata()[0] == pytest.approx(2.68, abs=0.01)
+
+
+@pytest.fixture
+def parabola():
+    """A model whose motion is a parabola over the speed, largest at 1.5 times the shear speed."""
+
+    def solve(scene, request):
+        c = (scene.body.solid.shear_modulus / scene.body.solid.density) ** 0.5
+        speed, pressure = scene.tacton.trajectory.speed, scene.pressure.peak_pressure
+        size = 1e-8 * pressure * (30 - (speed / c - 1.5) ** 2)
+        waves = size * np.sin(2 * np.pi * 100 * request.times)
+        return Response(
+            model="parabola", times=request.times, probes=scene.probe_points,
+            values=np.outer(waves, np.ones(len(scene.probes))),
+        )  # fmt: skip
+
+    yield register(
+        Model(name="parabola", method="", words="", solve=solve, error=None, is_infinite=True)
+    )
+    del models._MODELS["parabola"]
+
+
+def test_a_best_value_is_refined_and_has_the_interval_of_its_samples(parabola):
+    """Speeds of shear waves go with the root of the modulus."""
+    base = skinwave.loads(
+        'tacton = { shape = "circle", duration_s = 0.02 }\nbody = { material = "palm" }\n'
+        "probes = { points_mm = [[0, 0], [5, 0]] }"
+    )
+    asked = {"column": "peak_um[1]", "samples": 39, "model": "parabola"}
+    found = skinwave.best_value(base, {"tacton.speed_m_per_s": "5:15:3"}, **asked)
+    solid = base.body.solid
+    assert found.value == pytest.approx(1.5 * (solid.shear_modulus / solid.density) ** 0.5)
+    spreads = [each for each in spreads_of(base) if each.part == "material"]
+    assert found.uncertain == tuple(each.key for each in spreads)
+    speeds = np.clip(found.value * samples(spreads, 39)[:, 0] ** 0.5, 5, 15)
+    assert found.interval == pytest.approx((speeds.min(), speeds.max()))
+    assert speeds.min() == 5
+    assert "The interval reaches an end of the range" in found.words
+
+
+def test_a_best_value_at_the_end_of_the_range_is_called_so(scene, capsys):
+    text = scene.read_text().replace("[body]", "[body]\nmaterial = 'ecoflex'")
+    scene.write_text(text + "[focus]\npeak_pressure_pa = { value = 50, spread = 0 }\n")
+    vary = ["--vary", "tacton.speed_m_per_s=4:8:3", "--model", "point-kernel"]
+    column = "drawing_frequency_hz"  # which goes with the speed
+    assert main(["sweep", str(scene), *vary, "--best", column, *THREADS[:2]]) == 0
+    said = capsys.readouterr().out
+    assert f"tacton.speed_m_per_s = 8.00, an end of the range, gives the largest {column}" in said
+    assert "no interval, because nothing in the scene is uncertain" in said
+    assert len(dataset.read(Path("short-sweep"))) == 3
+
+
+def test_values_without_a_number_are_no_best_value():
+    found = best.optima(
+        lambda runs: np.array([-((r["x"] - r["c"]) ** 2) if r["x"] > 1 else np.nan for r in runs]),
+        "x", [0, 1, 2, 3, 4], [{"c": 2.3}, {"c": 0.5}, {"c": 9.0}],
+    )  # fmt: skip
+    np.testing.assert_allclose(found[0], [2.3, 2.0, 4.0])
+    assert np.isneginf(
+        best.optima(lambda runs: np.full(len(runs), np.nan), "x", [1, 2, 3], [{}])[1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cure"),
+    [
+        (["tacton.speed_m_per_s=4:8:3", "tacton.size_mm=5:9:3"], "2 are varied; vary one and"),
+        (["body.material=palm,forearm,bone"], "all numbers; give body.material=start:stop:n"),
+        (["tacton.size_mm=5,9"], "at least three values"),
+        (["tacton.size_mm=5:9:3", "--best", "levl_db"], "did you mean 'level_db'"),
+        (["tacton.size_mm=5:9:3", "--best", "model"], "holds words; choose one of numbers"),
+        (["tacton.size_mm=5:9:3", "--best", "peak_um[9]"], "take one of peak_um[0] to peak_um"),
+        (["tacton.size_mm=5:9:3", "--samples", "9"], "give 39 or more"),
+        (["tacton.size_mm=5:9", "--design", "lhs", "--samples", "99"], "lhs; leave it out"),
+    ],
+)
+def test_what_has_no_best_value_is_refused_before_any_run(scene, capsys, arguments, cure):
+    assert cure in refused(capsys, "sweep", scene, "--best", "level_db[0]", "--vary", *arguments)
+    assert not Path("short-sweep").exists()
 
 
 def test_plots_are_drawn_with_units(scene):

@@ -127,7 +127,7 @@ def note_central_values(options: argparse.Namespace) -> None:
     A file that cannot be read is the command's to refuse.
     """
     path, name = getattr(options, "scene", None), options.command_name
-    samples = name == "run" and options.samples is not None
+    samples = (name == "run" and options.samples is not None) or getattr(options, "best", None)
     if samples or name == "plan" or not isinstance(path, Path) or not path.is_file():
         return
     if getattr(options, "quiet", False):

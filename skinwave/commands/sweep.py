@@ -5,6 +5,8 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,9 +40,15 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--design", default="factorial", help="factorial (default), zip, lhs or sobol"
     )
     parser.add_argument(
-        "--samples", type=int, metavar="N", help="runs of lhs; rows of each matrix of sobol"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of a Latin hypercube")
+        "--samples", type=int, metavar="N",
+        help="runs of lhs; rows of each matrix of sobol; samples of spreads of --best (199)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="of samples")
+    parser.add_argument(
+        "--best", metavar="COLUMN",
+        help="the value of the varied key at which a column such as level_db[0] is largest, and "
+        "its 95 %% interval under the spreads of the scene",
+    )  # fmt: skip
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     parser.add_argument(
         "--scheduler", default="processes", metavar="WHERE",
@@ -63,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
+    from skinwave.sweeps.best import Request, best_value, check
     from skinwave.sweeps.sweep import ModelOptions, sweep
     from skinwave.sweeps.variation import SAMPLED, cases, combinations, parse
     from skinwave.uncertainty import of_sweep
@@ -70,9 +79,15 @@ def run(options: argparse.Namespace) -> int:
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
     variations = [parse(text) for text in options.vary]
-    combined = combinations(variations, options.design, options.samples, options.seed)
+    design = options.design
+    if options.best and design in SAMPLED:
+        raise ValueError(f"--best takes a grid of values, not --design {design}; leave it out")
+    samples = None if options.best else options.samples
+    combined = combinations(variations, design, samples, options.seed)
     wanted = cases(options.scene, combined)
-    is_sampled = options.design in SAMPLED and not any(each.values for each in variations)
+    if options.best:
+        check(variations, options.best, wanted, options.samples)
+    is_sampled = design in SAMPLED and not any(each.values for each in variations)
     model_options = ModelOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
@@ -86,12 +101,21 @@ def run(options: argparse.Namespace) -> int:
             wanted, out, model_options, progress, scheduler=options.scheduler,
             workers=options.workers, command=record.of_command(options),
         )  # fmt: skip
+        best = None
+        if options.best and not found.missing:
+            request = Request(
+                cases=partial(cases, options.scene), variation=variations[0], column=options.best,
+                folder=out, model_options=model_options, samples=options.samples,
+                seed=options.seed, scheduler=options.scheduler, workers=options.workers,
+                command=record.of_command(options),
+            )  # fmt: skip
+            best = best_value(request, progress)
     if options.csv and found.planned > found.missing:
         dataset.write_csv(out, dataset.read(out))
     sampled: list[str] = []
     if is_sampled and found.done + found.found and not found.missing:
         names = {case.name(version("skinwave"), model_options): case for case in wanted}
-        has_indices = options.design == "sobol"
+        has_indices = design == "sobol"
         rows = of_sweep.in_order(dataset.read(out), names, combined)
         sampled = of_sweep.write(
             out, of_sweep.Sampled(rows=rows, variations=variations, has_indices=has_indices)
@@ -106,10 +130,14 @@ def run(options: argparse.Namespace) -> int:
         "seconds": round(found.seconds, 1),
         "files": sampled,
     }
+    if best:
+        summary["best"] = asdict(best) | {"is_at_end": best.is_at_end}
     sentence = (
         f"{found.done} of {found.planned} runs done in {found.seconds:.0f} s, {found.failed} "
         f"failed, {found.found} were there; {out}/{dataset.ROWS} is the table"
     ) + (f", {out}/{of_sweep.PAGE} its percentiles" if sampled else "")
+    if best:
+        sentence = f"{best.words}\n{sentence}"
     summarise(options, summary, sentence)
     if found.missing:
         why = "interrupted" if found.interrupted else "workers were killed"

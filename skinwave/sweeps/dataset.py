@@ -176,15 +176,17 @@ def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
         file.write(sink.getvalue())
 
 
-def read(out: Path) -> list[dict[str, Any]]:
-    """All rows, each once, in the order of the design, with the columns of all of them.
+def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """All rows, each once, in the order of the design, with the columns of all of them, or only
+    those given.
 
     Raises
     ------
     ValueError
         If there are none, or they cannot be read.
     """
-    rows = list({row[KEY]: row for row in _table(out, None).to_pylist()}.values())
+    wanted = [KEY, INDEX, *columns] if columns else None
+    rows = list({row[KEY]: row for row in _table(out, wanted).to_pylist()}.values())
     if not rows:
         raise ValueError(f"{out} holds no rows of a sweep; name the folder of one")
     last = len(rows)  # rows of releases up to 0.2 have no index

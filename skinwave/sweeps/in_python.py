@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from skinwave.numbers import significant
 from skinwave.progress_bar import reported
 from skinwave.scene import Scene
 from skinwave.scene_file import dumps
-from skinwave.sweeps import dataset
+from skinwave.sweeps import best, dataset
 from skinwave.sweeps import sweep as runner
 from skinwave.sweeps.variation import Variation, cases_of, combinations, parse
 
@@ -156,6 +157,56 @@ def sweep(
     names = (case.name(version("skinwave"), options) for case in wanted)
     rows = tuple(there[name] for name in names if name in there)
     return SweepTable(rows=rows, varied=tuple(v.key for v in variations))
+
+
+def best_value(
+    scene: Scene,
+    vary: Mapping[str, Values],
+    column: str,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    model: str = "auto",
+    tolerance: float = 0.05,
+    h: float | None = None,
+    solver: str = "auto",
+    folder: str | Path | None = None,
+    scheduler: str = "threads",
+    workers: int | None = None,
+    progress: Progress | bool | None = None,
+) -> best.Best:
+    """Find the value of one key at which a column of the sweep's table is largest.
+
+    Parameters
+    ----------
+    scene : Scene
+    vary : one key and three or more of its numbers, as for `sweep`
+    column : of the table, such as "level_db[0]"; without an index, the largest over the probes
+    samples : int, of the spreads of the scene, for the interval; 199 if not given
+    seed, model, tolerance, h, solver, folder, scheduler, workers, progress : as for `sweep`
+
+    Returns
+    -------
+    Best, whose `interval` holds the best values of 95 % of the samples
+
+    Raises
+    ------
+    ValueError
+        If several keys vary, their values are not numbers, there is no such column of numbers, or
+        as `sweep` does.
+    """
+    variations = [_variation(key, values) for key, values in vary.items()]
+    table = tomllib.loads(dumps(scene))
+    cases = partial(cases_of, table, table)
+    best.check(variations, column, cases(combinations(variations)), samples)
+    options = runner.ModelOptions(model=model, tolerance=tolerance, h=h, solver=solver)
+    with _kept(folder) as kept, reported(progress) as report:
+        request = best.Request(
+            cases=cases, variation=variations[0], column=column, folder=kept,
+            model_options=options, samples=samples, seed=seed, scheduler=scheduler,
+            workers=workers,
+        )  # fmt: skip
+        return best.best_value(request, report)
 
 
 def _variation(key: str, values: Values) -> Variation:

@@ -23,7 +23,7 @@ from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolera
 from skinwave.planning.assessment import assessed
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene import Scene
-from skinwave.simulation import answered, check_options
+from skinwave.simulation import answered, check_options, compute
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.families import (
     Family,
@@ -45,12 +45,15 @@ LOST = Mesh(error="its worker was killed each time; give it more memory or large
 
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """Model, tolerance, element size h in metre and solver of every run."""
+    """Model, tolerance, element size h in metre and solver of every run, and whether the error of
+    runs without a mesh is estimated.
+    """
 
     model: str = "auto"
     tolerance: float = 0.05
     h: float | None = None
     solver: str = "auto"
+    is_assessed: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,7 +300,7 @@ class Batch:
 def _batches(
     runs: dict[str, DesignPoint], model_options: ModelOptions, meshes: dict[Solid, Mesh], count: int
 ) -> list[Batch]:
-    """Runs on one body follow each other; others are alone."""
+    """Runs on one body follow each other; others are alone, unless they are short."""
     groups: dict[Solid | None, list[str]] = {}
     for name, case in runs.items():
         groups.setdefault(_solid(case, model_options), []).append(name)
@@ -306,7 +309,7 @@ def _batches(
     return [
         Batch(runs={n: runs[n] for n in names[k : k + step]}, mesh=solid and meshes[solid])
         for solid, names in groups.items()
-        for step in [size if solid else 1]
+        for step in [size if solid or not model_options.is_assessed else 1]
         for k in range(0, len(names), step)
     ]
 
@@ -324,7 +327,9 @@ def _row(case: DesignPoint, model_options: ModelOptions, mesh: Mesh | None) -> d
     try:
         if mesh is None:
             model = model_of(case.scene, model_options.model)
-            response = answered(
+            has_mesh = named(model).default_size is not None
+            run = answered if model_options.is_assessed or has_mesh else compute
+            response = run(
                 case.scene,
                 model,
                 model_options.tolerance,

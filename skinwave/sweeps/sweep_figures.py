@@ -60,7 +60,7 @@ def finished(rows: Sequence[Row]) -> list[Row]:
 
 def value(row: Row, column: str) -> float:
     """An entry as a number: the largest of a list over the probes, `name[2]` that of one probe."""
-    name, probe = _at_probe(column)
+    name, probe = at_probe(column)
     cell = row.get(name)
     if isinstance(cell, list):
         if probe is not None:
@@ -193,7 +193,7 @@ def _joined(rows: Sequence[Row], x: str, by: str | None) -> bool:
 
 def axis_label(column: str) -> str:
     """Label of an axis: the quantity of a column and its unit."""
-    name, probe = _at_probe(column)
+    name, probe = at_probe(column)
     words = NAMES.get(name)
     if words is None:
         words = name.split(".", 1)[-1] if re.match(r"[a-z]+\.[a-z]", name) else name
@@ -218,7 +218,8 @@ def _with_unit(key: str, level: Any) -> str:
     return f"{name} {text} {_unit(key)}".strip()
 
 
-def _at_probe(column: str) -> tuple[str, int | None]:
+def at_probe(column: str) -> tuple[str, int | None]:
+    """Name of a column and, of one such as "peak_um[2]", the index of the probe."""
     found = re.fullmatch(r"(.+)\[(\d+)\]", column)
     return (found[1], int(found[2])) if found else (column, None)
 
@@ -226,7 +227,7 @@ def _at_probe(column: str) -> tuple[str, int | None]:
 def _check(rows: Sequence[Row], columns: Sequence[str]) -> None:
     known = list(dict.fromkeys(name for row in rows for name in row))
     for column in columns:
-        choose("column", _at_probe(column)[0], known)
+        choose("column", at_probe(column)[0], known)
     shown = columns[0]
     if not any(np.isfinite(value(row, shown)) for row in rows):
         raise ValueError(f"column '{shown}' has no finite number to draw; choose another")

@@ -122,10 +122,15 @@ def solve(scene: Scene, method: Method) -> Solution:
 
 def _is_proportional(scene: Scene, method: Method) -> bool:
     """Whether the vibration is in proportion to the pressure."""
-    model = named(method.model)
+    return method.mapped or is_linear(scene, method.model)
+
+
+def is_linear(scene: Scene, name: str) -> bool:
+    """Whether the vibration by a model is in proportion to the pressure."""
+    model = named(name)
     linear = (model.is_reduced or model.is_infinite or model.is_steady) and not model.is_nonlinear
     alone = not (scene.load.gravity or scene.load.support_motion)
-    return method.mapped or (scene.reading.is_plain and linear and alone)
+    return scene.reading.is_plain and linear and alone
 
 
 @lru_cache(maxsize=KEPT)

@@ -1,0 +1,290 @@
+"""Best value of a varied key: where a column of the sweep's table is largest, with the interval
+that the spreads of the scene leave.
+
+The best point of the grid and its neighbours give a parabola, and its vertex a further run. Each
+sample of the spreads has a best value of its own, found in the same way; the interval holds 95 %
+of them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model.choices import choose
+from skinwave.effort import Progress
+from skinwave.models.advice import takes
+from skinwave.models.flat_body import FLAT_BODY, HARMONIC
+from skinwave.numbers import significant
+from skinwave.scene import Scene
+from skinwave.spreads import PRESSURE, spreads_of
+from skinwave.sweeps import dataset
+from skinwave.sweeps.measures import columns
+from skinwave.sweeps.sweep import ModelOptions, model_of, sweep
+from skinwave.sweeps.sweep_figures import at_probe, value
+from skinwave.sweeps.variation import DesignPoint, Variation
+from skinwave.uncertainty.of_sweep import in_order
+from skinwave.uncertainty.sampling import samples as samples_of
+from skinwave.uncertainty.solutions import is_linear
+
+SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
+ENDS = (2.5, 97.5)  # percentiles between which the interval lies
+VERTICES = 2  # runs that refine a best value beyond the grid
+FOLDER = "samples"  # within that of the sweep: the sweep of the samples
+
+Combined = Sequence[Mapping[str, Any]]  # values by key, of each run
+Evaluate = Callable[[Combined], Floats]  # the column (n,) of runs (n,), nan where there is none
+
+
+@dataclass(frozen=True, kw_only=True)
+class Best:
+    """The `value` of a `key` at which a `column` is largest, and the column there, `result`; the
+    `limits` of the values that were tried; and the 95 % `interval` of the best values of `samples`
+    of the numbers that are `uncertain`, None if none is.
+    """
+
+    key: str
+    column: str
+    value: float
+    result: float
+    limits: tuple[float, float]
+    interval: tuple[float, float] | None = None
+    samples: int = 0
+    uncertain: tuple[str, ...] = ()
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether the best value is an end of the range, beyond which a better one may lie."""
+        return self.value in self.limits
+
+    @property
+    def words(self) -> str:
+        """The best value and its interval in one or two sentences."""
+        end = ", an end of the range," if self.is_at_end else ""
+        said = f"{self.key} = {significant(self.value)}{end} gives the largest {self.column}, "
+        said += significant(self.result)
+        if self.interval is None:
+            return f"{said}; there is no interval, because nothing in the scene is uncertain"
+        low, high = map(significant, self.interval)
+        said += f"; 95 % interval {low} to {high}, from {self.samples} samples of "
+        said += ", ".join(self.uncertain)
+        if set(self.interval) & set(self.limits):
+            said += ". The interval reaches an end of the range: widen the range"
+        return said
+
+    def __repr__(self) -> str:
+        return f"<Best: {self.words}>"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What a best value is asked of: the `cases` of combinations of values, the `variation`, the
+    `column`, the `folder` of the sweep, its `model_options`, how many `samples` of the spreads with
+    which `seed`, and the `scheduler`, `workers` and `command` of `sweep`.
+    """
+
+    cases: Callable[[Combined], list[DesignPoint]]
+    variation: Variation
+    column: str
+    folder: Path
+    model_options: ModelOptions
+    samples: int | None = None
+    seed: int = 0
+    scheduler: str = "processes"
+    workers: int | None = None
+    command: Mapping[str, Any] | None = None
+
+
+def check(
+    variations: Sequence[Variation],
+    column: str,
+    wanted: Sequence[DesignPoint],
+    samples: int | None = None,
+) -> None:
+    """Refuse, before any work, what has no best value.
+
+    Parameters
+    ----------
+    variations : of the sweep
+    column : of its table, such as "level_db[0]"
+    wanted : runs of its grid
+    samples : of the spreads, `SAMPLES` if not given
+
+    Raises
+    ------
+    ValueError
+        If several keys vary, their values are not three numbers or more, there is no such column
+        of numbers, or there are too few samples for an interval.
+    """
+    if samples is not None and samples < FEWEST:
+        raise ValueError(
+            f"{samples} samples are too few for a 95 % interval; give {FEWEST} or more"
+        )
+    if len(variations) != 1:
+        raise ValueError(
+            f"a best value is of one key, and {len(variations)} are varied; vary one and set the "
+            "others in the scene"
+        )
+    key, values = variations[0].key, set(variations[0].values)
+    numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
+    if len(numbers) < max(3, len(values)):
+        raise ValueError(
+            f"a best value of {key} needs at least three values, all numbers; give "
+            f"{key}=start:stop:n"
+        )
+    types, (name, probe) = columns(wanted), at_probe(column)
+    choose("column", name, list(types))
+    if types[name] == "text":
+        raise ValueError(f"column '{name}' holds words; choose one of numbers, such as level_db[0]")
+    probes = max(len(case.scene.probes) for case in wanted if case.scene)
+    if probe is not None and probe >= probes:
+        raise ValueError(
+            f"column '{column}' is of a probe that the scene does not have; take one of "
+            f"{name}[0] to {name}[{probes - 1}]"
+        )
+
+
+def best_value(request: Request, progress: Progress) -> Best:
+    """Best value of a request that `check` accepts; resumes an interrupted one.
+
+    Parameters
+    ----------
+    request : Request
+    progress : called with the name of the phase and the fraction done
+
+    Returns
+    -------
+    Best
+
+    Raises
+    ------
+    ValueError
+        If no run has the column, or too few samples have it.
+    """
+    n = request.samples or SAMPLES
+    key, grid = request.variation.key, request.variation.values
+    (best,), (result,) = optima(_evaluate(request, progress, "run"), key, grid, [{}])
+    if not np.isfinite(result):
+        raise ValueError(
+            f"column '{request.column}' has no finite number in this sweep; choose another"
+        )
+    found = Best(
+        key=key, column=request.column, value=float(best), result=float(result),
+        limits=(float(min(grid)), float(max(grid))),
+    )  # fmt: skip
+    case = next(case for case in request.cases([{key: x} for x in grid]) if case.scene)
+    assert case.scene
+    options = _of_samples(request.model_options, case.scene)
+    # Pressure moves no largest value of what is in proportion to it.
+    fixed = {key, PRESSURE} if is_linear(case.scene, options.model) else {key}
+    spreads = [each for each in spreads_of(case.before or case.scene) if each.key not in fixed]
+    if not spreads:
+        return found
+    names = tuple(each.key for each in spreads)
+    drawn = samples_of(spreads, n, request.seed).tolist()
+    settings = [dict(zip(names, row, strict=True)) for row in drawn]
+    own = replace(request, folder=request.folder / FOLDER, model_options=options)
+    values, results = optima(_evaluate(own, progress, "samples"), key, grid, settings)
+    values = values[np.isfinite(results)]
+    if len(values) < FEWEST:
+        raise ValueError(
+            f"only {len(values)} of {n} samples have a number in column '{request.column}'; narrow "
+            "their distributions or choose another column"
+        )
+    low, high = np.percentile(values, ENDS, method="weibull").tolist()
+    return replace(found, interval=(low, high), samples=len(values), uncertain=names)
+
+
+def optima(
+    evaluate: Evaluate, key: str, grid: Sequence[float], settings: Combined
+) -> tuple[Floats, Floats]:
+    """Best value of a key for each setting of other keys, refined beyond a grid.
+
+    Parameters
+    ----------
+    evaluate : values by key, of each run (m,) -> the column (m,), nan where there is none
+    key : the one that varies
+    grid : (g,) its values, three or more
+    settings : (n,) values of the other keys
+
+    Returns
+    -------
+    values (n,) of the key, and the column there (n,), -inf of a setting that has none
+    """
+    x = np.tile(np.unique(grid), (len(settings), 1))
+    y = _tried(evaluate, key, x, settings)
+    for _ in range(VERTICES):
+        vertices = np.array([[_vertex(*each)] for each in zip(x, y, strict=True)])
+        x = np.hstack([x, vertices])
+        y = np.hstack([y, _tried(evaluate, key, vertices, settings)])
+    y = np.where(np.isfinite(y), y, -np.inf)
+    best = y.argmax(axis=1)[:, None]
+    return np.take_along_axis(x, best, 1)[:, 0], np.take_along_axis(y, best, 1)[:, 0]
+
+
+def _tried(evaluate: Evaluate, key: str, values: Floats, settings: Combined) -> Floats:
+    """The column (n, g) at values (n, g) of the key, under n settings."""
+    # Runs of one value follow each other: they share the load, whose lines are cached.
+    runs = [
+        {**own, key: x} for at in values.T.tolist() for own, x in zip(settings, at, strict=True)
+    ]
+    return evaluate(runs).reshape(values.T.shape).T
+
+
+def _vertex(x: Floats, y: Floats) -> float:
+    """Vertex of the parabola through the best of some points and its neighbours; the best point if
+    there is none among them.
+    """
+    known = np.isfinite(y)
+    if not known.any():
+        return float(x[0])
+    x, first = np.unique(x[known], return_index=True)
+    y = y[known][first]
+    best = int(y.argmax())
+    k = min(max(best, 1), len(x) - 2)
+    if k < 1:  # fewer than three points
+        return float(x[best])
+    (a, b, c), slopes = x[k - 1 : k + 2], np.diff(y[k - 1 : k + 2]) / np.diff(x[k - 1 : k + 2])
+    if not slopes[1] < slopes[0]:
+        return float(x[best])
+    vertex = (a + b) / 2 + (c - a) / 2 * slopes[0] / (slopes[0] - slopes[1])
+    return float(np.clip(vertex, a, c))
+
+
+def _of_samples(asked: ModelOptions, scene: Scene) -> ModelOptions:
+    """Options of the samples: the steady state where the wavenumber integral from rest is asked
+    for, without an estimate of its error.
+    """
+    model = model_of(scene, asked.model)
+    if model == FLAT_BODY.name and takes(HARMONIC, scene):
+        model = HARMONIC.name
+    return replace(asked, model=model, is_assessed=False)
+
+
+def _evaluate(request: Request, progress: Progress, phase: str) -> Evaluate:
+    """The column of a request in runs of a sweep; their progress has the name of a phase."""
+
+    def report(step: str, fraction: float) -> None:
+        progress(phase if step == "run" else step, fraction)
+
+    def evaluate(combined: Combined) -> Floats:
+        wanted = request.cases(combined)
+        found = sweep(
+            wanted, request.folder, request.model_options, report, scheduler=request.scheduler,
+            workers=request.workers, command=request.command,
+        )  # fmt: skip
+        if found.interrupted:
+            raise KeyboardInterrupt
+        if found.missing:
+            raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
+        release = version("skinwave")
+        names = {case.name(release, request.model_options): case for case in wanted}
+        rows = dataset.read(request.folder, (at_probe(request.column)[0],))
+        ordered = in_order(rows, names, combined)
+        return np.array([value(row, request.column) for row in ordered])
+
+    return evaluate
