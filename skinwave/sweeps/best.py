@@ -3,7 +3,7 @@ that the spreads of the scene leave.
 
 The best point of the grid and its neighbours give a parabola, and its vertex a further run. Each
 sample of the spreads has a best value of its own, found in the same way; the interval holds 95 %
-of them.
+of them, and is wider by a tenth of a step of the grid at each end, to which they are found.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,6 +34,7 @@ from skinwave.uncertainty.solutions import is_linear
 SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
 ENDS = (2.5, 97.5)  # percentiles between which the interval lies
 VERTICES = 2  # runs that refine a best value beyond the grid
+RESOLUTION = 0.1  # of a step of the grid, to which a best value is then found
 FOLDER = "samples"  # within that of the sweep: the sweep of the samples
 
 Combined = Sequence[Mapping[str, Any]]  # values by key, of each run
@@ -68,7 +69,7 @@ class Best:
         said = f"{self.key} = {significant(self.value)}{end} gives the largest {self.column}, "
         said += significant(self.result)
         if self.interval is None:
-            return f"{said}; there is no interval, because nothing in the scene is uncertain"
+            return f"{said}; no interval, because no uncertain number of the scene moves it"
         low, high = map(significant, self.interval)
         said += f"; 95 % interval {low} to {high}, from {self.samples} samples of "
         said += ", ".join(self.uncertain)
@@ -176,18 +177,23 @@ def best_value(request: Request, progress: Progress) -> Best:
         key=key, column=request.column, value=float(best), result=float(result),
         limits=(float(min(grid)), float(max(grid))),
     )  # fmt: skip
-    case = next(case for case in request.cases([{key: x} for x in grid]) if case.scene)
-    assert case.scene
-    options = _of_samples(request.model_options, case.scene)
+    runs = [case for case in request.cases([{key: x} for x in grid]) if case.scene]
+    scenes = [case.scene for case in runs if case.scene]
+    asked = request.model_options.model
     # Pressure moves no largest value of what is in proportion to it.
-    fixed = {key, PRESSURE} if is_linear(case.scene, options.model) else {key}
-    spreads = [each for each in spreads_of(case.before or case.scene) if each.key not in fixed]
+    is_proportional = all(is_linear(scene, model_of(scene, asked)) for scene in scenes)
+    fixed = {key, PRESSURE} if is_proportional else {key}
+    uncertain = spreads_of(runs[0].before or scenes[0])
+    spreads = [each for each in uncertain if each.key not in fixed]
     if not spreads:
         return found
     names = tuple(each.key for each in spreads)
     drawn = samples_of(spreads, n, request.seed).tolist()
     settings = [dict(zip(names, row, strict=True)) for row in drawn]
-    own = replace(request, folder=request.folder / FOLDER, model_options=options)
+    own = replace(
+        request, folder=request.folder / FOLDER,
+        model_options=_of_samples(request.model_options, scenes),
+    )  # fmt: skip
     values, results = optima(_evaluate(own, progress, "samples"), key, grid, settings)
     values = values[np.isfinite(results)]
     if len(values) < FEWEST:
@@ -195,7 +201,9 @@ def best_value(request: Request, progress: Progress) -> Best:
             f"only {len(values)} of {n} samples have a number in column '{request.column}'; narrow "
             "their distributions or choose another column"
         )
-    low, high = np.percentile(values, ENDS, method="weibull").tolist()
+    low, high = np.percentile(values, ENDS, method="weibull")
+    margin = RESOLUTION * np.diff(np.unique(grid)).max()
+    low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
     return replace(found, interval=(low, high), samples=len(values), uncertain=names)
 
 
@@ -255,14 +263,15 @@ def _vertex(x: Floats, y: Floats) -> float:
     return float(np.clip(vertex, a, c))
 
 
-def _of_samples(asked: ModelOptions, scene: Scene) -> ModelOptions:
+def _of_samples(asked: ModelOptions, scenes: Sequence[Scene]) -> ModelOptions:
     """Options of the samples: the steady state where the wavenumber integral from rest is asked
     for, without an estimate of its error.
     """
-    model = model_of(scene, asked.model)
-    if model == FLAT_BODY.name and takes(HARMONIC, scene):
-        model = HARMONIC.name
-    return replace(asked, model=model, is_assessed=False)
+    has_steady = all(
+        model_of(scene, asked.model) == FLAT_BODY.name and takes(HARMONIC, scene)
+        for scene in scenes
+    )
+    return replace(asked, model=HARMONIC.name if has_steady else asked.model, is_assessed=False)
 
 
 def _evaluate(request: Request, progress: Progress, phase: str) -> Evaluate:
