@@ -88,6 +88,16 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
 def of_stretching(scene: Scene, response: Response, tolerance: float) -> tuple[str, ...]:
     """Warning of a linear model of a sheet that deflects by more than `LINEAR` thicknesses, or
     whose stretching changes its motion by more than the tolerance.
+
+    Parameters
+    ----------
+    scene : Scene
+    response : Response
+    tolerance : relative error that is asked for
+
+    Returns
+    -------
+    one sentence, or none
     """
     model = named(response.model)
     if model.is_nonlinear or not response.record.of_body:

@@ -21,8 +21,9 @@ from skinwave.studies.changes import Shown
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
 ABOUT_MAPS = (
     "Share of squared displacement and spread are of maps of 44 mm either way. A slab's is that of "
-    "a laterally infinite layer; of other bodies the first Tacton alone has a map. Strongest is the largest amplitude at any probe; a phase delay is known up to whole "
-    "periods and includes the phase of a body that is driven off resonance."
+    "a laterally infinite layer; of other bodies the first Tacton alone has a map. Strongest is "
+    "the largest amplitude at any probe; a phase delay is known up to whole periods and includes "
+    "the phase of a body that is driven off resonance."
 )
 SCALED = {MODULI: "moduli", LOSSES: "losses"}
 NAMED = 3  # lines that a sentence names
