@@ -353,11 +353,12 @@ def _scaled_law(law: Any, modulus: float, loss: float) -> Any:
     return ScaledLaw(law=law, modulus=modulus, loss=loss)
 
 
-def _tissue(young: float) -> Material:
-    """Soft tissue with the viscosity-to-modulus ratio of the palm."""
-    shear = young / (2 * (1 + 0.4999))
-    return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=2e-4 * shear)
+def _tissue(shear: float, loss: float = 2e-4) -> Material:
+    """Soft tissue of a shear modulus in Pa; `loss` in s is its viscosity over that modulus."""
+    return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=loss * shear)
 
+
+FOREARM_LOSS = 5e-4  # s
 
 PRESETS: Mapping[str, Material] = {
     # Effective homogeneous half-spaces: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
@@ -383,19 +384,20 @@ PRESETS: Mapping[str, Material] = {
         poisson=0.4999,
         law=FractionalKelvinVoigt(shear_modulus=25e3, exponent=0.33, time=0.3e-3),
     ),
-    # Layers of a hand. Moduli are those of fingertip models (Maeno, Kobayashi and Yamazaki 1998:
-    # Young's modulus 136, 80 and 34 kPa) and, for muscle, the middle of 5 to 30 kPa; published
-    # values spread over a factor of ten and more with method and strain. Losses as in the palm.
-    "epidermis": _tissue(young=136e3),
-    "dermis": _tissue(young=80e3),
-    "fat": _tissue(young=34e3),
-    "muscle": _tissue(young=15e3),
-    # Layers of a forearm, Young's modulus in waves of 4 to 10 kHz (epidermis with stratum corneum)
-    # and of 0.2 to 1 kHz: Feng et al., Acta Biomater 146:295 (2022). Indentation finds epidermis of
-    # 0.1 to 1 MPa, and dermis up to 6 MPa at large strain. Losses as in the palm.
-    "forearm-epidermis": _tissue(young=4e6),
-    "forearm-dermis": _tissue(young=40e3),
-    "forearm-hypodermis": _tissue(young=15e3),
+    # Layers of a palm, fitted to published waves within published ranges (bench/layered_skin.py has
+    # both). The epidermis is not fitted: 1 to 2 MPa (Young's modulus) in vitro, with and without
+    # stratum corneum (Geerligs et al., J Biomech 44:1176 (2011)).
+    "epidermis": _tissue(shear=500e3),
+    "dermis": _tissue(shear=70e3),
+    "fat": _tissue(shear=15e3),
+    "muscle": _tissue(shear=25e3),
+    # Layers of a forearm. Three have Young's moduli of waves of 4 to 10 kHz (epidermis with stratum
+    # corneum, 4 MPa) and of 0.2 to 1 kHz (40 and 15 kPa): Feng et al., Acta Biomater 146:295
+    # (2022). The muscle and all losses are fitted to the waves of Zhang et al. (2011).
+    "forearm-epidermis": _tissue(shear=1.33e6, loss=FOREARM_LOSS),
+    "forearm-dermis": _tissue(shear=13.3e3, loss=FOREARM_LOSS),
+    "forearm-hypodermis": _tissue(shear=5e3, loss=FOREARM_LOSS),
+    "forearm-muscle": _tissue(shear=10e3, loss=FOREARM_LOSS),
     # Compact bone, isotropic: human femora have shear moduli of 3.3 and Young's moduli of 17 GPa
     # along and 11.5 GPa across (Reilly and Burstein, J Biomech 8:393 (1975), doi
     # 10.1016/0021-9290(75)90075-5); ten times the modulus moves a fingertip by 2 %

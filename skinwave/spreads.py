@@ -23,8 +23,8 @@ measured one).
     (Potts et al. 1983; Manfredi et al. 2012; Zhang et al. 2011): 3 either way at most.
 [3] Zhang et al., Med Eng Phys 33:31 (2011): 7.86 +- 1.86 kPa and 5.03 +- 0.60 Pa s, whose ratio,
     the loss, has 27 % if the two errors are independent.
-[4] Fingertip models, indentation, optical and elastographic values differ by a factor of ten and
-    more with method and strain (see `simple_model.material.PRESETS`): the root of ten either way.
+[4] Published moduli of a layer differ by a factor of 6 to 18 between methods and people, and
+    waves on hands by 1.8 in speed, 3.2 in its square, from fitted layers (bench/layered_skin.py).
 [5] Office paper: 5 to 8 GPa along and 2 to 4 GPa across the machine direction, about the 4 GPa of
     "paper" and, each, the 5.5 and 2.5 GPa of "paper-grain"; loss factor 0.02 to 0.05.
 
@@ -57,13 +57,14 @@ class MaterialSpread:
 
 _PALM = MaterialSpread(moduli=known_to(2.0), losses=known_to(3.0))
 _LAYER = MaterialSpread(moduli=known_to(3.2), losses=known_to(3.0))
+_FOREARM = ("forearm-epidermis", "forearm-dermis", "forearm-hypodermis", "forearm-muscle")
 OF_PRESETS: Mapping[str, MaterialSpread] = {
     **dict.fromkeys(("palm", "palm-stiff", "palm-zener"), _PALM),
     "forearm": MaterialSpread(
         moduli=Distribution(width=(1.86 / 7.86,)), losses=Distribution(width=(0.27,))
     ),
     **dict.fromkeys(("epidermis", "dermis", "fat", "muscle"), _LAYER),
-    **dict.fromkeys(("forearm-epidermis", "forearm-dermis", "forearm-hypodermis"), _LAYER),
+    **dict.fromkeys(_FOREARM, _LAYER),
     "paper": MaterialSpread(moduli=known_to(2.0), losses=known_to(1.6)),
     "paper-grain": MaterialSpread(moduli=known_to(1.6), losses=known_to(1.6)),
 }

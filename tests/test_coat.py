@@ -376,7 +376,7 @@ def test_as_few_layers_as_need_be_are_a_coat():
     ("layers", "reason"),
     [
         ((Layer(thickness=3e-3, material="fat"), EPIDERMIS), "3.3 mm, too thick for a coat"),
-        ((Layer(thickness=0.8e-3, material="muscle"),), "at most 0.56 mm, a tenth of a shear"),
+        ((Layer(thickness=0.8e-3, material="forearm-hypodermis"),), "at most 0.56 mm, a tenth of"),
     ],
 )
 def test_thin_layers_that_are_no_coat_are_refused_with_the_reason(layers, reason):

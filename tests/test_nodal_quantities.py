@@ -81,7 +81,7 @@ def test_files_for_other_programs_have_the_tensors_of_a_view_from_a_file(view, t
 
 
 def test_between_two_materials_strain_jumps_and_traction_does_not():
-    layers = (Layer(thickness=3e-3, material="epidermis"),)
+    layers = (Layer(thickness=3e-3, material="palm-stiff"),)
     scene = replace(SCENE, body=replace(SCENE.body, layers=layers))
     seen = views.body_view(scene, "slab", motion.waves(scene, h=COARSE), (0.01, 2))
     kept = views.with_tensors(seen).tensors

@@ -224,7 +224,7 @@ def test_a_layer_has_its_own_strain_and_the_traction_of_its_neighbour():
     above, below = (read("stress_zz", [z, z]) for z in (1 - 1e-6, 1 + 1e-6))
     np.testing.assert_allclose(above, below, rtol=1e-4)
     stiff, soft = (read("strain_xz", [z, z]) for z in (1 - 1e-6, 1 + 1e-6))
-    assert 0.2 < np.abs(stiff).max() / np.abs(soft).max() < 0.8  # moduli of 45 and 25 kPa, and 35
+    assert 0.04 < np.abs(stiff).max() / np.abs(soft).max() < 0.08  # 25 to 35 kPa over 500 kPa
 
 
 def test_silicone_is_no_skin_but_layers_of_skin_and_own_materials_are():

@@ -189,7 +189,7 @@ def test_a_page_says_how_a_body_lies_and_what_lies_above():
 def test_a_page_lists_layers_from_the_surface_down():
     words = above(BODIES["palm-layers"])
     assert words == (
-        "; on it, from the surface down: 0.27 mm of epidermis, 1 mm of dermis, 4 mm of fat"
+        "; on it, from the surface down: 0.27 mm of epidermis, 1 mm of dermis, 2 mm of fat"
     )
 
 

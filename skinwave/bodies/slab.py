@@ -127,21 +127,21 @@ def cell_layers(body: Body, h: float) -> int:
     return len(_depth_line(body, h)) - 1
 
 
-# Skin in layers on bone. Epidermis of a palm 265 +- 51 um (optical coherence tomography,
-# PMC11137746), all skin 0.8 to 1.4 mm, hypodermis 2 to 6 mm; moduli of fingertip models, which vary
-# tenfold and more between methods.
+# Skin in layers on bone, fitted to published waves (bench/layered_skin.py has the ranges of each
+# number). Epidermis of a palm 265 +- 51 um (optical coherence tomography, PMC11137746), all skin
+# 0.8 to 1.4 mm, hypodermis 2 to 6 mm; the depth of the bone is assumed within 10 to 25 mm.
 PALM_LAYERS = (
     Layer(thickness=0.27e-3, material="epidermis"),
     Layer(thickness=1.0e-3, material="dermis"),
-    Layer(thickness=4.0e-3, material="fat"),
+    Layer(thickness=2.0e-3, material="fat"),
 )
 # Epidermis with stratum corneum of a forearm 75 +- 13 um (Sandby-Moller et al., Acta Derm Venereol
-# 83:410 (2003)); moduli of Feng et al. (2022). Dermis of 1 to 1.5 mm, hypodermis of 2 to 10 mm and
-# muscle of 10 to 20 mm differ between people, and are assumed.
+# 83:410 (2003)). Dermis of 1 to 1.5 mm, hypodermis of 2 to 10 mm and muscle of 10 to 20 mm differ
+# between people, and are assumed.
 FOREARM_LAYERS = (
     Layer(thickness=0.075e-3, material="forearm-epidermis"),
     Layer(thickness=1.2e-3, material="forearm-dermis"),
-    Layer(thickness=5.0e-3, material="forearm-hypodermis"),
+    Layer(thickness=4.0e-3, material="forearm-hypodermis"),
 )
 
 SLAB = register(
@@ -149,8 +149,12 @@ SLAB = register(
         name="slab",
         presets={
             "skin-slab": {},  # effective homogeneous soft tissue of the palm on bone
-            "palm-layers": {"material": "muscle", "layers": PALM_LAYERS},
-            "forearm-layers": {"material": "muscle", "layers": FOREARM_LAYERS, "depth": 0.020},
+            "palm-layers": {"material": "muscle", "layers": PALM_LAYERS, "depth": 0.025},
+            "forearm-layers": {
+                "material": "forearm-muscle",
+                "layers": FOREARM_LAYERS,
+                "depth": 0.020,
+            },
         },
         discretise=discretise,
         morph=morph,

@@ -16,7 +16,15 @@ from skinwave.validate import figures, modulation, zigzag
 from skinwave.validate.compared import ABOVE, BELOW, COLUMNS, WITHIN, Compared, csv_row, tallies
 from skinwave.validate.finger import Decay
 from skinwave.validate.modulation import Harmonics
-from skinwave.validate.published import LENGTH, NOT_COMPARED, OPTIMUM, SPEED, Published, all_sources
+from skinwave.validate.published import (
+    ALL,
+    LENGTH,
+    NOT_COMPARED,
+    OPTIMUM,
+    SPEED,
+    Published,
+    all_sources,
+)
 from skinwave.validate.validation import Validation, headline, particulars
 from skinwave.validate.waves import BODIES, WORDS
 
@@ -24,14 +32,15 @@ TITLE = "Models beside published measurements"
 SCOPE = (
     "Verification asks whether the equations are solved right; this page asks whether they are the "
     "right ones, as far as published numbers tell. The preset forearm was made from Zhang's "
-    "constants, palm and palm-stiff were chosen for optimum speeds of 5 and 7 m/s: the tables say "
-    "where, and there agreement is no evidence; skin-slab and the hand have the material palm. "
-    "Otherwise nothing was fitted to a number on this page. A factor is ours over the published "
-    "value, or over the nearer end of its spread."
+    "constants. palm and palm-stiff were chosen for optimum speeds of 5 and 7 m/s. palm-layers was "
+    "fitted to the waves of Potts, Manfredi and SkinSource, forearm-layers to Zhang's. The tables "
+    "mark these; there agreement is no evidence. skin-slab and the hand have the material palm. "
+    "All other values are predictions. A factor is ours over the published value, or over the "
+    "nearer end of its spread."
 )
 FACTORS = (
     "Each point is a preset at a frequency; grey: within 5 %, what can be read off a curve. "
-    "Hollow: the preset was made from that source. "
+    "Hollow: the preset was fitted to that source; filled: it predicts it. "
     f"Factors beyond {figures.FURTHEST:g} are drawn there."
 )
 WAVES = (
@@ -93,7 +102,7 @@ def write(folder: Path, found: Validation) -> None:
         document.section("Sources", document.table(*_sources(found.rows))),
         document.section("Published, and not compared",
                          document.table(("source", "what", "why not"), NOT_COMPARED)),
-        document.section("Presets", document.table(("name", "what it is"), WORDS.items())),
+        document.section("Presets", document.table(*_presets(found.rows))),
     ]  # fmt: skip
     (folder / "index.html").write_text(document.page(TITLE, *parts), encoding="utf-8")
 
@@ -139,7 +148,8 @@ def _wave_tables(rows: Iterable[Compared]) -> Iterator[str]:
         table = [[f"{f:g}", *_line([row for row in own if row.frequency == f], names)] for f in at]
         yield document.table(("frequency, Hz", "published", *names), table)
     yield document.paragraph(
-        "In brackets the factor of a miss. * The preset was made from this source, or chosen by it."
+        "In brackets the factor of a miss. * The preset was fitted to this source, or chosen by "
+        "it; without the mark, it predicts the source."
     )
 
 
@@ -242,11 +252,28 @@ def _shortest(hand: Decay) -> str:
 
 
 def _summary(rows: Iterable[Compared]) -> tuple[tuple[str, ...], list[list[str]]]:
-    header = ("set", "preset", "outcome", "made from it")
+    header = ("set", "preset", "outcome", "fitted to it or predicts it")
     return header, [
-        [t.rows[0].published.name, t.rows[0].body, t.words, "yes" if t.rows[0].is_built else ""]
+        [t.rows[0].published.name, t.rows[0].body, t.words,
+         "fitted" if t.rows[0].is_built else "predicts"]
         for t in tallies(rows)
-    ]
+    ]  # fmt: skip
+
+
+def _presets(rows: Iterable[Compared]) -> tuple[tuple[str, ...], list[list[str]]]:
+    """Presets with the sources that each was fitted to, and those that it predicts."""
+    sources: dict[tuple[str, bool], dict[str, None]] = {}
+    for row in rows:
+        if not row.published.name.startswith(ALL):
+            known = sources.setdefault((row.body, row.is_built), {})
+            known[row.published.name.split(":")[0]] = None
+
+    def names(preset: str, is_built: bool) -> str:
+        return ", ".join(sources.get((preset, is_built), {})) or "none"
+
+    header = ("name", "what it is", "fitted to", "predicts")
+    return header, [[name, words, names(name, True), names(name, False)]
+                    for name, words in WORDS.items()]  # fmt: skip
 
 
 def _sources(rows: Iterable[Compared]) -> tuple[tuple[str, ...], list[list[str]]]:

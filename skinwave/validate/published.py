@@ -1,8 +1,8 @@
 """Published values that models are compared with: each set with its conditions, spread and source.
 
 Numbers are facts of the sources named. `how` says whether one was read in the source or where it is
-quoted, in its abstract only, or computed from what the source gives. None was used to choose a
-preset but where `built` says so: there agreement is no evidence.
+quoted, in its abstract only, or computed from what the source gives. `built` names the presets that
+were fitted to a source or chosen by it: there agreement is no evidence. All others predict it.
 """
 
 from collections.abc import Callable
@@ -120,19 +120,20 @@ _POTTS = Published(
     name="Potts: speed", site="back of the hand", quantity=SPEED, frequencies=_GRID,
     values=(6, 8, 9, 9, 10, 11, 11, 8), conditions="shear wave in vivo",
     source=f"Potts et al. (1983-84), {_DIGITISED}", how=QUOTED,
-    bodies=(*_ARMS, "palm", "palm-layers"), remark=_BACK,
+    bodies=(*_ARMS, "palm", "palm-layers"), built=("palm-layers",), remark=_BACK,
 )  # fmt: skip
 _FINGER = Published(
     name="Manfredi: speed, digitised", site="finger", quantity=SPEED, frequencies=_GRID,
     values=(18, 18, 10, 7.5, 5, 6, 7.5, 8), conditions="waves along the finger",
-    source=f"{MANFREDI}, {_DIGITISED}", how=QUOTED, bodies=_HANDS,
+    source=f"{MANFREDI}, {_DIGITISED}", how=QUOTED, bodies=_HANDS, built=("palm-layers",),
     remark="Contradicts the abstract of the same paper, by which the speed rises with frequency to "
     "a plateau of 7 m/s",
 )  # fmt: skip
 _PLATEAU = Published(
     name="Manfredi: speed, abstract", site="finger", quantity=SPEED, frequencies=(300.0,),
     values=(7,), conditions="plateau of the speed; at 300 Hz, as the abstract names no frequency",
-    source=MANFREDI, how=ABSTRACT, bodies=_HANDS, built=("palm-stiff",),
+    source=MANFREDI, how=ABSTRACT, bodies=_HANDS,
+    built=("palm-stiff", "palm-layers"),
     remark="Contradicts the values digitised from the same paper, which fall from 18 to 5 m/s",
 )  # fmt: skip
 _MODULUS, _VISCOSITY = (7.86e3, 1.86e3), (5.03, 0.60)  # Pa, Pa s, mean and standard deviation
@@ -140,7 +141,8 @@ _VOIGT_AT = (100.0, 200.0, 300.0, 400.0)
 _ZHANG = Published(
     name="Zhang: speed", site="forearm", quantity=SPEED, frequencies=(200.0,), values=(3.25,),
     lows=(3.06,), highs=(3.44,), conditions="surface wave in vivo, mean +- standard deviation",
-    source=ZHANG, how=ABSTRACT, bodies=_ARMS, built=("forearm",),
+    source=ZHANG, how=ABSTRACT, bodies=_ARMS,
+    built=("forearm", "forearm-layers"),
 )  # fmt: skip
 _ATTENUATION = (0.047, 0.050, 0.056, 0.062, 0.073, 0.082)  # 1/mm
 _ZHANG_DIGITISED = Published(
@@ -171,7 +173,7 @@ SKINSOURCE = Published(
     conditions="normal acceleration along the dorsal line away from the tip of digit III, force of "
     "a shaker there; four people",
     source="Tummala et al. (2024), doi 10.1109/HAPTICS59260.2024.10520852, data by doi "
-    "10.5281/zenodo.10547601", how=COMPUTED, bodies=_HANDS,
+    "10.5281/zenodo.10547601", how=COMPUTED, bodies=_HANDS, built=("palm-layers",),
     remark="Below 200 Hz the amplitude is not monotone, the finger moves as a linkage; our bodies "
     "have no joints and no dorsal side, and their length is that of a plane wave",
 )  # fmt: skip
@@ -255,8 +257,8 @@ def all_sources(quantity: Quantity) -> Published:
         conditions="lowest to highest of the sources here, where two or more have the frequency",
         source="the sets of this page", how=COMPUTED,
         bodies=("forearm", "palm", "palm-stiff", "skin-slab", "palm-layers", "forearm-layers"),
-        remark="Sites and methods differ, so that this is wider than people are at one site; the "
-        "two speeds that forearm and palm-stiff were made from are among them",
+        remark="Sites and methods differ, so that this is wider than people are at one site; sets "
+        "that presets were fitted to are among them",
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from simple_model.dispersion import Mode
 from simple_model.focus import NOMINAL_HEIGHT, lobe_width, spot_width
@@ -36,8 +36,10 @@ WORDS: Mapping[str, str] = {
     "palm": "half-space, Kelvin-Voigt, chosen for an optimum speed of the focus of 5 m/s",
     "palm-stiff": "half-space, Kelvin-Voigt, chosen for an optimum speed of 7 m/s",
     "skin-slab": "15 mm of palm on rigid bone",
-    "palm-layers": "epidermis, dermis, fat, muscle on rigid bone, 15 mm; moduli of fingertips",
-    "forearm-layers": "epidermis, dermis, hypodermis and muscle on rigid bone, 20 mm",
+    "palm-layers": "epidermis, dermis, fat and muscle on rigid bone, 25 mm, fitted within "
+    "published ranges",
+    "forearm-layers": "epidermis, dermis, hypodermis and muscle on rigid bone, 20 mm; upper layers "
+    "of Feng's moduli, the rest fitted within published ranges",
 }
 GRID = np.arange(10.0, 701.0, 10.0)  # Hz: fine enough for modes to be tracked
 AT_REST = 1e-3  # Hz, in place of 0, where a half-space without loss has its static speed
@@ -61,19 +63,20 @@ class Curves:
         return np.interp(frequencies, self.frequencies, values, left=np.nan, right=np.nan)
 
 
-def leading_wave(body: Body) -> Curves:
+def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
     """Wave that moves the surface most at the edge of the focal spot's main lobe.
 
     Parameters
     ----------
     body : Body, a slab or half-space
+    grid : (f,) float, Hz, frequencies above 0 and ascending; `GRID` if None
 
     Returns
     -------
     Curves, from rest if it is a half-space: a layer on bone has no wave there
     """
     at_rest = [AT_REST] if body.depth == inf else []
-    f = np.array([*at_rest, *GRID])
+    f = np.array([*at_rest, *np.asarray(GRID if grid is None else grid)])
     modes = dispersion(body, f, 6).modes
     led = np.array([_amplitude(mode) for mode in modes])
     if len(modes) == 1:  # Rayleigh's wave is one however strongly it decays
