@@ -88,14 +88,14 @@ def test_layers_are_moved_one_by_one(session):
         moves.own_layer(session, 1, "modulus", "40")
     with session.state:
         moves.own_layer(session, 0, "thickness", "0,5")
-    assert session.state.layers.startswith("0.5/45.3")
+    assert session.state.layers.startswith("0.5/500")
     assert session.state.body_layers[1]["modulus"] == "40"
     assert session.scene.body.layers[1].material.shear_modulus == pytest.approx(40e3)
     again, refused = from_query(to_query(session.values), own=True)
     assert (again["layers"], refused) == (session.state.layers, ())
     with session.state:
         moves.own_layer(session, 0, "thickness", "thick")
-    assert "'thick/45.3" in session.state.errors["layers"]
+    assert "'thick/500" in session.state.errors["layers"]
     with session.state:
         moves.undo(session)
         moves.undo(session)
