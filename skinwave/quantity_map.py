@@ -19,12 +19,15 @@ from simple_model.load_spectrum import synthesise
 from simple_model.quantities import Quantity
 from skinwave.bodies.sizes import default_size
 from skinwave.effort import Progress
+from skinwave.models.advice import takes
 from skinwave.models.flat_body import field_read
 from skinwave.models.loads import line_factor, probe_rows
+from skinwave.models.plate_modes import ERROR as PLATE_ERROR
+from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.reduction import read_at
 from skinwave.pictures.motion import TOLERANCE, DrivenBody, driven
 from skinwave.scene import Reading, Scene
-from skinwave.surface import FAINT, Lines, grid, has_wavenumber_integral
+from skinwave.surface import FAINT, Lines, body_map, grid, has_wavenumber_integral
 
 COARSER, ORDER = 1.5, 2  # element size of a second map, and its order: Richardson extrapolation
 # Times at which an invariant is looked at, in steps of s that are no multiple of any period. Its
@@ -93,6 +96,11 @@ def quantity_map(
             x=x, y=y, rms=_flat_rms(scene, depth, places), asked=asked, depth=depth,
             note="wavenumber integral of the laterally infinite body",
         )  # fmt: skip
+    if h is None and scene.reading.is_plain and takes(FROM_REST, scene):
+        found = body_map(scene, x, y)
+        return QuantityMap(
+            x=x, y=y, rms=found.rms, asked=asked, depth=depth, note=found.note, error=PLATE_ERROR
+        )
     if scene.load.support_motion or (scene.load.gravity and asked.invariant):
         raise ValueError(
             "a map is of motion about the rest without gravity, on a support at rest; leave "

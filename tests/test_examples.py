@@ -11,14 +11,14 @@ from skinwave.cli import main
 from skinwave.pictures.motion import waves
 from skinwave.pictures.renderer import Renderer
 from skinwave.scene_file import read
-from skinwave.simulation import compute
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.toml"))
-MESHED = {"layered-skin", "palm", "paper-sheet"}  # for which no wavenumber integral stands
+MESHED = {"layered-skin", "palm"}  # for which no wavenumber integral stands
 DRAWN = {"palm", "speed-on-forearm"}  # with all pictures of a report, but for films
 SIZE = {path.stem: ["--h", "12"] for path in EXAMPLES}  # numbers of one mesh agree, coarse or not
 SIZE["square-on-silicone"] = ["--h", "20"]  # whose path is long
 SIZE["speed-on-forearm"] = []  # a half-space, which has no mesh
+SIZE["paper-sheet"] = []  # by the modes of a plate
 REDUCED = 0.05  # relative error of the reduced-order model of a whole body
 
 
@@ -44,8 +44,6 @@ def test_every_command_takes_an_example_and_they_agree(path, tmp_path, monkeypat
     if compared.model == "fem":  # of the report another reduced-order model, of the whole body
         a, b = (tones(each, scene) for each in (compared, reported))
         np.testing.assert_allclose(b, a, atol=REDUCED * a.max())
-    if path.stem == "paper-sheet":  # which rings all along
-        run = reported = compute(scene, "fem-harmonic", h=0.012)
     check_map(Path("map"), run)
     check_map(next(Path("report").glob("*/map.npz")).parent, reported)
 

@@ -19,7 +19,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.karman_motion import linear_motion, stretched_motion
 from simple_model.plate_modes import PlateModes
-from simple_model.response import SETTLE, step
+from simple_model.response import step
 from simple_model.von_karman import KarmanPlate, karman_plate
 from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, register
@@ -89,7 +89,7 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
 
 
 def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
-    """Motion of a whole sheet about its mean, after the first part of the scene.
+    """Motion of a whole sheet about its mean, in the later half of a scene.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]
     request = Request(times=times, tolerance=tolerance, report=silent)
     modes: PlateModes = modes_of(plate_of(scene.body))
     count, parts, _ = _resolved(scene, request, modes, FROM_REST.solve(scene, request).values)
-    kept = slice(int(SETTLE * len(times)), None)
+    kept = slice(len(times) // 2, None)
     middle = scene.body.placement.offset
     z = linear_motion(modes, scene.pressure, scene.body.solid, times[kept], middle=middle)
     plate, added = _moved(scene, times, modes, count, parts)

@@ -39,6 +39,7 @@ WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlarge
 LETTER, GAP = 0.45, 0.3  # of a line's name, and between two, over the size of its letters
 LAID_OUT = 1.2  # width of a panel with the margins of a figure, over that before
 IN_A_ROW = 3  # entries of a legend, at most
+LETTER, HANDLE = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
 FLOOR = -80.0  # dB
 HIGHEST = 650.0  # Hz shown
 SETTLE = 0.25  # of the response, before which it is not looked at
@@ -90,16 +91,16 @@ def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     axes[0, 1].set_title(said[1], fontsize="medium")
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
-    _legend(figure, runs, scales=True)
+    rows = _legend(figure, runs, scales=True)
     # Fixed margins: a computed layout takes twice as long.
     inch = style.zoom / figure.get_figheight()
     if narrow:
         for ax in axes[:, 1]:
             ax.set_yticks(np.arange(FLOOR, 1, 40))
-        top = 0.75 + 0.2 * len(figure.legends[0].get_texts())
+        top = 0.75 + 0.2 * rows
         figure.subplots_adjust(0.2, 0.55 * inch, 0.97, 1 - top * inch, wspace=0.32, hspace=0.13)
         return figure
-    top = 0.8 + 0.2 * (len(runs) > IN_A_ROW)
+    top = 0.6 + 0.2 * rows
     figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
     return figure
 
@@ -121,9 +122,9 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     axes[0, 0].set_ylabel(f"motion at {where:g} mm\n/ largest of the model")
     axes[1, 0].set_ylabel(f"spectrum at {where:g} mm,\ndB re largest line of the model")
     axes[2, 0].set_ylabel("RMS motion,\ndB re strongest probe")
-    _legend(figure, next(iter(columns.values())), scales=False)
+    rows = _legend(figure, next(iter(columns.values())), scales=False)
     # Fixed margins here, too, in inches.
-    above = 0.35 + 0.25 * (len(figure.legends[0].get_texts()) > IN_A_ROW)
+    above = 0.1 + 0.25 * rows
     figure.subplots_adjust(
         0.85 / width, 0.55 / height, 1 - 0.1 / width, 1 - (above + 0.3) / height,
         wspace=0.06, hspace=0.24,
@@ -170,8 +171,10 @@ def measured(value: float, asked: Quantity, digits: int = 3) -> str:
     return f"{significant(asked.per_unit * value, digits)} {asked.shown}"
 
 
-def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
-    """One entry a model, with what 1 on the waveform axis stands for if that is one number."""
+def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
+    """One entry a model, with what 1 on the waveform axis stands for if that is one number; the
+    number of rows.
+    """
     handles, labels = [], []
     for run in runs:
         style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
@@ -185,8 +188,10 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> None:
         labels.append(f"open: {', '.join(kinds)}")
     where: Any = "outside upper center" if figure.get_layout_engine() else "upper center"
     ncols = len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2)
-    ncols = 1 if figure.get_figwidth() < NARROW else ncols
+    room = figure.get_figwidth() / (LETTER * max(map(len, labels)) + HANDLE)
+    ncols = 1 if figure.get_figwidth() < NARROW else max(1, min(ncols, int(room)))
     figure.legend(handles, labels, loc=where, ncols=ncols, frameon=False)
+    return -(-len(labels) // ncols)
 
 
 def _shown(run: Run, runs: list[Run]) -> slice:

@@ -11,6 +11,7 @@ from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 LABELS = {
     **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": "paper sheet",
+    "paper-sheet-loose": "loose sheet",
     "skin-slab": "skin slab",
 }
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.

@@ -296,7 +296,7 @@ def _surface_view(
 def plate_view(run: Run, part: tuple[float, int]) -> View:
     """The view of a sheet by the modes of a thin plate; `part` as `kernel_view` takes it.
 
-    A sheet at large deflection is shown as it moves after the first part of the scene.
+    A sheet at large deflection is shown as it moves in the later half of the scene.
     """
     scene, body = run.scene, run.scene.body
     middle, reach = body.placement.offset, np.array([body.width, body.height]) / 2

@@ -27,7 +27,6 @@ LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be 
 # four edges, two or in clips, with tension and without; 7 with a tenth of their loss.
 STEEPEST = 7.0
 NEGLIGIBLE = 0.1  # of the tolerance, of an error that is bounded rather than measured
-MOST = 1.0  # relative error that says nothing more
 
 
 def deflection(scene: Scene) -> float:
@@ -84,15 +83,15 @@ def stretching_left_out(scene: Scene, model: Model, tolerance: float) -> float:
 
     Returns
     -------
-    float, at most 1; 0 of a nonlinear model, and of other bodies
+    float; 0 of a nonlinear model, and of other bodies
     """
     if model.is_nonlinear or not model.needs_body:
         return 0.0
     bound = STEEPEST * deflection(scene) ** 2
     plain = _plain(scene)
     if bound > NEGLIGIBLE * tolerance and takes(STRETCHED, plain):
-        return min(MOST, _measured(plain))
-    return min(MOST, bound)
+        return _measured(plain)
+    return min(1.0, bound)
 
 
 def beyond_linear(scene: Scene, tolerance: float) -> bool:

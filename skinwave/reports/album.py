@@ -49,7 +49,7 @@ from skinwave.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.scene_file import dumps, read
 from skinwave.simulation import compute, follow, has_elements, required_plan
 from skinwave.studies import description, paper15
-from skinwave.surface import SurfaceMap, body_map, element_map, grid
+from skinwave.surface import SurfaceMap, body_map, element_map, grid, has_wavenumber_integral
 from skinwave.verify.suite import suite
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
@@ -157,8 +157,8 @@ def keep_view(view: View, folder: Path) -> None:
         save_map(folder / "map.npz", map_of_motion(scene, view.moved.driven))
     elif scene.reading.is_plain and view.unit == "m":
         x, y = grid(scene)
-        moved = view.moved and view.moved.driven
-        found = element_map(scene, moved, x, y) if moved else body_map(scene, x, y)
+        moved = None if has_wavenumber_integral(scene) else view.moved
+        found = element_map(scene, moved.driven, x, y) if moved else body_map(scene, x, y)
         surface.save(folder / "map.npz", found)
 
 
