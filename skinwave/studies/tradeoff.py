@@ -1,5 +1,5 @@
 """Work-precision study of one scene: every model over its discretisation parameters, against the
-finest fem run.
+finest fem run or, of a sheet that stretches, the finest run of `plate-modes-nonlinear`.
 """
 
 import json
@@ -18,23 +18,31 @@ from skinwave.bodies.sizes import default_size
 from skinwave.comparison import compare
 from skinwave.effort import Progress, peak_memory
 from skinwave.models import named, names
+from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.linear_elements import FEM
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import MODES as PLATES
 from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare
+from skinwave.models.stretched_plate import STRETCHED
 from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
+from skinwave.planning.stretching import beyond_linear
 from skinwave.processes import apart
 from skinwave.scene import Scene, check_load
 from skinwave.simulation import compute
 
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.6, 0.5)  # of the two runs whose difference decides whether the reference is accepted
+TOLERANCES, FINEST_STEPS = (0.3, 0.05, 0.02), (0.01, 0.003)  # the same of plates that stretch
 BARS = (0.01, 0.05, 0.20)
+PLANNED = 0.05  # tolerance of a candidate that has none
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """Model and its discretisation: element size in metre, reduction tolerance, time step in s, and
-    whether the body is taken as a half-space.
+    """Model and its discretisation: element size in metre, tolerance of its reduction or its steps
+    and modes, time step in s, and whether the body is taken as a half-space.
     """
 
     model: str
@@ -48,7 +56,7 @@ class Candidate:
         """Name in tables."""
         discretisation = ["half-space"] if self.half_space else []
         discretisation += [f"h = {1e3 * self.h:.2f} mm"] if self.h else []
-        discretisation += [f"reduced to {self.tolerance:g}"] if self.tolerance else []
+        discretisation += [f"tolerance {self.tolerance:g}"] if self.tolerance else []
         discretisation += [f"dt = {1e3 * self.dt:g} ms"] if self.dt else []
         return ", ".join([self.model, *discretisation])
 
@@ -112,6 +120,11 @@ def candidates(scene: Scene) -> list[Candidate]:
         found += [Candidate(model=f"flat-body{how}") for how in ("-harmonic", "")]
         if isfinite(scene.body.depth):
             found.append(Candidate(model="flat-body", half_space=True))
+    if takes(STRETCHED, scene):
+        plates = (PLATES.name, FROM_REST.name)
+        found += [Candidate(model=name) for name in plates]
+        found += [Candidate(model=STRETCHED.name, tolerance=t) for t in TOLERANCES]
+        return found + [Candidate(model="fem", h=size) for size in sizes[:2] if takes(FEM, scene)]
     found += [Candidate(model="fem", h=size) for size in sizes]
     found += [Candidate(model="fem", h=sizes[2], tolerance=t) for t in (0.3, 0.03)]
     if scene.body.air:
@@ -134,6 +147,8 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
         raise ValueError("a scene without a body has one model only; give it a sheet or a slab")
     todo = list(chosen or candidates(scene))
     fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]
+    if beyond_linear(scene, min(BARS)):
+        fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in FINEST_STEPS]
     results = {}
     for k, candidate in enumerate([*fine, *todo]):
         progress(candidate.name, k / (len(todo) + len(fine)))
@@ -247,7 +262,8 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
         return response, ready - started, time.perf_counter() - ready, peak_memory()
     if candidate.half_space:
         scene = replace(scene, body=replace(scene.body, depth=inf))
-    response = compute(scene, candidate.model, h=candidate.h, dt=candidate.dt)
+    tolerance = candidate.tolerance or PLANNED
+    response = compute(scene, candidate.model, tolerance, h=candidate.h, dt=candidate.dt)
     cold = time.perf_counter() - started
     return response, cold, cold, peak_memory()
 
