@@ -1,7 +1,6 @@
 """Time and memory that commands take for a scene, before they are run: about, on two cores.
 
-Elements were timed on slabs and palms of 20,000 to 140,000 degrees of freedom (`bench.costs`). A
-plan that has reduced a body gives the measure of this machine.
+Where a plan has reduced a body, its time is the measure; otherwise that of a slab on two cores is.
 """
 
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ KNOWN_DOFS, KNOWN_SECONDS, KNOWN_MEMORY = 64_000, 9.0, 0.8 * 2**30  # of one red
 BASE_MEMORY = 0.3 * 2**30  # of a process
 GROWTH, MEMORY_GROWTH = 1.4, 1.2  # exponents of dofs
 PAGE, PICTURES = 8.0, 20.0  # s of the figures of a comparison, and of a report
-LARGER = 1.5  # times the default size, of the elements of pictures
+LARGER = 1.5  # times the default size: elements of pictures, for a fifth of the time
 COARSER = 1.15  # times the time of a body, with the coarser one that it is compared with
 
 

@@ -40,6 +40,7 @@ from skinwave.pictures.views import (
     save,
     shaded,
 )
+from skinwave.planning.costs import LARGER
 from skinwave.planning.plan import Plan, plan
 from skinwave.quantity_map import QuantityMap, map_of_motion
 from skinwave.quantity_map import load as load_map
@@ -53,7 +54,6 @@ from skinwave.surface import SurfaceMap, body_map, element_map, grid, has_wavenu
 from skinwave.verify.suite import suite
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
-LARGER = 1.5  # times the default size are the elements of pictures, for a fifth of the time
 PLANNED = 0.05  # tolerance of the plan that stands on the page
 CASES = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a second or two in all
 
