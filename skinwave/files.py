@@ -51,13 +51,18 @@ def distinct_names(names: Iterable[str]) -> list[str]:
 
 
 def write_run(
-    folder: Path, run: Run, *, by: str = "compute", also: Callable[[Path], object] | None = None
+    folder: Path,
+    run: Run,
+    *,
+    by: str = "compute",
+    h: float | None = None,
+    also: Callable[[Path], object] | None = None,
 ) -> None:
-    """The folder of one run, all or nothing; `also` writes more into it."""
+    """The folder of one run, all or nothing; `also` writes more into it, by and h as for `fill`."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     aside = outputs.beside(folder, Path.mkdir, f"{folder.name}.partial-", "")
     try:
-        fill(aside, run, by=by)
+        fill(aside, run, by=by, h=h)
         if also:
             also(aside)
         os.replace(aside, folder)
@@ -66,9 +71,9 @@ def write_run(
         raise
 
 
-def fill(folder: Path, run: Run, *, by: str = "compute") -> None:
+def fill(folder: Path, run: Run, *, by: str = "compute", h: float | None = None) -> None:
     """scene.toml, responses.npz, lines.csv, effort.json and record.json of one run, into an empty
-    folder; `by` is how its model was computed, as in `record.of_model`.
+    folder; `by` and h are how its model was computed, as in `record.of_model`.
     """
     name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
     write_responses(folder / record.RESPONSES[0], {name: run, run.model: run})
@@ -76,7 +81,7 @@ def fill(folder: Path, run: Run, *, by: str = "compute") -> None:
     write_effort(folder / "effort.json", run.response.effort)
     # Only then is it a result for whoever looks for scenes in a folder that was left half-written.
     (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
-    command = record.of_model(run, by)
+    command = record.of_model(run, by, h)
     record.write(folder, command, scene=run.scene, response=run.response)
 
 

@@ -38,15 +38,15 @@ def of_command(options: Namespace) -> dict[str, Any]:
     }
 
 
-def of_model(run: Run, name: str = "compute") -> dict[str, Any]:
-    """One model by itself, as `skinwave.simulation.compute` takes it or, with the name "waves",
-    `skinwave.pictures.motion.waves`, which keeps the motion of the whole body.
+def of_model(run: Run, name: str = "compute", h: float | None = None) -> dict[str, Any]:
+    """One model by itself, as `skinwave.simulation.compute` takes it or, with the name "plan", as
+    planned, with the element size h in metre if that was asked for.
     """
     effort = run.response.effort
     solver = "auto" if effort.solver == "none" else effort.solver
     options = {
         "tacton": run.tacton, "body": run.body, "model": run.model,
-        "h": effort.h or None, "dt": effort.dt or None, "solver": solver,
+        "h": h if name == "plan" else effort.h or None, "dt": effort.dt or None, "solver": solver,
     }  # fmt: skip
     return {"typed": "", "name": name, "options": options}
 

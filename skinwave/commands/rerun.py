@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
         scene = Path(place) / "scene.toml"
         if kept["scene"] is not None:
             scene.write_text(kept["scene"], encoding="utf-8")
-        if kept["command"]["name"] in ("compute", "waves"):
+        if kept["command"]["name"] in ("compute", "plan"):
             return _model_again(options, kept, scene, out)
         return _command_again(options, kept, scene, out)
 
@@ -152,10 +152,9 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     from skinwave.files import fill
     from skinwave.fitting import fitting
     from skinwave.outputs import output_folder
-    from skinwave.pictures.motion import probe_response, waves
     from skinwave.run import Run
     from skinwave.scene_file import read
-    from skinwave.simulation import compute
+    from skinwave.simulation import answered, compute
 
     asked, by = kept["command"]["options"], kept["command"]["name"]
     kinds = {"h": float, "dt": float, "solver": str, "model": str, "tacton": str, "body": str}
@@ -172,15 +171,14 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
         ) as folder,
         progress_of(options) as progress,
     ):
-        if by == "waves":
-            moved = waves(its, progress=progress, h=h, solver=solver)
-            response = probe_response(its, moved)
+        if by == "plan" and its.body.of_kind.discretise:
+            response = answered(its, "auto", 0.05, progress, h=h, solver=solver)
         else:
             response = compute(its, asked["model"], 0.05, progress, h=h, dt=asked["dt"],
                                solver=solver)  # fmt: skip
         error = kept["expected_error"]
         response = replace(response, expected_error=nan if error is None else error)
         run = Run(tacton=asked["tacton"], body=asked["body"], scene=its, response=response)
-        fill(folder, run, by=by)
+        fill(folder, run, by=by, h=h)
     summarise(options, {"out": str(out), "model": response.model}, f"{response.model}: wrote {out}")
     return 0

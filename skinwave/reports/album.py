@@ -139,7 +139,7 @@ def make(
     runs, misfit = [], np.nan
     for view, run in answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames):
         also = None if view is None else partial(keep_view, view)
-        write_run(folder / run.column, run, by="waves", also=also)
+        write_run(folder / run.column, run, by="plan", h=h, also=also)
         runs.append(run)
         if run.scene == scene and view and view.moved:
             misfit = _misfit(run, view.moved)
