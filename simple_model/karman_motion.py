@@ -33,7 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, signal
+from scipy import linalg
 from scipy.linalg.lapack import dposv
 
 from simple_model.free_modes import FreeModes, free_modes
@@ -305,11 +305,13 @@ class _Scheme:
         """Forces (n - 1, r) under which the steps without stretching are a motion (n, r) from
         rest.
         """
+        from scipy.signal import lfilter  # which takes long to import
+
         z, dt = motion, self.dt
         change = np.vstack([z[1:2] - z[:1], z[2:] - z[:-2]]) / 2
         stress = self.stiff * change
         for pull, keep, follow in zip(self.pull, self.keep, self.follow, strict=True):
-            stretch = signal.lfilter([follow], [1, -keep], change, axis=0)
+            stretch = lfilter([follow], [1, -keep], change, axis=0)
             stress[1:] += pull * stretch[:-1]
         stress[0] = 0.0
         inertia = np.vstack([2 * (z[1:2] - z[:1]), z[2:] - 2 * z[1:-1] + z[:-2]]) / dt**2

@@ -225,7 +225,7 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
 
 
 def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
-    """A run that was left to plan itself, with a sequence of meshes that ends too early."""
+    """A run that was left to plan its mesh, with a sequence of meshes that ends too early."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
     (tmp_path / "scene.toml").write_text(
@@ -233,7 +233,7 @@ def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monke
         '[body]\nkind = "sheet"\nmaterial = "paper"\nsize_x_mm = 40\nsize_y_mm = 40\n'
         'thickness_mm = 0.1\nbase = "free"\nsides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n'
     )
-    assert main(["run", "scene.toml", "--tolerance", "0.001", "--quiet"]) == 0
+    assert main(["run", "scene.toml", "--model", "fem", "--tolerance", "0.001", "--quiet"]) == 0
     said = capsys.readouterr().err
     assert "warning: elements of" in said
     assert "more than the tolerance of 0.1 %" in said

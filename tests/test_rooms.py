@@ -31,7 +31,7 @@ INNER = {
     "uncertainty": {"bodies", "models", "planning", "pictures", "sweeps"},
     "studies": {"bodies", "models", "planning", "pictures", "measurements"},
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
-    "sweeps": {"bodies", "models", "planning", "pictures"},
+    "sweeps": {"bodies", "models", "planning", "pictures", "uncertainty"},
     "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
     "web": {
         "bodies",

@@ -426,8 +426,8 @@ def test_assumptions_that_a_sheet_keeps_by_its_mounting():
     )
     framed = replace(scene, body=replace(scene.body, mounting=Mounting()))
     assert set(droppable(framed)) - set(droppable(scene)) == {"vacuum"}  # without a frame, no air
-    with pytest.raises(ValueError, match="this sheet is orthotropic"):
-        droppable(replace(scene, body=SMALL))
+    grained = set(droppable(replace(scene, body=SMALL)))
+    assert grained - set(droppable(scene)) >= {"alike in all directions"}
 
 
 def test_elements_damp_each_mode_of_a_stretched_sheet_by_its_loss_factor():

@@ -13,7 +13,6 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
@@ -150,6 +149,8 @@ def _added(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: in
     plate, moved = _moved(scene, times, modes, count, parts)
     read = moved @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
     if rate := scene.reading.asked.rate:
+        from scipy.interpolate import make_interp_spline  # which takes long to import
+
         steps = step(times) / parts * np.arange(len(moved))
         read = make_interp_spline(steps, read, DEGREE)(steps, rate)
     return np.asarray(read[::parts])

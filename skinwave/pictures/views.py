@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 import fem
 from meshes import reading
@@ -305,6 +304,8 @@ def plate_view(run: Run, part: tuple[float, int]) -> View:
     period, frames = part
     times = np.arange(frames) * period / frames
     if run.model == STRETCHED.name:
+        from scipy.interpolate import CubicSpline  # which takes long to import
+
         at, z, modes = settled(scene, PLATE_TOLERANCE)
         steady = CubicSpline(at - at[0], z)
         f = plate_lines(scene, points[:1, :2])[0]

@@ -272,7 +272,7 @@ def _unplanned(
     reason = f"as asked: {model.method}{_without(start)}"
     rows = [PlanRow(what="model", value=model.name, reason=reason)]
     what, size = f"the {model.method}", None
-    cure = "a model with waves is"
+    cure = "a larger tolerance is" if model.needs_body else "a model with waves is"
     if model.default_size:
         size = h or model.default_size(scene.body)
         check_mesh(scene.body, size)
