@@ -157,7 +157,7 @@ def _models(
 ) -> dict[str, str]:
     """Model of each column; a ValueError of a scene that it does not take, before any run."""
     if model != "auto" and not named(model).needs_body:
-        raise ValueError(f"{model} moves no body, and compare shows it in any case; give a model of bodies")
+        raise ValueError(f"{model} moves no body; give a model that does, or leave --model out")
     found: dict[str, str] = {}
     for column, scene in (each for group in scenes.values() for each in group.items()):
         if not scene.body.of_kind.discretise:
