@@ -18,11 +18,11 @@ TEXTS = {
     "empty": ("", "has no table; give a header such as t [s]"),
     "comments alone": ("# name: x\n\n", "has no table"),
     "header alone": (HEAD, "a header and no numbers"),
-    "no header": (ROWS, "no header; write one such as t [s], v(0,0) [mm/s], v(5,0) [mm/s], or"),
+    "no header": (ROWS, "write a header such as t [s], v(0,0) [mm/s], v(5,0) [mm/s], or"),
     "a word": (HEAD + ROWS + "0.003, x, 8\n", "line 5 has 'x', which is no number"),
     "thousands": ("t [s]; v(0,0) [nm/s]\n0,001; 594\n0,002; 1.357\n", "'1.357' with a dot, and"),
-    "a short row": (HEAD + ROWS + "0.003, 7\n", "line 5 has 2 cells between ',' and the header 3"),
-    "not a number": (HEAD + ROWS + "0.003, nan, 1\n", "line 5 has nan in the column 'v(0,0)"),
+    "a short row": (HEAD + ROWS + "0.003, 7\n", "line 5 has 2 cells and the rows above 3"),
+    "not a number": (HEAD + ROWS + "0.003, nan, 1\n", "of 4 samples only 3 lie between"),
     "uneven times": (HEAD + ROWS + "0.007, 1, 1\n", "equal steps"),
     "falling times": (HEAD + "0, 1, 2\n-0.001, 3, 4\n", "must rise"),
     "time without unit": (HEAD.replace(" [s]", "") + ROWS, "'t' has no unit; write 't [s]'"),
@@ -34,7 +34,7 @@ TEXTS = {
     "no quantity": ("t [s], left, right\n" + ROWS, "give --quantity velocity --unit mm/s"),
     "no time": ("v(0,0) [mm/s], v(5,0) [mm/s]\n1, 2\n3, 4\n", "or give --rate"),
     "time alone": ("t [s]\n0\n1\n", "no column is of motion"),
-    "two times": ("t [s], t [s], v [m/s]\n0, 0, 1\n", "2 columns are of time"),
+    "two times": ("t [s], t [s], v [m/s]\n0, 1, 1\n1, 2, 1\n", "2 columns are of time"),
     "place in three": ("t [s], v(0,0,0) [mm/s]\n0, 1\n1, 2\n", "is no pair x,y; write (5,0)"),
     "repetitions": ("t [s], v(0,0) [m/s], v(1,0)#2 [m/s]\n0, 1, 1\n", "not the same places"),
     "half a spectrum": ("f [Hz], v(0,0) [m/s]\n1, 1\n", "two columns a place: 're v(0,0)', 'im"),
@@ -103,8 +103,8 @@ A_MAP = np.arange(18.0).reshape(9, 2) / 100
 OWN = {"format": "skinwave measurement 1", "quantity": "velocity", "unit": "m/s"}
 # Name of the file, its content of a folder to write in, options, and what is said of it.
 BINARIES = {
-    "not utf-8": ("a.csv", lambda d: b"\xff\x00t", [], "no UTF-8 text"),
-    "half of utf-16": ("a.csv", lambda d: b"\xff\xfe\x00", [], "no UTF-8 text"),
+    "not utf-8": ("a.csv", lambda d: b"\xff\x00t", [], "the file is no text"),
+    "half of utf-16": ("a.csv", lambda d: b"\xff\xfe\x00", [], "the file is no text"),
     "no zip": ("a.npz", lambda d: b"text", [], "cannot be read"),
     "half a zip": ("a.npz", lambda d: truncated(files.numpy_npz, d, ".npz"), [], "cannot be read"),
     "no arrays": ("a.npz", lambda d: no_arrays(), [], "cannot be read"),
@@ -134,7 +134,8 @@ BINARIES = {
         "a.wav", lambda d: wav(np.zeros(9, np.int16), d), [], "give --quantity velocity --unit mm/s"
     ),
     "wav of nan": (
-        "a.wav", lambda d: wav(np.full(9, np.nan, np.float32), d), ["--unit", "m/s"], "nan and inf"
+        "a.wav", lambda d: wav(np.full(9, np.nan, np.float32), d), ["--unit", "m/s"],
+        "no place has a value"
     ),
     "wav of one sample": (
         "a.wav", lambda d: wav(np.zeros(1, np.int16), d), ["--unit", "m/s"], "has 1 samples"

@@ -1,7 +1,8 @@
-"""Column headers of text files: what a column is, where, of which repetition, in which unit.
+"""Headings of columns: what a column holds, where, of which repetition, in which unit.
 
 `t [s]`, `v(0,0) [mm/s]`, `v(5,0)#2 [mm/s]`, `re u(0,0) [um]`, `phase u(0,0) [deg]`, `drive`, or
-with the unit as skinwave's own tables have it: `t_s`, `x_mm`, `velocity_mm_s`.
+with the unit as in skinwave's own tables: `t_s`, `x_mm`, `velocity_mm_s`. Headings of other
+programs and languages follow from their units, or from a few words.
 """
 
 import re
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 
 from simple_model.quantities import QUANTITIES
 from skinwave.measurements.units import (
+    ANGLES,
     FREQUENCIES,
     LENGTHS,
     MOTION,
@@ -18,33 +20,56 @@ from skinwave.measurements.units import (
     quantity_of,
 )
 
-TIME, FREQUENCY, X, Y, REPETITION, DRIVE = "time", "frequency", "x", "y", "repetition", "drive"
+TIME, FREQUENCY, X, Y, Z = "time", "frequency", "x", "y", "z"
+REPETITION, DRIVE, INDEX = "repetition", "drive", "index"
 NAMES = {
-    TIME: ("t", "time", "times"),
-    FREQUENCY: ("f", "freq", "frequency", "frequencies"),
+    TIME: (
+        "t", "time", "times", "zeit", "temps", "tempo", "tiempo", "tid", "tijd", "czas", "время",
+        "時間", "时间", "時刻", "시간", "x_value", "timestamp", "time stamp", "elapsed time",
+        "uhrzeit", "datum", "date", "clock", "datetime", "x-axis", "x axis",
+    ),
+    FREQUENCY: (
+        "f", "freq", "frequency", "frequencies", "frequenz", "fréquence", "frequence", "frecuencia",
+        "frequenza", "częstotliwość", "частота", "周波数", "频率", "주파수",
+    ),
     X: ("x", "probe_x"),
     Y: ("y", "probe_y"),
+    Z: ("z", "probe_z"),
     REPETITION: ("rep", "repetition", "run", "trial", "repeat"),
-    DRIVE: ("drive", "ref", "reference", "trigger"),
+    DRIVE: ("drive", "ref", "ref1", "reference", "referenz", "référence", "trigger", "trig"),
+    INDEX: (
+        "index", "idx", "no", "no.", "nr", "nr.", "n", "#", "sample", "samples", "sample number",
+        "sequence", "row", "line", "point", "point index", "punktindex", "番号",
+    ),
     "displacement": ("u", "d", "disp", "displacement"),
     "velocity": ("v", "vel", "velocity"),
     "acceleration": ("a", "acc", "accel", "acceleration"),
-}
-PARTS = ("re", "im", "abs", "phase")  # of a complex amplitude
+}  # fmt: skip
+AROUND = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)  # what is no motion
+PARTS = {
+    word: part
+    for part, words in {
+        "re": "re real realteil réel reel", "im": "im imag imaginary imaginärteil imaginaire",
+        "abs": "abs", "phase": "phase phasenwinkel",
+    }.items()
+    for word in words.split()
+}  # fmt: skip
 ROLE = {name: role for role, names in NAMES.items() for name in names} | {
     name: name for name, record in QUANTITIES.items() if record.of_body
 }
 _COLUMN = re.compile(
-    r"(?:(?P<part>re|im|abs|phase)[ _.]+)?(?P<name>[^()\[\]#]*?)\s*"
+    r"(?P<name>[^()\[\]#]*?)\s*"
     r"(?:\((?P<place>[^()]*,[^()]*)\))?\s*(?:\#(?P<rep>\d{1,9}))?\s*"
-    r"(?:\[(?P<unit>[^\]]*)\]|\((?P<round>[^(),]*)\))?",
-    re.IGNORECASE,
+    r"(?:\[(?P<unit>[^\]]*)\]|\((?P<round>(?:[^(),]|\([^()]*\))*)\))?"
 )
 _SUFFIXES = {
     unit.replace("/", "_"): unit
-    for units in (TIMES, FREQUENCIES, *MOTION.values(), {"deg": 1.0, "rad": 1.0})
+    for units in (TIMES, FREQUENCIES, *MOTION.values(), ANGLES)
     for unit in units
 }
+UNITS = {plain(unit) for unit in _SUFFIXES.values()} | {
+    "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", "Sequence", "dB", "",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,11 +89,16 @@ class Column:
     @property
     def is_motion(self) -> bool:
         """Whether it has measured values, not what they are at, or the drive."""
-        return self.role not in (TIME, FREQUENCY, X, Y, REPETITION, DRIVE)
+        return self.role not in AROUND
+
+    @property
+    def is_of_motion(self) -> bool:
+        """Whether its name or unit says that it is motion."""
+        return self.is_motion and bool(self.role or self.part or quantity_of(self.unit))
 
 
-def column(text: str) -> Column:
-    """The column that a header cell describes.
+def column(text: str, unit: str = "") -> Column:
+    """The column that a heading describes, with the unit below it.
 
     Raises
     ------
@@ -76,25 +106,36 @@ def column(text: str) -> Column:
         If its place is no pair of numbers.
     """
     said = " ".join(text.split())
+    apart = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", said)
+    if apart and plain(apart[2]) in UNITS:
+        said = f"{apart[1]} [{apart[2]}]"
     found = _COLUMN.fullmatch(said)
     if not found:
-        return Column(text=said, role="")
-    name, unit = found["name"].strip().lower(), found["unit"] or found["round"] or ""
-    if name not in ROLE and not unit:
-        name, unit = _suffixed(found["name"].strip())
+        return Column(text=said, role="", unit=unit.strip("[]() "))
+    words = found["name"].strip().lower()
+    unit = unit or found["unit"] or found["round"] or ""
+    if words not in ROLE and not unit:
+        words, unit = _suffixed(found["name"].strip())
+    first, _, rest = words.replace(".", " ").partition(" ")
+    part = PARTS.get(first, PARTS.get(words.rpartition("_")[2], ""))
+    name = rest if PARTS.get(first) else words
     return Column(
         text=said,
         role=ROLE.get(name, "") if found["place"] else _role(name, unit),
-        part=(found["part"] or "").lower(),
+        part=part or ("phase" if plain(unit) in ANGLES else ""),
         place=_place(found["place"]) if found["place"] else Column.place,
         repetition=int(found["rep"] or 1),
-        unit=unit.strip(),
+        unit=unit.strip("[]() "),
     )
 
 
 def _role(name: str, unit: str) -> str:
-    """Role of a name without a place; one letter may be a channel whose unit says what it is."""
-    role = ROLE.get(name, "")
+    """Role of a name without a place. The unit decides where it says another one."""
+    role, of = ROLE.get(name, ""), plain(unit)
+    if of in TIMES or of in FREQUENCIES:
+        return TIME if of in TIMES else FREQUENCY
+    if role in (TIME, FREQUENCY, INDEX) and of in UNITS - {"", "Sequence"}:
+        return ""
     return "" if len(name) == 1 and role in MOTION and quantity_of(unit) not in ("", role) else role
 
 
@@ -119,41 +160,3 @@ def _place(text: str) -> tuple[float, float]:
         raise ValueError(f"the place ({text[:40]}) of a column is no pair x,y; write (5,0)")
     x, y = (length(part, unit) for part in parts)
     return x, y
-
-
-def cells(line: str, delimiter: str) -> list[str]:
-    """Cells of a line; a delimiter within quotes or brackets is none, as in v(0,0)."""
-    found, cell, depth, quoted = [], "", 0, False
-    for letter in line:
-        if letter == '"':
-            quoted = not quoted
-            continue
-        if letter == delimiter and not quoted and depth <= 0:
-            found.append(cell.strip())
-            cell = ""
-            continue
-        if not quoted:
-            depth += (letter in "([") - (letter in ")]")
-        cell += letter
-    return [*found, cell.strip()]
-
-
-def split(line: str, delimiter: str) -> list[str]:
-    """Cells of a line between a delimiter, or between white space outside of brackets."""
-    if delimiter != " ":
-        return cells(line, delimiter)
-    joined = re.sub(r"\s+(?=[^\[\]]*\])|\s+(?=[\[#])", "", line.strip())
-    return joined.split()
-
-
-def is_unit(cell: str) -> bool:
-    """Whether a cell is a unit and nothing else, be it in brackets."""
-    return plain(cell) in {plain(unit) for unit in _SUFFIXES.values()}
-
-
-def delimiter_of(line: str) -> str:
-    """Tab, semicolon or comma, whichever a line has first in this order outside of brackets and
-    quotes; else white space.
-    """
-    bare = re.sub(r"\([^()]*\)|\[[^\[\]]*\]|\"[^\"]*\"", "", line)
-    return next((letter for letter in "\t;," if letter in bare), " ")

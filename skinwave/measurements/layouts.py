@@ -1,19 +1,44 @@
 """Recordings of text tables: wide, a column a place, and long, a row a time and place."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from simple_model.trajectory import Floats
 from skinwave.measurements import headers
 from skinwave.measurements.headers import Column
 from skinwave.measurements.recording import Given, Recording
-from skinwave.measurements.table import Table, agreed, axis_of, complex_of, noted
+from skinwave.measurements.table import (
+    Table,
+    agreed,
+    axis_of,
+    complex_of,
+    noted,
+    noted_axis,
+    noted_frequency,
+    with_roles,
+)
 from skinwave.measurements.units import LENGTHS, in_si, scale
 
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
 LONG = "t [s], x [mm], y [mm], v [mm/s]"
 
 
-def wide(table: Table, given: Given) -> Recording:
+def recording(table: Table, given: Given) -> Recording:
+    """The recording in a table, of a row for each place and time if it has the columns x and y.
+
+    Raises
+    ------
+    ValueError
+        If its columns do not make a measurement.
+    """
+    table, said = with_roles(table, given)
+    is_long = table.of(headers.X) >= 0 or table.of(headers.Y) >= 0
+    found = _long(table, given) if is_long else _wide(table, given)
+    return replace(found, remarks=(*found.remarks, *said))
+
+
+def _wide(table: Table, given: Given) -> Recording:
     """The recording in columns, one a place and repetition.
 
     Raises
@@ -23,15 +48,19 @@ def wide(table: Table, given: Given) -> Recording:
     """
     columns, numbers = table.columns, table.numbers
     at = max(table.of(headers.TIME), table.of(headers.FREQUENCY))
-    times, frequencies = axis_of(columns, numbers, at)
-    if at < 0 and given.rate is None:
+    times, frequencies = axis_of(table, at, given.rate is not None)
+    rate, start = noted_axis(table)
+    if at < 0 and given.rate is None and np.isnan(rate):
         raise ValueError(
-            "no column is of time or frequency; write 't [s]' above it, or give --rate"
+            f"no column is of time or frequency; write a header such as {EXAMPLE}, or give --rate, "
+            "--quantity and --unit"
         )
+    if at < 0 and not np.isnan(rate):
+        times = start + np.arange(len(numbers)) / rate
     motion = [k for k, one in enumerate(columns) if one.is_motion]
     if not motion:
         raise ValueError(f"no column is of motion; write a header such as {EXAMPLE}")
-    series, quantity, unit = _series(columns, numbers, motion, len(frequencies) > 0)
+    series, quantity, unit = _series(columns, numbers, motion, len(frequencies) > 0, given)
     values, places = _by_repetition(series)
     name, sign, remarks = noted(table)
     return Recording(
@@ -41,24 +70,27 @@ def wide(table: Table, given: Given) -> Recording:
 
 
 def _series(
-    columns: tuple[Column, ...], numbers: Floats, motion: list[int], complex_: bool
+    columns: tuple[Column, ...], numbers: Floats, motion: list[int], complex_: bool, given: Given
 ) -> tuple[list[tuple[Column, np.ndarray]], str, str]:
     """Columns with their values, real and imaginary parts together."""
     if not complex_:
         if parts := [columns[k].text for k in motion if columns[k].part]:
             raise ValueError(f"the column '{parts[0]}' is of a spectrum; give the column 'f [Hz]'")
-        quantity, unit = agreed([columns[k] for k in motion])
+        quantity, unit = agreed([columns[k] for k in motion], given)
         return [(columns[k], numbers[:, k]) for k in motion], quantity, unit
     found = []
     for k, other in _pairs(columns, motion):
         found.append((columns[k], complex_of(columns, numbers, k, other)))
-    return found, *agreed([one for one, _ in found])
+    quantity, unit = agreed([one for one, _ in found], given)
+    return found, quantity, unit
 
 
 def _pairs(columns: tuple[Column, ...], motion: list[int]) -> list[tuple[int, int]]:
     """Columns of real part and imaginary, or magnitude and phase, next to each other."""
     if len(motion) % 2:
-        raise ValueError("a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)'")
+        raise ValueError(
+            "a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)', or magnitude and phase"
+        )
     return list(zip(motion[::2], motion[1::2], strict=True))
 
 
@@ -83,7 +115,7 @@ def _drive(columns: tuple[Column, ...], numbers: Floats) -> np.ndarray:
     return numbers[:, found[0]] if found else np.empty(0)
 
 
-def long(table: Table) -> Recording:
+def _long(table: Table, given: Given) -> Recording:
     """The recording in rows of a time or frequency, a place, and perhaps a repetition.
 
     Raises
@@ -95,10 +127,13 @@ def long(table: Table) -> Recording:
     at = max(table.of(headers.TIME), table.of(headers.FREQUENCY))
     where = table.of(headers.X), table.of(headers.Y)
     motion = [k for k, one in enumerate(columns) if one.is_motion]
-    if at < 0 or min(where) < 0 or not motion:
+    band = noted_frequency(table)
+    if (at < 0 and np.isnan(band)) or min(where) < 0 or not motion:
         raise ValueError(f"a table of a row a place needs the columns {LONG}; mend the header")
-    times, frequencies = axis_of(columns, numbers, at)
-    series, quantity, unit = _series(columns, numbers, motion, len(frequencies) > 0)
+    times, frequencies = axis_of(table, at, False)
+    if at < 0:
+        frequencies = np.full(len(numbers), band)
+    series, quantity, unit = _series(columns, numbers, motion, len(frequencies) > 0, given)
     if len(series) > 1:
         raise ValueError(f"a table of a row a place has {len(series)} columns of motion; leave one")
     axis, row = np.unique(times if len(times) else frequencies, return_inverse=True)

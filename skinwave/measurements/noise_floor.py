@@ -10,6 +10,7 @@ from simple_model.trajectory import Floats
 
 SHARE = 0.25  # of its frequency: the half-width of the band of the median,
 FEWEST, WIDEST = 10, 400  # bins, at least and at most
+ROUND_OFF = 1e-40  # of the largest density
 LEAST_KEPT = 0.5  # share of the noise that a bin beside lines must have to tell the floor
 CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins of a Hann window that stand for one in a median
 
@@ -33,7 +34,8 @@ def floor_of(density: Floats, runs: int, kept: Floats | None = None) -> Floats:
     """
     kept = np.ones(len(density)) if kept is None else kept
     bins = _telling(kept)
-    positive = np.maximum(density[bins] / kept[bins, None], np.finfo(float).tiny)
+    least = ROUND_OFF * density.max(initial=0.0) + np.finfo(float).tiny
+    positive = np.maximum(density[bins] / kept[bins, None], least)
     level = _trend(bins, positive, len(density))
     flat = positive / level[bins]
     knots = _knots(len(density))

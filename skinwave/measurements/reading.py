@@ -2,7 +2,7 @@
 published sets.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +47,8 @@ def read(
     sign: int | None = None,
     rate: float | None = None,
     variable: str = "",
+    columns: Sequence[str] = (),
+    direction: str = "",
 ) -> Measurement:
     """Measurement in a file, in SI and positive into the body.
 
@@ -60,8 +62,11 @@ def read(
     places : (p, 2) float, metre
     sign : 1 if positive values are into the body, -1 if out of it, as of a vibrometer that counts
         motion towards itself as positive
-    rate : Hz, of samples without times
+    rate : Hz, replaces the steps of the file's times; its first sample stays as many steps from
+        zero
     variable : name of the array in a file of several
+    columns : headings or numbers from 1 of the columns or channels of motion
+    direction : "x", "y" or "z", of the motion in a Universal File with several
 
     Returns
     -------
@@ -77,8 +82,9 @@ def read(
     reader = reader_of(path)
     known = None if places is None else np.asarray(places, np.float64)
     given = Given(
-        quantity=quantity, unit=unit, places=known, sign=sign, rate=rate, variable=variable
-    )
+        quantity=quantity, unit=unit, places=known, sign=sign, rate=rate, variable=variable,
+        columns=tuple(columns), direction=direction,
+    )  # fmt: skip
     try:
         return completed(reader.read(path, given), given, path)
     except ValueError as error:

@@ -1,6 +1,6 @@
 """A file's recording as it stands, what a user adds to it, and the measurement that both make."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +8,8 @@ import numpy as np
 from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
 from simple_model.trajectory import Floats
-from skinwave.measurements import units
-from skinwave.measurements.measurement import Measurement
+from skinwave.measurements import sampling, units
+from skinwave.measurements.measurement import UNEVEN, Measurement
 
 LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
 EXAMPLE = "--quantity velocity --unit mm/s"
@@ -26,6 +26,8 @@ class Given:
     sign : 1 if positive values are into the body, -1 if out of it, None if not given
     rate : Hz, or None
     variable : str, the array of a file of several
+    columns : headings or numbers from 1 of the columns or channels of motion; all if empty
+    direction : "x", "y" or "z", of the motion in a file of several; "z" if ""
     """
 
     quantity: str = ""
@@ -34,6 +36,8 @@ class Given:
     sign: int | None = None
     rate: float | None = None
     variable: str = ""
+    columns: tuple[str, ...] = ()
+    direction: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,24 +94,49 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
     """
     quantity, unit = _quantity(found, given)
     sign, said = _sign(found, given)
+    places, placed = _places(found, given)
+    found, missing = _measured(replace(found, places=places))
+    axis, found, filled = _sampled(found, given)
     values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
     if values.size and not np.abs(values).max() < LARGEST:
         raise ValueError(
             f"values reach {np.abs(values).max():g} in SI; leave out nan and inf, and check --unit"
         )
-    times = _times(found, given)
-    places, placed = _places(found, given)
     return Measurement(
         quantity=quantity,
-        places=places,
-        times=times,
+        places=found.places,
+        times=axis,
         frequencies=found.frequencies,
         values=values,
         drive=found.drive,
         name=found.name or path.stem,
         source=path.name,
-        remarks=tuple(dict.fromkeys((*found.remarks, *placed, *said))),
+        remarks=tuple(dict.fromkeys((*found.remarks, *missing, *filled, *placed, *said))),
     )
+
+
+def _measured(found: Recording) -> tuple[Recording, list[str]]:
+    """The recording without places and frequencies of which nothing was measured, and sentences."""
+    gone = np.isnan(found.values)
+    if not gone.any():
+        return found, []
+    place = ~gone.all(axis=(0, 1))
+    if not place.any():
+        raise ValueError("no place has a value; export the measured values")
+    said = [f"{(~place).sum()} of {len(place)} places have no value and are left out"] * int(
+        not place.all()
+    )
+    found = replace(found, values=found.values[:, :, place], places=found.places[place])
+    if len(found.frequencies):
+        at = ~np.isnan(found.values).any(axis=(0, 2))
+        if 2 * at.sum() < len(at):
+            raise ValueError(f"only {at.sum()} of {len(at)} frequencies have values of all places")
+        said += [f"{(~at).sum()} frequencies without values are left out"] * int(not at.all())
+        drive = found.drive[at] if len(found.drive) else found.drive
+        found = replace(
+            found, values=found.values[:, at], frequencies=found.frequencies[at], drive=drive
+        )
+    return found, said
 
 
 def _quantity(found: Recording, given: Given) -> tuple[str, str]:
@@ -118,6 +147,11 @@ def _quantity(found: Recording, given: Given) -> tuple[str, str]:
         missing = "the unit" if quantity else "what was measured, and its unit"
         option = f"--unit {_usual(quantity)}" if quantity else EXAMPLE
         raise ValueError(f"{missing} is not in the file; give {option}")
+    if not given.unit and not units.quantity_of(unit) and not quantity and "dB" not in unit:
+        raise ValueError(
+            f"the values are in {unit[:40]}, and how much motion that is is not in the file; give "
+            f'--unit "20 mm/s" if 1 {unit[:40]} stands for 20 mm/s'
+        )
     if not quantity:
         units.per_unit(unit, "displacement")  # whose sentence names what is wrong with it
     return choose("quantity", quantity, [name for name, q in QUANTITIES.items() if q.of_body]), unit
@@ -139,17 +173,49 @@ def _sign(found: Recording, given: Given) -> tuple[int, list[str]]:
                "--positive out turns it"]  # fmt: skip
 
 
-def _times(found: Recording, given: Given) -> Floats:
+def _sampled(found: Recording, given: Given) -> tuple[Floats, Recording, list[str]]:
+    """Even times, the recording at each of them, and sentences on what was filled or replaced."""
     if len(found.frequencies):
-        return np.empty(0)
-    if given.rate is None and len(found.times):
-        return found.times
+        return np.empty(0), found, []
+    times, index, said = _times(found, given)
+    together = found.values
+    if len(found.drive) == together.shape[1]:
+        drive = np.broadcast_to(found.drive[:, None], (len(together), len(found.drive), 1))
+        together = np.concatenate([together, drive], axis=2)
+    full, part, more = sampling.complete(np.moveaxis(together, 1, 2), index, len(times))
+    full = np.moveaxis(full, 2, 1)
+    count = found.values.shape[2]
+    drive = full[0, :, count] if full.shape[2] > count else found.drive
+    return times[part], replace(found, values=full[..., :count], drive=drive), [*said, *more]
+
+
+def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str]]:
+    """Times of samples, the number of each sample of the file, and sentences. A rate that is given
+    replaces steps; the first sample stays as many steps from zero.
+    """
+    count = found.values.shape[1]
     rate = found.rate if given.rate is None else given.rate
+    if given.rate is None and len(found.times):
+        return *sampling.even(found.times), []
     if np.isnan(rate):
         raise ValueError("the sampling rate is not in the file; give --rate in Hz")
     if not 0 < rate < np.inf:
         raise ValueError(f"the rate of {rate:g} Hz must be above 0 and finite; give --rate in Hz")
-    return np.arange(found.values.shape[1]) / rate
+    if len(found.times) < 2:
+        return np.arange(count) / rate, np.arange(count), []
+    try:
+        times, index = sampling.even(found.times)
+    except ValueError:
+        span = float(found.times[-1] - found.times[0])
+        if not span > 0:
+            raise
+        times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    said = []
+    if not np.isclose(step * rate, 1, rtol=UNEVEN):
+        said.append(f"the file's steps of {step:g} are replaced by 1/{rate:g} s")
+    start = times[0] if np.isclose(step * rate, 1, rtol=UNEVEN) else times[0] / (step * rate)
+    return start + np.arange(len(times)) / rate, index, said
 
 
 def _places(found: Recording, given: Given) -> tuple[Floats, list[str]]:

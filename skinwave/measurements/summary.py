@@ -61,7 +61,7 @@ def _clipping(found: Inspection) -> str:
 
 
 def _constant(found: Inspection) -> list[str]:
-    if not len(found.constant):
+    if not len(found.constant) or len(found.measured.axis) == 1:
         return []
     names = ", ".join(place_words(found.measured, int(p)) for p in found.constant[:MOST_NAMED])
     return [f"Nothing varies at {len(found.constant)} of the places: {names}."]

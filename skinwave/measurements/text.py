@@ -1,32 +1,42 @@
-"""Text in columns, wide (a column a place) or long (a row a place): CSV, TSV, semicolons."""
+"""Text in columns as programs export it: encoding, delimiter, decimal sign, header, and numbers.
 
+The rows at the end of a file show what separates its cells and which columns hold numbers. Its
+table begins at the first line with numbers in these columns. The line above has the names, or the
+units below a line of names. Everything above, and cells beside the numbers, are notes.
+"""
+
+import codecs
 import io
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 from meshes import reading
 from simple_model.trajectory import Floats
-from skinwave.measurements import headers
-from skinwave.measurements.headers import (
-    FREQUENCY,
-    TIME,
-    Column,
-    X,
-    Y,
-    column,
-    delimiter_of,
-    is_unit,
-    split,
-)
-from skinwave.measurements.layouts import EXAMPLE, in_metre, long, wide
+from skinwave.measurements.headers import TIME, UNITS, Column, X, Y, column
+from skinwave.measurements.layouts import EXAMPLE, in_metre, recording
 from skinwave.measurements.recording import Given, Recording
 from skinwave.measurements.table import Table
+from skinwave.measurements.units import plain
 from skinwave.plain_text import number_in
 
 LARGEST = 256_000_000  # bytes
-MOST_ABOVE = 100  # lines about the measurement
-AXES = (TIME, FREQUENCY)
+SHOWN = 100  # rows at the end that show what separates cells
+NO_VALUE = (
+    "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
+    "1.#ind", "missing", "invalid",
+)  # fmt: skip
+BEYOND = ("∞", "+∞", "1.#inf", "overload", "over")  # the range of an instrument
+MARK = "#%;/!"  # before lines about the measurement
+_CLOCK = re.compile(
+    r"(?:(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4}))?[T ]*(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)Z?)?"
+)
+_LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 
 
 def read(path: Path, given: Given) -> Recording:
@@ -35,12 +45,9 @@ def read(path: Path, given: Given) -> Recording:
     Raises
     ------
     ValueError
-        If it is no table of numbers below a header, or its columns do not make a measurement.
+        If it is no table of numbers, or its columns do not make a measurement.
     """
-    table = _table(reading.exported_text(path, LARGEST), given)
-    if table.of(headers.X) >= 0 or table.of(headers.Y) >= 0:
-        return long(table)
-    return wide(table, given)
+    return recording(table(decoded(path)), given)
 
 
 def places(path: Path) -> Floats:
@@ -51,127 +58,301 @@ def places(path: Path) -> Floats:
     ValueError
         If it has no such columns, or they are no numbers.
     """
-    lines = [line for line in reading.exported_text(path, LARGEST).splitlines() if line.strip()]
-    delimiter = delimiter_of(lines[0]) if lines else ","
-    head = split(lines[0], delimiter) if lines else []
-    bare = len(head) == 2 and _are_numbers(head)
-    columns = tuple(map(column, ("x [mm]", "y [mm]") if bare else head))
+    found = table(decoded(path))
+    columns = found.columns
+    if len(columns) == 2 and not any(one.text for one in columns):
+        columns = (column("x [mm]"), column("y [mm]"))
     where = [[k for k, one in enumerate(columns) if one.role == role] for role in (X, Y)]
-    if not all(len(found) == 1 for found in where):
+    if not all(len(of) == 1 for of in where):
         raise ValueError(f"{path}: a file of places needs the columns x [mm], y [mm]; add these")
-    numbers = _numbers(lines[1 - bare :], delimiter, columns, 1 - bare)
-    return in_metre(columns, numbers, (where[0][0], where[1][0]))
+    return in_metre(columns, found.numbers, (where[0][0], where[1][0]))
 
 
-def _table(text: str, given: Given) -> Table:
-    lines = text.splitlines()
-    notes, at = [], 0
-    while at < len(lines) and (not lines[at].strip() or lines[at].lstrip().startswith("#")):
-        key, _, value = lines[at].lstrip("# ").partition(":")
-        notes.append((key.strip().lower(), value.strip()))
-        at += 1
-    if at == len(lines):
-        raise ValueError(f"the file has no table; give a header such as {EXAMPLE}, and numbers")
-    columns, below, delimiter = _header(lines, at, given)
-    numbers = _numbers(lines[below:], delimiter, columns, below)
-    return Table(columns=columns, numbers=numbers, notes=tuple(notes))
+def decoded(path: Path) -> str:
+    """Text of a file in UTF-8, UTF-16, or else Windows' Latin-1, whose letters matter little here.
 
-
-def _header(lines: list[str], at: int, given: Given) -> tuple[tuple[Column, ...], int, str]:
-    """Columns, the number of the first line below them, and what separates cells.
-
-    The header is the first line or, below lines about the measurement, the last one above numbers;
-    the units may stand in a line of their own below the names.
+    Raises
+    ------
+    ValueError
+        If it is no text.
     """
-    delimiter = delimiter_of(lines[at])
-    head = split(lines[at], delimiter)
-    if _are_numbers(head):
-        _refuse_no_header(given)
-        return tuple(column(f"column {k + 1}") for k in range(len(head))), at, delimiter
-    if not any(column(cell).role in AXES for cell in head):
-        at = _last_above_numbers(lines, at)
-        delimiter = delimiter_of(lines[at])
-        head = split(lines[at], delimiter)
-    below = split(lines[at + 1], delimiter) if at + 1 < len(lines) else []
-    if len(below) == len(head) and all(map(is_unit, below)):
-        bare = (cell.strip("[]() ") for cell in below)
-        head = [f"{name} [{unit}]" for name, unit in zip(head, bare, strict=True)]
-        at += 1
-    return tuple(map(column, head)), at + 1, delimiter
+    content = reading.content(path, LARGEST)
+    encoding = "utf-8-sig"
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    elif b"\0" in content[:2000] and not len(content) % 2:
+        encoding = "utf-16-le" if content[1:2] == b"\0" else "utf-16-be"
+    for name in (encoding, *["cp1252", "latin-1"] * (encoding == "utf-8-sig")):
+        try:
+            text = content.decode(name)
+        except UnicodeDecodeError:
+            continue
+        if not reading.CONTROL.search(text.encode()):
+            return text
+        break
+    raise ValueError("the file is no text; export it as text in UTF-8, or name it by its format")
 
 
-def _are_numbers(found: list[str]) -> bool:
-    return all(number_in(cell.replace(",", ".")) is not None for cell in found)
+def table(text: str) -> Table:
+    """The table in a text: columns, numbers, and notes above it.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or a line in it is no row of numbers; with the number of the line.
+    """
+    lines = text.splitlines()
+    last = [k for k in range(max(0, len(lines) - 4 * SHOWN), len(lines)) if lines[k].strip()]
+    if not any(line.strip() and line.lstrip()[0] not in "#%" for line in lines):
+        raise ValueError(f"the file has no table; give a header such as {EXAMPLE}, and numbers")
+    wrong = ""
+    for delimiter, comma in _separations([lines[k] for k in last[-SHOWN:]]):
+        kept, width = _columns([lines[k] for k in last[-SHOWN:]], delimiter, comma)
+        first = next((k for k, line in enumerate(lines)
+                      if _is_row(_cells(line, delimiter, comma), kept, width)), -1)  # fmt: skip
+        if first < 0:
+            continue
+        columns, names, notes, problem = _header(lines[:first], delimiter, kept, width)
+        if not problem:
+            numbers = _numbers(lines, first, delimiter, comma, kept, width, names, notes)
+            clocks = [_clock(_cells(lines[first], delimiter, comma)[k]) is not None for k in kept]
+            numbers[:, clocks] -= numbers[:1, clocks]
+            columns = tuple(replace(one, role=TIME, unit="s") if clock else one
+                            for one, clock in zip(columns, clocks, strict=True))  # fmt: skip
+            return Table(columns=columns, numbers=numbers, notes=tuple(notes))
+        wrong = wrong or problem
+    raise ValueError(wrong or _no_rows(lines, last))
 
 
-def _last_above_numbers(lines: list[str], first: int) -> int:
-    """Number of the line of names above the first numbers; the first line if there are none."""
-    for k in range(first + 1, min(first + MOST_ABOVE, len(lines))):
-        if lines[k].strip() and _are_numbers(split(lines[k], delimiter_of(lines[k]))):
-            above = [n for n in range(first, k) if lines[n].strip()]
-            delimiter = delimiter_of(lines[k])
-            is_units = all(map(is_unit, split(lines[above[-1]], delimiter)))
-            return above[-2] if is_units and len(above) > 1 else above[-1]
-    return first
+def _separations(rows: list[str]) -> Iterator[tuple[str, bool]]:
+    """Delimiters, and whether decimal signs are commas, by which most rows are alike."""
+    for delimiter in "\t;, ":
+        if delimiter != " " and not any(delimiter in line for line in rows):
+            continue
+        bare = [line for line in rows if line.lstrip()[0] not in "#%"]
+        comma = delimiter != "," and any(_with_point(cell) != cell for line in bare if "," in line
+                                         for cell in _cells(line, delimiter))  # fmt: skip
+        if len(_columns(rows, delimiter, comma)[0]):
+            yield delimiter, comma
 
 
-def _refuse_no_header(given: Given) -> None:
-    """Columns of numbers alone are all of motion, and the rest has been told."""
-    if given.rate is None or not given.unit:
-        raise ValueError(
-            f"the first line has no header; write one such as {EXAMPLE}, or give --rate, "
-            "--quantity and --unit if every column is a place"
-        )
+def _columns(rows: list[str], delimiter: str, comma: bool) -> tuple[list[int], int]:
+    """The columns of numbers at the end of a file, and how many cells its rows have."""
+    split = [_cells(line, delimiter, comma) for line in rows]
+    widths = [len(cells) for cells in split[-3:]]
+    width = max(widths, key=widths.count)
+    alike = [cells for cells in split if len(cells) == width]
+    alike = alike[len(alike) // 2 :]  # without the header of a short table
+    full = [k for k in range(width) if any(cells[k] for cells in alike)]
+    kept = [k for k in full if 2 * sum(_is_value(c[k]) for c in alike) >= len(alike)]
+    return (kept if any(_is_number(c[k]) for c in alike for k in kept) else []), width
 
 
-def _numbers(lines: list[str], delimiter: str, columns: tuple[Column, ...], above: int) -> Floats:
-    """Numbers (n, c) below a header, as 1.5 or, between semicolons or tabs, 1,5."""
-    while lines and not lines[-1].strip():
-        lines = lines[:-1]
-    if not lines:
-        raise ValueError("the file has a header and no numbers; export it anew")
-    if delimiter != "," and any("," in line for line in lines[:10]):
-        for k, line in enumerate(lines):
-            if "." in line:
-                cell = next(cell for cell in split(line, delimiter) if "." in cell)
-                raise ValueError(
-                    f"line {above + k + 1} has '{cell.strip()[:40]}' with a dot, and the file has "
-                    "decimal commas; leave out separators of thousands"
-                )
-        lines = [line.replace(",", ".") for line in lines]
-    if '"' in lines[0]:
-        lines = [line.replace('"', "") for line in lines]
-    try:
-        found = np.loadtxt(
-            io.StringIO("\n".join(lines)), ndmin=2, comments=None,
-            delimiter=None if delimiter == " " else delimiter,
-        )  # fmt: skip
-    except ValueError:
-        raise ValueError(_first_wrong(lines, delimiter, len(columns), above)) from None
-    if found.shape[1] != len(columns):
-        raise ValueError(_first_wrong(lines, delimiter, len(columns), above))
-    if not np.isfinite(found).all():
-        row, k = np.argwhere(~np.isfinite(found))[0]
-        raise ValueError(
-            f"line {above + row + 1} has {found[row, k]:g} in the column '{columns[k].text}'; "
-            "leave out what was not measured"
-        )
-    return found
+def _is_row(cells: list[str], kept: list[int], width: int) -> bool:
+    """Whether cells are a row of the table: values in the columns of numbers, and one at least."""
+    if not kept[-1] < len(cells) <= width:
+        return False
+    found = [cells[k] for k in kept]
+    return all(map(_is_value, found)) and any(map(_is_number, found))
 
 
-def _first_wrong(lines: list[str], delimiter: str, count: int, above: int) -> str:
-    """Sentence on the first line that is no row of numbers."""
-    for k, line in enumerate(lines):
-        row = line.split(None if delimiter == " " else delimiter)
-        if len(row) != count:
-            word = {"\t": "tabs", " ": "white space"}.get(delimiter, f"'{delimiter}'")
+def _cells(line: str, delimiter: str, comma: bool = False) -> list[str]:
+    """Cells of a line; a delimiter within quotes or brackets is none, as in v(0,0)."""
+    if delimiter == " ":
+        joined = re.sub(r"\s+(?=[^\[\]]*\])|\s+(?=[\[(#])", "", line.strip()).replace('"', "")
+        found = joined.split()
+    elif not re.search(r'["(\[]', line):
+        found = line.split(delimiter)
+    else:
+        found, cell, depth, quoted = [], "", 0, False
+        for letter in line:
+            if letter == '"':
+                quoted = not quoted
+            elif letter == delimiter and not quoted and depth <= 0:
+                found.append(cell)
+                cell = ""
+            else:
+                depth += 0 if quoted else (letter in "([") - (letter in ")]")
+                cell += letter
+        found.append(cell)
+    found = [cell.strip().replace("\u2212", "-") for cell in found]
+    return [_with_point(cell) for cell in found] if comma else found
+
+
+def _with_point(cell: str) -> str:
+    """A number with a decimal comma as one with a point; other cells as they are."""
+    pointed = cell.replace(",", ".")
+    return pointed if "." not in cell and number_in(pointed) is not None else cell
+
+
+def _is_number(cell: str) -> bool:
+    value = _value(cell)
+    return value is not None and bool(np.isfinite(value))
+
+
+def _is_value(cell: str) -> bool:
+    return _value(cell) is not None
+
+
+def _value(cell: str) -> float | None:
+    """Number of a cell: nan of one that was not measured, inf beyond the range, s of a clock."""
+    number = number_in(cell)
+    if number is not None:
+        return number
+    if cell.lower() in NO_VALUE:
+        return np.nan
+    return np.inf if cell.lower().lstrip("-") in BEYOND else _clock(cell)
+
+
+def _clock(cell: str) -> float | None:
+    """Seconds of a date, a time of day, or both."""
+    found = _CLOCK.fullmatch(cell) if ":" in cell or cell[:1].isdigit() else None
+    if not found or not (found[1] or found[5]):
+        return None
+    seconds = 0.0
+    if found[1]:
+        parts = [int(found[k]) for k in (1, 3, 4)]
+        if found[2] != "-" and parts[0] < 32:
+            parts = [parts[2], *(parts[1::-1] if found[2] == "." else parts[:2])]
+        try:
+            seconds = 86400.0 * (date(*parts).toordinal() % 100)  # leaves digits to fractions
+        except ValueError:
+            return None
+    if found[5]:
+        seconds += 3600 * int(found[5]) + 60 * int(found[6]) + float(found[7].replace(",", "."))
+    return seconds
+
+
+def _header(
+    above: list[str], delimiter: str, kept: list[int], width: int
+) -> tuple[tuple[Column, ...], list[str], list[tuple[str, str]], str]:
+    """Columns, all names, and notes of the lines above a table, and what is wrong with them."""
+    at = [k for k, line in enumerate(above) if line.strip()]
+    notes = [_note(above[k]) for k in at]
+    rows = [_heading(above[k], delimiter) for k in at]
+    found = [rows.pop()] if rows and not _is_title(rows[-1], len(kept)) else []
+    if found and _are_units([found[0][k] for k in kept if k < len(found[0])]):
+        found = [rows.pop() if rows and len(rows[-1]) > kept[-1] else [], *found]
+    elif found and any(number_in(cell) is not None for cell in found[0]):
+        cell = next((cell for cell in found[0] if number_in(cell) is None), "")
+        if rows and len(rows[-1]) == len(found[0]) and not any(map(number_in, rows[-1])):
             return (
-                f"line {above + k + 1} has {len(row)} cells between {word} and the header "
-                f"{count}; mend it"
+                (),
+                [],
+                notes,
+                f"line {at[-1] + 1} has '{cell[:40]}', which is no number; mend it",
             )
-        for cell in row:
-            if number_in(cell) is None:
-                return (
-                    f"line {above + k + 1} has '{cell.strip()[:40]}', which is no number; mend it"
+        found = found if column(found[0][0]).role else []
+    names, units = ([*cells, *[""] * width] for cells in [*found, [], []][:2])
+    notes += [(names[k].lower(), units[k]) for k in range(min(len(names), len(units)))
+              if k not in kept and names[k] and units[k]]  # fmt: skip
+    count = len(found[0]) if found else width
+    if found and found[0] and (count <= kept[-1] or (count > width and len(found) == 1)):
+        word = {"\t": "tabs", " ": "white space"}.get(delimiter, f"'{delimiter}'")
+        return (), [], notes, (
+            f"line {at[-1] + 2} has {width} cells between {word} and the header {count}; give a "
+            "name for each column, and columns with decimal commas between semicolons"
+        )  # fmt: skip
+    return tuple(column(names[k], units[k]) for k in kept), names, notes, ""
+
+
+def _is_title(cells: list[str], count: int) -> bool:
+    """Whether the cells above a table are no names of its columns."""
+    if len(cells) == 1 and count > 1:
+        one = column(cells[0])
+        return not (one.role or one.unit)
+    return not cells
+
+
+def _heading(line: str, delimiter: str) -> list[str]:
+    """Cells of a line that may be names or units; none of a note such as "key: value"."""
+    marked = line.lstrip()[0] in MARK
+    if marked and ":" in line:
+        return []
+    cells = _cells(line.lstrip(MARK + " ") if marked else line, delimiter)
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Whether cells are units and nothing else, be they in brackets."""
+    return any(cells) and all(
+        plain(cell) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None for cell in cells
+    )
+
+
+def _note(line: str) -> tuple[str, str]:
+    """Key in lower case and value of a line such as "key: value" or "key,value"."""
+    bare = re.sub(r"^[#%;/!\s]+", "", line).replace('"', "")
+    key, value = [*re.split(r"[:,;\t=]+", bare, maxsplit=1), ""][:2]
+    name, unit = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", key.strip()).groups()
+    return name.lower(), f"{value.strip(' ,;' + chr(9))} {unit or ''}".strip()
+
+
+def _numbers(
+    lines: list[str], first: int, delimiter: str, comma: bool, kept: list[int], width: int,
+    names: list[str], notes: list[tuple[str, str]],
+) -> Floats:  # fmt: skip
+    """Numbers (n, c) of the lines from the first on; notes from cells beside them are added."""
+    rows = lines[first:]
+    if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SHOWN]):
+        raise ValueError(
+            f"line {first + 1} seems to have decimal commas between commas; export columns between "
+            "semicolons or tabs"
+        )
+    plain_rows = "\n".join(rows)
+    values = []
+    if len(kept) == width and not (comma and "." in plain_rows):
+        with suppress(ValueError):
+            found = np.loadtxt(
+                io.StringIO(plain_rows.replace(",", ".") if comma else plain_rows), ndmin=2,
+                comments=None, delimiter=None if delimiter == " " else delimiter,
+            )  # fmt: skip
+            if found.shape[1] == width and not np.isinf(found).any():
+                return found[~np.isnan(found).all(axis=1)]
+    for k, line in enumerate(rows, first + 1):
+        if not line.strip():
+            continue
+        if comma and "." in line and ":" not in line:
+            cell = next(cell for cell in _cells(line, delimiter) if "." in cell)
+            raise ValueError(
+                f"line {k} has '{cell[:40]}' with a dot, and the file has decimal commas; leave "
+                "out separators of thousands"
+            )
+        cells = _cells(line, delimiter, comma)
+        if len(cells) > width or len(cells) <= kept[-1]:
+            raise ValueError(
+                f"line {k} has {len(cells)} cells and the rows above {width}; complete or delete it"
+            )
+        row = [_value(cells[c]) for c in kept]
+        for c, number in zip(kept, row, strict=True):
+            if number is None:
+                raise ValueError(f"line {k} has '{cells[c][:40]}', which is no number; mend it")
+            if np.isinf(number):
+                raise ValueError(
+                    f"line {k} has '{cells[c][:40]}', beyond the range of the instrument; measure "
+                    "with a larger range"
                 )
-    return "the file is no table of numbers; export it anew"
+        aside = {c: cell for c, cell in enumerate(cells) if cell and c not in kept}
+        for c, cell in aside.items():
+            if names[c] and _is_number(cell):
+                raise ValueError(
+                    f"line {k} has '{cell[:40]}' in the column '{names[c][:40]}', which ends "
+                    "early; export columns of one length, or without it"
+                )
+        if aside and not any(names[c] for c in aside):
+            notes.append((next(iter(aside.values())).lower(), " ".join([*aside.values()][1:])))
+        values.append(row)
+    numbers = np.array(values, np.float64)
+    return numbers[~np.isnan(numbers).all(axis=1)]
+
+
+def _no_rows(lines: list[str], last: list[int]) -> str:
+    """Sentence on a text without rows of numbers."""
+    if len(last) > 1:
+        cells = re.split(r"[\t;, ]+", lines[last[-1]].strip())
+        wrong = next((cell for cell in cells if number_in(cell) is None), cells[0])
+        if len(wrong) < len(lines[last[-1]].strip()):
+            return f"line {last[-1] + 1} has '{wrong[:40]}', which is no number; mend it"
+    return "the file has a header and no numbers; export it anew"

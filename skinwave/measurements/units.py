@@ -24,7 +24,22 @@ MOTION = {
         "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY,
     },
 }  # fmt: skip
-_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-"})
+ANGLES = {"deg": 1.0, "rad": 1.0}
+_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"})
+# Words of programs and languages, in lower case.
+_WORDS = {
+    word: unit
+    for unit, words in {
+        "s": "s sec secs second seconds sekunde sekunden seconde secondes segundo "
+             "segundos secondi 秒",
+        "ms": "msec millisecond milliseconds millisekunden millisecondes milisegundos",
+        "us": "usec microsecond microseconds mikrosekunden", "ns": "nsec nanosecond nanoseconds",
+        "Hz": "hz hertz", "kHz": "khz kilohertz", "deg": "deg degree degrees grad degdeg",
+        "rad": "rad radian radians", "um": "micron microns micrometer micrometre",
+        "V": "v volt volts", "g": "gn",
+    }.items()
+    for word in words.split()
+}  # fmt: skip
 _FACTOR = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(.*)", re.IGNORECASE)
 _LEVELS = re.compile(r"dB\w*(/.*)?", re.IGNORECASE)
 
@@ -33,8 +48,19 @@ def plain(unit: str) -> str:
     """A unit as it is looked up: "µm·s^-1" is "um/s", "m/s^2" and "m/s/s" are "m/s2"."""
     text = unit.strip().strip("[]()").translate(_SAME).replace("**", "^").replace("^", "")
     text = re.sub(r"[\s·*.]*s-1$", "/s", text)
-    text = re.sub(r"[\s·*.]*s-2$|/s/s$|/s\^?2$|/\(s2\)$", "/s2", text)
-    return re.sub(r"^(micron|microns|micrometer|micrometre)\b", "um", text.replace(" ", ""))
+    text = re.sub(r"[\s·*.]*s-2$|/s/s$|/s\^?2$|/\(s2\)$", "/s2", text).replace(" ", "")
+    above, slash, below = text.partition("/")
+    words = _WORDS.get(above.lower(), above), re.sub(r"^sec(ond)?s?(?=2?$)", "s", below)
+    return slash.join(words) if slash else words[0]
+
+
+def per_reference(unit: str) -> tuple[str, bool]:
+    """Unit of motion without that of a reference below it, as "m/s" of "(m/s)/N", and whether it
+    has one.
+    """
+    above, _, below = unit.strip("[] ").rpartition("/")
+    has = plain(below) in ("N", "V", "Pa") and bool(quantity_of(above))
+    return (above.strip("() "), True) if has else (unit, False)
 
 
 def quantity_of(unit: str) -> str:
