@@ -37,7 +37,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--variable", default="", metavar="NAME", help="array of a file of several")
     parser.add_argument("--columns", default="", metavar="NAMES",
                         help='columns of motion, "CH1,CH3" or numbers from 1')  # fmt: skip
-    parser.add_argument("--direction", default="", choices=("x", "y", "z"),
+    parser.add_argument("--direction", choices=("x", "y", "z"),
                         help="of the motion in a Universal File (default: z)")  # fmt: skip
 
 
@@ -49,7 +49,7 @@ def measured_in(file: Path, options: argparse.Namespace) -> "Measurement":
         file, quantity=options.quantity, unit=options.unit,
         places=places_of(options.places) if options.places else None,
         sign=SIGNS[options.positive] if options.positive else None,
-        rate=options.rate, variable=options.variable, direction=options.direction,
+        rate=options.rate, variable=options.variable, direction=options.direction or "",
         columns=tuple(name.strip() for name in options.columns.split(",") if name.strip()),
     )  # fmt: skip
 

@@ -111,7 +111,9 @@ def column(text: str, unit: str = "") -> Column:
         said = f"{apart[1]} [{apart[2]}]"
     found = _COLUMN.fullmatch(said)
     if not found:
-        return Column(text=said, role="", unit=unit.strip("[]() "))
+        last = re.fullmatch(r".*[\[(]([^\[\]()]*)[\])]", said)
+        unit = (unit or (last[1] if last else "")).strip("[]() ")
+        return Column(text=said, role=_role("", unit), unit=unit)
     words = found["name"].strip().lower()
     unit = unit or found["unit"] or found["round"] or ""
     if words not in ROLE and not unit:

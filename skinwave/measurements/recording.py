@@ -142,7 +142,9 @@ def _measured(found: Recording) -> tuple[Recording, list[str]]:
 def _quantity(found: Recording, given: Given) -> tuple[str, str]:
     """Quantity and unit."""
     unit = given.unit or found.unit
-    quantity = given.quantity or found.quantity or units.quantity_of(unit)
+    quantity = (
+        given.quantity or units.quantity_of(given.unit) or found.quantity or units.quantity_of(unit)
+    )
     if not unit:
         missing = "the unit" if quantity else "what was measured, and its unit"
         option = f"--unit {_usual(quantity)}" if quantity else EXAMPLE

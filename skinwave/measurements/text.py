@@ -286,8 +286,8 @@ def _note(line: str) -> tuple[str, str]:
     """Key in lower case and value of a line such as "key: value" or "key,value"."""
     bare = re.sub(r"^[#%;/!\s]+", "", line).replace('"', "")
     key, value = [*re.split(r"[:,;\t=]+", bare, maxsplit=1), ""][:2]
-    name, unit = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", key.strip()).groups()
-    return name.lower(), f"{value.strip(' ,;' + chr(9))} {unit or ''}".strip()
+    name, _, unit = key.strip(" )]").replace("[", "(").partition("(")
+    return name.strip().lower(), f"{value.strip(' ,;' + chr(9))} {unit}".strip()
 
 
 def _numbers(
